@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from numbers import Integral
 from typing import Any
 
@@ -34,9 +34,23 @@ def parse_toml(text: str) -> dict[str, Any]:
         line = text.count("\n", 0, long_key.start()) + 1
         raise ValueError(f"a key of more than {MAX_LEVELS} parts (at line {line}); take shorter ones")
     try:
-        return tomllib.loads(text)
+        table = tomllib.loads(text)
+        too_long = next(_too_long(table, ""), None)
     except (RecursionError, OverflowError) as error:
         raise ValueError(f"nested too deeply, or a number too long ({type(error).__name__})") from None
+    if too_long is not None:
+        raise ValueError(f"{too_long.lstrip('.')}: TOML has whole numbers of 64 bits, write a larger one as 1e30")
+    return table
+
+
+def _too_long(value: Any, place: str) -> Iterator[str]:
+    """Places of whole numbers in a TOML table that 64 bits do not hold."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        yield place
+    for name, part in value.items() if isinstance(value, dict) else ():
+        yield from _too_long(part, f"{place}.{name}")
+    for number, part in enumerate(value if isinstance(value, list) else ()):
+        yield from _too_long(part, f"{place}[{number}]")
 
 
 def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:

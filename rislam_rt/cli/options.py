@@ -143,8 +143,6 @@ def write_json(file: Path | None, content: dict[str, Any]) -> None:
     """
     if file is None:
         return
-    import json
+    from rislam_rt.storage.files import MARK, json_file, write_atomic
 
-    from rislam_rt.storage.files import MARK, write_atomic
-
-    write_atomic(file, (json.dumps({**content, "origin": MARK}, indent=2, allow_nan=False) + "\n").encode())
+    write_atomic(file, json_file({**content, "origin": MARK}, indent=2))

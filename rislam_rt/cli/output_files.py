@@ -45,17 +45,20 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
     Raises
     ------
     ConfigError
-        It is there, is not empty, and was not made by this program; and the command was not told to overwrite it.
+        It is a folder; or it is there, is not empty and not made by this program, and the command was not told to
+        overwrite it.
     StoreError
         Its folder cannot be written to.
     """
     from rislam_rt.errors import ConfigError
-    from rislam_rt.storage.files import check_writable, is_device, is_own
+    from rislam_rt.storage.files import check_writable, is_device, is_own, led_to
 
     if file is None:
         return None
+    if file.is_dir():
+        raise ConfigError(f"{option}{file}: is a folder; give the name of a file")
     if not is_device(file):
-        check_writable(file.parent)
+        check_writable(led_to(file).parent)
     if not _may_overwrite and not is_own(file):
         raise ConfigError(
             f"{option}{file}: is there already, and not of this program's making; give another name, or --overwrite"

@@ -153,24 +153,23 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
 
 def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
     """Write what `slam` found: the estimate as TUM and as CSV, and the last map."""
-    import json
-
     import numpy as np
 
     from rislam_rt.scene.write import tum_bytes
-    from rislam_rt.storage.files import write_atomic
+    from rislam_rt.storage.files import csv_file, json_file, write_all
+    from rislam_rt.sweeps.record import plain_result
 
     position = np.array([one.position for one in answers.estimates])
     heading = np.array([one.heading for one in answers.estimates])
-    write_atomic(folder / "estimate.tum", tum_bytes(inputs.time, position, heading))
-    lines = ["time_s,x_m,y_m,z_m,std_x_m,std_y_m,std_z_m,heading_rad,components,outcome"]
+    head = ["time_s", "x_m", "y_m", "z_m", "std_x_m", "std_y_m", "std_z_m", "heading_rad", "components", "outcome"]
+    rows = []
     for time, one, info, heard in zip(inputs.time, answers.estimates, answers.infos, inputs.measurements, strict=True):
         std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
         numbers = [time, *one.position, *std, one.heading]
-        lines.append(",".join([*(f"{value:.9g}" for value in numbers), str(len(heard)), str(info.outcome)]))
-    write_atomic(folder / "estimate.csv", ("\n".join(lines) + "\n").encode())
+        rows.append([*(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
     last = answers.estimates[-1].map
     fields = ("ident", "position", "covariance", "parent", "ris_probability", "strength", "wall_normal", "wall_offset")
     names = (*fields, "wall_std", *(["panel"] if last.panel is not None else []))
-    content = {name: getattr(last, name).tolist() for name in names}
-    write_atomic(folder / "map.json", (json.dumps(content, indent=1) + "\n").encode())
+    files = {"estimate.tum": tum_bytes(inputs.time, position, heading), "estimate.csv": csv_file(head, rows)}
+    content = plain_result({name: getattr(last, name) for name in names})
+    write_all(folder, files | {"map.json": json_file(content)})

@@ -18,7 +18,7 @@ from rislam_rt.report.studies.classifier import (
     weights_file,
 )
 from rislam_rt.report.style import to_png
-from rislam_rt.storage.files import json_file, write_atomic
+from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.classifier.run import ALL, run_training
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.spec import study_record
@@ -50,8 +50,7 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     }
     if given.page:
         contents |= {name: to_png(draw(found)) for name, draw in PICTURES.items()}
-    for name, data in contents.items():
-        write_atomic(folder / name, data)
+    page = write_all(folder, contents)
     typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")
-    typer.echo(f"page: {folder / PAGE}.md")
+    typer.echo(f"page: {page}")
     write_json(given.json, content)

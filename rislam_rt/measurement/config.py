@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from rislam_rt.errors import ConfigError
 
 ESTIMATORS = ("bound", "waveform")
@@ -11,6 +9,18 @@ ESTIMATORS = ("bound", "waveform")
 
 RESOLUTIONS = ("cell", "joint")
 ORDERS = ("ABBA", "AB")
+MOST_TONES = 65536
+"""Of a sounding: what estimates from its samples takes memory and time for all of them."""
+RANGES: dict[str, tuple[float, float]] = {
+    "detection_threshold_db": (2.0, 60.0), "clutter_rate": (0.0, 1e4), "leakage_cancellation_db": (0.0, 300.0),
+    "code_dwell": (0.0, 1e12), "slot": (0.0, 1e12), "top_speed": (0.0, 1e12), "min_delay": (0.0, 1.0),
+    "max_delay": (0.0, 1.0), "false_alarm_rate": (0.0, 1e12), "num_subcarriers": (0, MOST_TONES),
+    "converter_bits": (0, 32), "max_components": (1, 1000), "panels": (1, 100),
+}  # fmt: skip
+"""Smallest and largest value of each. Below 2 dB the law of false alarms, one of high levels, gives a negative number;
+above 60 dB nothing is heard; a delay of 1 s is beyond every scene."""
+LEAST_RATE = 1e-100
+"""[false components a cycle] Fewer nobody asks for, and a threshold for them float64 cannot tell."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,28 +74,15 @@ class ReceiverConfig:
             if getattr(self, name) not in allowed:
                 choice = " or ".join(map(repr, allowed))
                 raise ConfigError(f"receiver.{name}: '{getattr(self, name)}' received; give {choice}")
-        not_negative: tuple[str, ...] = (
-            "clutter_rate",
-            "leakage_cancellation_db",
-            "min_delay",
-            "false_alarm_rate",
-            "code_dwell",
-        )
-        not_negative += ("slot", "top_speed")
-        for name in ("detection_threshold_db", "max_delay", *not_negative):
-            if not np.isfinite(getattr(self, name)):
-                raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give a finite number")
-        for name in not_negative:
-            if getattr(self, name) < 0.0:
-                raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give 0 or more")
-        for name, least, most in (
-            ("num_subcarriers", 0, 65536),
-            ("converter_bits", 0, 32),
-            ("max_components", 1, 1000),
-            ("panels", 1, 100),
-        ):
+        for name, (least, most) in RANGES.items():
             if not least <= getattr(self, name) <= most:
-                raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give {least} to {most}")
+                raise ConfigError(f"receiver.{name}: {getattr(self, name)} received; give {least:g} to {most:g}")
+        if 0.0 < self.false_alarm_rate < LEAST_RATE:
+            raise ConfigError(
+                f"receiver.false_alarm_rate: {self.false_alarm_rate} received; give 0, or at least {LEAST_RATE:g}"
+            )
+        if self.num_subcarriers == 1:
+            raise ConfigError("receiver.num_subcarriers: 1 received; one tone tells no delay, give 0, or 2 or more")
         if self.max_delay <= self.min_delay:
             raise ConfigError(
                 f"receiver.max_delay: {self.max_delay} s received; give more than min_delay, {self.min_delay} s"

@@ -18,6 +18,9 @@ from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.signal import add_noise, convert, num_tones, to_samples, to_tones
 from rislam_rt.model import RadioConfig
 
+LARGEST = 1e12
+"""Largest value of a fault; float64 carries its square, and nothing is worse."""
+
 
 @dataclass(frozen=True, slots=True)
 class HardwareConfig:
@@ -54,10 +57,12 @@ class HardwareConfig:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            if name not in ("told", "carrier_offset_hz") and not (np.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"hardware.{name}: {value} received; give a number of 0 or more")
-        if not np.isfinite(self.carrier_offset_hz):
-            raise ConfigError(f"hardware.carrier_offset_hz: {self.carrier_offset_hz} received; give a finite number")
+            if name not in ("told", "carrier_offset_hz") and not 0.0 <= value <= LARGEST:
+                raise ConfigError(f"hardware.{name}: {value} received; give 0 to {LARGEST:g}")
+        if not abs(self.carrier_offset_hz) <= LARGEST:
+            raise ConfigError(
+                f"hardware.carrier_offset_hz: {self.carrier_offset_hz} received; give {-LARGEST:g} to {LARGEST:g}"
+            )
         if self.coupling >= 0.2:
             raise ConfigError(f"hardware.coupling: {self.coupling} received; give less than 0.2 (-14 dB)")
 

@@ -8,7 +8,8 @@ of M samples at rate B, scaled by 1 / sqrt(B), whose noise has the variance N0 B
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, phasor
-from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.errors import ConfigError
+from rislam_rt.measurement.config import MOST_TONES, ReceiverConfig
 from rislam_rt.measurement.estimation.sounding import tone_response
 from rislam_rt.measurement.received import Received
 from rislam_rt.model import RadioConfig
@@ -19,11 +20,23 @@ FEWEST_TONES = 16
 
 def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
     """Tones M of the received signal: as set, or the power of two that leaves a quarter of its period after the last
-    delay."""
+    delay.
+
+    Raises
+    ------
+    ConfigError
+        The last delay takes more than `MOST_TONES`.
+    """
     if config.num_subcarriers:
         return config.num_subcarriers
     needed = max(1.25 * radio.bandwidth * config.max_delay, FEWEST_TONES)
-    return int(2 ** np.ceil(np.log2(needed)))
+    count = int(2 ** np.ceil(np.log2(needed)))
+    if count > MOST_TONES:
+        raise ConfigError(
+            f"receiver.max_delay: {config.max_delay:g} s received, which take {count} tones over "
+            f"{radio.bandwidth / 1e9:g} GHz, more than {MOST_TONES}; give less"
+        )
+    return count
 
 
 def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elements: Floats | None = None) -> Complexes:

@@ -72,7 +72,7 @@ class SchemeResult:
     end); None of others, and of runs in slices."""
     given: Any = None
     """What the estimator was given, cycle by cycle, and the seed that it drew from
-    (`rislam_rt.pipeline.recordings.recorded_inputs.RecordedInputs`); None where the result was read from a file: it
+    (`rislam_rt.pipeline.recordings.inputs.RecordedInputs`); None where the result was read from a file: it
     lies in one of its own."""
 
     def __post_init__(self) -> None:

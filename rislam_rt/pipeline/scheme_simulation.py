@@ -13,10 +13,10 @@ from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, Receptions, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
-from rislam_rt.pipeline.record import gather
-from rislam_rt.pipeline.recordings.recorded_inputs import given_of
+from rislam_rt.pipeline.recordings.inputs import given_of
 from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
 from rislam_rt.pipeline.room.front_end import prepare_front_end
+from rislam_rt.pipeline.scheme_result import gather
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings

@@ -25,8 +25,7 @@ def panel_path_gain(
 
     Both legs and the code turn an element's signal together; in single precision an element errs by 1e-7 of a turn.
     """
-    first, distance = leg_parts(spec, center, tx, radio.wavelength)
-    second, onward = leg_parts(spec, center, rx, radio.wavelength)
+    (first, second), (distance, onward) = leg_parts(spec, center, np.stack([tx, rx]), radio.wavelength)
     turns = (distance + onward) / radio.wavelength + code.xi / (2.0 * np.pi)
     angle = (2.0 * np.pi * (np.rint(turns) - turns)).astype(np.float32)
     amplitude = (first * second).astype(np.float32)

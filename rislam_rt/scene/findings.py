@@ -34,11 +34,13 @@ class Fault(SceneError):
         super().__init__(one_line(f"{message}; {mend}"))
         self.message = message
         self.mend = mend
+        self.key = ""
+        """Below the place that the caller names, where one key is at fault."""
         self.faults: list[Fault] = [self]
 
     def at(self, file: str, field: str) -> Finding:
         """The finding at its place."""
-        return Finding("error", file, field, self.message, self.mend)
+        return Finding("error", file, f"{field}.{self.key}" if self.key else field, self.message, self.mend)
 
 
 class Faults(Fault):

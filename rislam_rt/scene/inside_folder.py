@@ -26,7 +26,7 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
         with path.open("rb") as file:
             content = file.read(limit + 1)
     except (OSError, ValueError, RuntimeError) as error:
-        cause = one_line(str(error))[:60]
+        cause = one_line(getattr(error, "strerror", None) or str(error))[:60]
         raise Fault(f"'{name[:80]}' cannot be read ({cause})", "check the file and its permissions") from None
     if len(content) > limit:
         raise Fault(f"'{name[:80]}' is larger than {limit} bytes", "give a smaller file")

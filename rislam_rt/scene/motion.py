@@ -40,8 +40,12 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
     if agent.velocity is not None:
         return straight_motion(agent.start, agent.velocity, agent.cycles or 0, agent.cycle_s or 0.0, body), b""
     if agent.trajectory is not None:
-        content = read_inside(folder, agent.trajectory, MAX_TUM_BYTES)
-        return _recorded_motion(agent, content, body), content
+        try:
+            content = read_inside(folder, agent.trajectory, MAX_TUM_BYTES)
+            return _recorded_motion(agent, content, body), content
+        except Fault as fault:
+            fault.key = "trajectory"
+            raise
     assert agent.speed_m_s is not None
     assert agent.cycle_s is not None
     radius = agent.speed_m_s**2 / agent.acceleration_m_s2

@@ -16,6 +16,13 @@ def square_root(covariance: Floats) -> Floats:
     return scale[:, None] * vectors[:, keep] * np.sqrt(values[keep])
 
 
+def square_roots(covariance: Floats) -> Floats:
+    """Factors (N, D, D) of covariances (N, D, D) as by `square_root`, null directions being columns of zeros."""
+    scale = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-30))
+    values, vectors = np.linalg.eigh(covariance / (scale[:, :, None] * scale[:, None, :]))
+    return np.asarray(scale[:, :, None] * vectors * np.sqrt(np.where(values > 1e-12, values, 0.0))[:, None, :])
+
+
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
 
 

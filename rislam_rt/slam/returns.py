@@ -124,12 +124,17 @@ class Linear(NamedTuple):
 
     seen: Floats
     """(..., R, 3)."""
-    by_feature: Floats
-    """(..., R, 3, F, 3)."""
+    wide: Floats
+    """(..., R, 3, S + 3F) with respect to the features, behind S spare columns of zeros."""
     by_tx: Floats
     """(..., R, 3, 3) with respect to the position of the Tx."""
     by_rx: Floats
     """(..., R, 3, 3) with respect to the position of the Rx."""
+
+    @property
+    def by_feature(self) -> Floats:
+        """(..., R, 3, F, 3), where no column is spare."""
+        return self.wide.reshape(*self.seen.shape, self.wide.shape[-1] // 3, 3)
 
     @property
     def by_pose(self) -> Floats:
@@ -147,38 +152,41 @@ class Linear(NamedTuple):
         return turned
 
 
-def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Linear:
+def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses, spare: int = 0) -> Linear:
     """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's ends."""
     ends = Poses(poses.tx[..., None, :], poses.rx[..., None, :], np.asarray(poses.heading)[..., None])
-    return _linearise(returns, features, anchor, ends.tx, ends)
+    return _linearise(returns, features, anchor, ends.tx, ends, spare)
 
 
-def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Linear:
+def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses, spare: int = 0) -> Linear:
     """The same of R returns of which each has a pose of its own, of features (F, 3); a leg has one `TX` at most."""
     tx = np.empty((len(returns.legs), 3))
     tx[returns.tx] = tx[returns.rx] = poses.tx
-    return _linearise(returns, features, anchor, tx, poses)
+    return _linearise(returns, features, anchor, tx, poses, spare)
 
 
-def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses) -> Linear:
+def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses, spare: int) -> Linear:
     """With the Tx of each leg (..., G or 1, 3), and poses with an axis for the returns (..., R or 1)."""
-    image, by_feature, by_base = _leg_jacobian(returns, features, anchor, leg_tx)
+    image, slopes = _leg_jacobian(returns.legs, features, anchor, leg_tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
-    # features side by side, so that one product of matrices serves all of them
-    count = by_feature.shape[-2]
-    wide = by_feature.reshape(*image.shape, 3 * count)
-    features_jacobian = by_rx @ wide[..., returns.rx, :, :]
-    moving = returns.legs[:, 0] == TX
-    rows = (~moving[returns.tx]).nonzero()[0]  # the Tx leg of a moving base is the Tx itself
-    toward = by_tx[..., rows, None, :] @ wide[..., returns.tx[rows], :, :]
-    features_jacobian[..., rows, 0, :] += toward[..., 0, :]
-    features_jacobian = features_jacobian.reshape(*features_jacobian.shape[:-1], count, 3)
-    if moving.any():  # the images of a moving base move with it
-        tx_jacobian = by_rx @ np.where(moving[:, None, None], by_base, 0.0)[..., returns.rx, :, :]
-    else:
-        tx_jacobian = np.zeros(by_rx.shape)
+    count = features.shape[-2]
+    wide = np.zeros((*seen.shape, spare + 3 * count))
+    block = np.swapaxes(wide[..., spare:].reshape(*seen.shape, count, 3), -3, -2)
+    heard, parts = by_rx @ slopes[..., returns.rx, :, :], returns.legs[returns.rx]
+    rows, part = (parts >= 0).nonzero()
+    each = np.swapaxes(heard.reshape(*heard.shape[:-1], 3, 3), -3, -2)
+    block[..., rows, parts[rows, part], :, :] = each[..., rows, part, :, :]
+    still = (returns.point != TX).nonzero()[0]  # the Tx leg of a moving base is the Tx itself
+    if len(still):
+        parts = returns.legs[returns.tx[still]]
+        rows, part = (parts >= 0).nonzero()
+        length = by_tx[..., still, None, :] @ slopes[..., returns.tx[still], :, :]
+        each = length.reshape(*length.shape[:-2], 3, 3)
+        block[..., still[rows], parts[rows, part], 0, :] += each[..., rows, part, :]
+    # the images of a moving base move with it
+    tx_jacobian = np.where((returns.point == TX)[:, None, None], heard[..., :3], 0.0)
     tx_jacobian[..., 0, :] -= by_tx
-    return Linear(seen, features_jacobian, tx_jacobian, -by_rx)
+    return Linear(seen, wide, tx_jacobian, -by_rx)
 
 
 def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
@@ -194,19 +202,14 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
     return np.concatenate([tx_length + rx_length, cosines], axis=-1), by_tx, by_rx
 
 
-def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats, Floats]:
-    """Images (..., G, 3) of the legs, their derivatives (..., G, 3, F, 3) by the features, (..., G, 3, 3) by the base.
-
-    A leg moves with three features at most: its point, through both mirrors, the wall next to it, through the other
-    mirror, and that other wall.
-    """
-    legs = returns.legs
+def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats]:
+    """Images (..., G, 3) of the legs and their derivatives (..., G, 3, 9) by all that moves them: the base, through
+    both mirrors, the wall next to it, through the other mirror, and that other wall."""
     moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx, image)
-    by_feature = np.zeros((*image.shape, features.shape[-2], 3))
-    block = np.swapaxes(by_feature, -3, -2)
-    by_base = np.zeros((*image.shape, 3)) + AXES
+    slopes = np.zeros((*image.shape, 9))
+    slopes[..., :3] = AXES
     for column in (1, 2):
         rows, walls = bounced(legs, column)
         if not len(rows):
@@ -216,17 +219,12 @@ def _leg_jacobian(returns: Returns, features: Floats, anchor: Floats, tx: Floats
         scaled = span / np.vecdot(span, span)[..., None]
         depth = np.vecdot(scaled, start - 0.5 * (wall + anchor[walls]))[..., None]
         mirrored = start - 2.0 * depth * span
-        householder = AXES - 2.0 * span[..., :, None] * scaled[..., None, :]
-        by_base[..., rows, :, :] = householder @ by_base[..., rows, :, :]
-        if column == 2:
-            near = legs[rows, 1]
-            block[..., rows, near, :, :] = householder @ block[..., rows, near, :, :]
-        by_wall = -2.0 * (depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :])
-        block[..., rows, walls, :, :] = by_wall
-        image[..., rows, :] = mirrored
-    rows = (~moving).nonzero()[0]
-    block[..., rows, legs[rows, 0], :, :] += by_base[..., rows, :, :]
-    return image, by_feature, by_base
+        passed = (AXES - 2.0 * span[..., :, None] * scaled[..., None, :]) @ slopes[..., rows, :, :]
+        passed[..., 3 * column : 3 * column + 3] = -2.0 * (
+            depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]
+        )
+        slopes[..., rows, :, :], image[..., rows, :] = passed, mirrored
+    return image, slopes
 
 
 def compact(returns: Returns, rows: Integers) -> Returns:

@@ -1,12 +1,14 @@
 """Writing files so that they are there whole or not at all, and taking away what a killed process was writing."""
 
+import csv
+import io
 import json
 import os
 import re
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from errno import EACCES, ENOTDIR
+from errno import EACCES, ELOOP, ENOTDIR
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
@@ -35,9 +37,29 @@ def is_own(path: Path) -> bool:
         return False
 
 
-def json_file(content: Any) -> bytes:
+def json_file(content: Any, *, indent: int = 1, sort_keys: bool = False) -> bytes:
     """Content of a JSON file, as plain data stand in it; NaN and infinity are refused."""
-    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()
+    return (json.dumps(content, indent=indent, sort_keys=sort_keys, allow_nan=False) + "\n").encode()
+
+
+def csv_file(head: Iterable[str], rows: Iterable[Iterable[Any]]) -> bytes:
+    """Content of a CSV file: the names of its columns, then its rows."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([head, *rows])
+    return text.getvalue().encode(errors="backslashreplace")
+
+
+def write_all(folder: Path, files: Mapping[str, bytes]) -> Path:
+    """Write files, relative name -> content, one after the other, each as `write_atomic`; returns the first.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    for name, content in files.items():
+        write_atomic(folder / name, content)
+    return folder / next(iter(files))
 
 
 def write_atomic(path: Path, content: bytes) -> None:
@@ -64,6 +86,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
             with os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND), "wb") as device:
                 device.writelines(pieces)
             return
+        path = led_to(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
         try:
@@ -78,6 +101,20 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
             raise
     except OSError as error:
         raise refused(path, error) from None
+
+
+def led_to(path: Path) -> Path:
+    """The file that writing to a path makes or replaces: a link stays, what it leads to does not.
+
+    Raises
+    ------
+    StoreError
+        It is a link that leads to itself.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise refused(path, OSError(ELOOP, os.strerror(ELOOP)))
+    return target
 
 
 def is_device(path: Path) -> bool:

@@ -19,9 +19,8 @@ from rislam_rt.pipeline.specification.read import Table, build_spec, make_way, r
 from rislam_rt.pipeline.specification.section import Positive, Section
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.sweeps.axes import Axis, Scalar, Value, parse_axis
-from rislam_rt.sweeps.record import json_bytes
 from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
 from rislam_rt.sweeps.sweep import Sweep
 
@@ -198,8 +197,7 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
         The disk refused.
     """
     content = [score.as_dict() for score in scores]
-    write_atomic(folder / "scores.json", json_bytes(content))
-    write_atomic(folder / "scores.csv", csv_bytes(content))
+    write_all(folder, {"scores.json": json_file(content, sort_keys=True), "scores.csv": csv_bytes(content)})
 
 
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:

@@ -1,6 +1,5 @@
-"""The record of a cell: its result as plain data and as bytes, the same on every machine, at every time."""
+"""The record of a cell: its result as plain data, the same on every machine, at every time."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -28,11 +27,6 @@ def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, A
             yield from flatten(value, f"{above}{name}.")
         else:
             yield f"{above}{name}", value
-
-
-def json_bytes(content: Any) -> bytes:
-    """A cell's record as JSON in one spelling."""
-    return (json.dumps(content, sort_keys=True, indent=1, allow_nan=False) + "\n").encode()
 
 
 def _plain(name: str, value: Any) -> Any:

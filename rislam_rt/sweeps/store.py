@@ -6,8 +6,6 @@ table.csv, table.json    all cells in their order, those that are missing too; t
 timings.jsonl            seconds and machine of every cell that ran, in the order in which they ended
 """
 
-import csv
-import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -15,10 +13,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.storage.files import (
+    TEMPORARY,
+    csv_file,
+    json_file,
+    make_folders,
+    remove_empty,
+    remove_temporaries,
+    write_all,
+    write_atomic,
+)
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import read_sealed, seal
-from rislam_rt.sweeps.record import flatten, json_bytes
+from rislam_rt.sweeps.record import flatten
 from rislam_rt.sweeps.sweep import Cell, Sweep
 from rislam_rt.sweeps.work import CellOutcome
 
@@ -111,7 +118,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
         "seed": sweep.seed,
         "paired": list(sweep.paired),
     }
-    write_atomic(folder / SWEEP_FILE, json_bytes(seal(about)))
+    write_atomic(folder / SWEEP_FILE, json_file(seal(about), sort_keys=True))
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
@@ -124,7 +131,7 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) ->
     """
     state = outcome.cause or DONE
     content = {"function": function, "state": state, "message": outcome.message, "result": outcome.result or {}}
-    write_atomic(_file(folder, cell), json_bytes(seal({**cell._asdict(), **content})))
+    write_atomic(_file(folder, cell), json_file(seal({**cell._asdict(), **content}), sort_keys=True))
     return Row(cell, state, outcome.message, outcome.result or {})
 
 
@@ -181,18 +188,13 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
         fixed = (row.cell.repetition, row.cell.seed, row.state, row.message)
         known = {**row.cell.point, **dict(zip(FIXED, fixed, strict=True))}
         entries.append(known | {f"result.{name}" if name in known else name: result.get(name) for name in results})
-    write_atomic(folder / "table.csv", csv_bytes(entries))
-    write_atomic(folder / "table.json", json_bytes(entries))
+    write_all(folder, {"table.csv": csv_bytes(entries), "table.json": json_file(entries, sort_keys=True)})
 
 
 def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
     """A table whose columns are those of the first row, in its order; lists with semicolons."""
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(entries[0] if entries else ())
-    for entry in entries:
-        table.writerow([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()])
-    return text.getvalue().encode(errors="backslashreplace")
+    rows = ([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()] for entry in entries)
+    return csv_file(entries[0] if entries else (), rows)
 
 
 def _file(folder: Path, cell: Cell) -> Path:

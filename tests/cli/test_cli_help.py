@@ -43,6 +43,9 @@ def test_several_faults_are_several_lines(run, tmp_path):
     for place, meant in (("scheems", "schemes"), ("radio.carier_ghz", "carrier_ghz"), ("radio.num_samples", "slam.")):
         assert f"mine.toml: {place}: unknown key; did you mean '{meant}" in told
     assert "error: --set: depth: " in told
+    code, _, err = run("config", "--set", "slamm.sigma_a.x=1")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert err.startswith("error: --set: slamm: unknown key")
 
 
 def test_several_faults_of_a_scene_are_several_lines(run, tmp_path):

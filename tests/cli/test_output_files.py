@@ -144,6 +144,27 @@ def test_a_folder_that_refuses_is_known_before_anything_is_worked_out(run, tmp_p
     assert not list(shut.iterdir())
 
 
+def test_a_folder_in_a_files_place_is_known_before_anything_is_worked_out(run, tmp_path):
+    (tmp_path / "mine").mkdir()
+    code, out, err = run("trace", "empty_box", "--channel", "image_source", "--out", "mine")
+    assert (code, out, err) == (2, "", "error: --out mine: is a folder; give the name of a file\n")
+
+
+def test_a_link_stays_a_link(run, tmp_path):
+    words = ("config", "--explain", "slam.sigma_a", "--json")
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to("there/found.json")
+    assert run(*words, "link")[0] == 0
+    assert run(*words, "link")[0] == 0
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "there" / "found.json").stat().st_size
+    (tmp_path / "loop").symlink_to("loop")
+    code, out, err = run(*words, "loop")
+    assert (code, out) == (4, "")
+    assert err.startswith("error: loop: cannot be written (Too many levels of symbolic links)")
+    assert (tmp_path / "loop").is_symlink()
+
+
 def test_a_device_is_written_to_wherever_it_lies(run, monkeypatch):
     refuse(monkeypatch, Path("/dev"))
     assert run("config", "--explain", "slam.sigma_a", "--json", "/dev/null")[0] == 0

@@ -80,12 +80,12 @@ SCREEN = grid([1.0, 0.2, 0.1], [0.0, 5.0, 0.0], [0.0, 0.0, 2.0], 1, 1)
 
 CASES: dict[str, tuple[Change, str, str]] = {
     "start outside": (lambda s: moved(s, [7, 1, 1], [0, 0, 0]), "error agent.start", "lies outside"),
-    "walks out": (lambda s: moved(s, [5, 1, 1], [0.1, 0, 0]), "error agent.trajectory", "lies outside"),
+    "walks out": (lambda s: moved(s, [5, 1, 1], [0.1, 0, 0]), "error agent", "lies outside"),
     "start on a wall": (lambda s: moved(s, [3, 3, 0.0005], [0, 0, 0]), "error agent.start", "lies on 'floor'"),
     "Tx out of the wall": (lambda s: moved(s, [0.02, 3, 1], [0, 0, 0]), "error agent.start", "Tx at"),
     "walks through": (
         lambda s: moved(furnished(s, "screen", SCREEN), [0.5, 3, 1], [0.03, 0, 0]),
-        "error agent.trajectory",
+        "error agent",
         "goes through 'screen' after cycle 166",
     ),
     "astride": (

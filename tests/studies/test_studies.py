@@ -169,7 +169,7 @@ def test_traced_and_analytic_curves_agree(room, tiny):
 
 
 def test_table_says_what_the_curves_say(room, tiny, curves):
-    rows = list(csv.DictReader(fig4a_csv(curves).splitlines()))
+    rows = list(csv.DictReader(fig4a_csv(curves).decode().splitlines()))
     assert [row["element"] for row in rows] == ["tang"] * 4 + ["energy"] * 4
     np.testing.assert_allclose([float(row["exact_db"]) for row in rows[4:]], curves.curves["energy"].exact, atol=1e-4)
     page = fig4a_page(curves, tiny, room.name, None)

@@ -24,7 +24,7 @@ from rislam_rt.pipeline.dataset import (
     seal_dataset,
 )
 from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
-from rislam_rt.pipeline.recordings.recorded_inputs import given_to_dataset
+from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
 from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation

@@ -1,11 +1,12 @@
 """Inputs of an estimator, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec
+from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec, SchemeResult
 from rislam_rt.model.ris import join_sheets
 from rislam_rt.pipeline.dataset import AXES, names_of
 from rislam_rt.slam import StartPrior
@@ -13,6 +14,9 @@ from rislam_rt.storage.netcdf import Entry, padded, variables
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from rislam_rt.pipeline.assumed_model import AssumedModel
+    from rislam_rt.pipeline.cycle import Cycle
 
 PADDING = -9.0
 """Fills cycles that have fewer components than the fullest one."""
@@ -58,6 +62,30 @@ class Inputs(NamedTuple):
     """(K,)."""
     codes: tuple[RisCode | None, ...]
     """(K,) what the agent holds the panel to be set to; None without a panel."""
+
+
+class RecordedInputs(NamedTuple):
+    """What an estimator was given over some cycles, and what it drew from."""
+
+    inputs: Inputs
+    seed: np.random.SeedSequence
+
+
+def given_of(
+    told: "AssumedModel", first: int, cycles: "Sequence[Cycle]", seed: np.random.SeedSequence
+) -> RecordedInputs:
+    """Record of what the estimator was given from cycle `first` on."""
+    span = slice(first, first + len(cycles))
+    time, heading = told.time[span] - told.time[0], told.heading[span]
+    measurements = tuple(cycle.measurement for cycle in cycles)
+    codes = tuple(cycle.believed for cycle in cycles)
+    return RecordedInputs(Inputs(told.start, told.body, told.panel, time, heading, measurements, codes), seed)
+
+
+def given_to_dataset(result: SchemeResult) -> "xr.Dataset":
+    """What a scheme's estimator was given, as `rislam-rt slam` reads it: nothing in it is of the truth."""
+    inputs, seed = result.given
+    return inputs_to_dataset(inputs, scheme=result.scheme, **seed_marks(seed))
 
 
 def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":

@@ -27,7 +27,7 @@ class AssumedSection(Section):
     """Height at the start as told less the true one."""
     process_noise_scale: Positive = 1.0
     """Acceleration that every estimator reckons with over the one that it would be told."""
-    time_scale: Positive = 1.0
+    time_scale: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
     """Time between cycles as told over the true one."""
     tilt_deg: Degrees = 0.0
     """By how much the body's front truly lies above its back (rotation about body y); it is held to be level."""
@@ -49,7 +49,7 @@ class AssumedSection(Section):
     estimator can be told of those."""
     std_scale: Positive = 1.0
     """Standard deviations of delays, cosines and amplitudes as reported over those that the receiver worked out."""
-    threshold_db: Decibel = 0.0
+    threshold_db: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
     """Detection threshold as told less the true one."""
     clutter_scale: Positive = 1.0
     """Density of false components as told over the one that the filter would reckon with."""

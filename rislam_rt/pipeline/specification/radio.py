@@ -1,10 +1,11 @@
 """The table `[radio]` of a pipeline file, and the radio that it becomes."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
+from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import Antennas, RadioConfig, RxArray
 from rislam_rt.pipeline.specification.section import Carrier, Decibel, Positive, Section, Side
@@ -20,7 +21,7 @@ class ArraySection(Section):
     """Antennas along the body's x axis, forward."""
     cols: Side = 4
     """Antennas along the body's y axis."""
-    spacing_wavelengths: Positive = 0.5
+    spacing_wavelengths: Annotated[float, Field(ge=1e-3, le=100.0)] = 0.5
     """Between neighbours, in wavelengths of the carrier."""
     pattern: Literal["upper", "isotropic"] = "upper"
     """`upper` hears nothing from below the array's plane."""
@@ -98,6 +99,11 @@ def build_radio(section: RadioSection) -> RadioConfig:
     ConfigError
         A value is out of the range that the record itself checks.
     """
+    if section.bandwidth_ghz >= 2.0 * section.carrier_ghz:
+        raise ConfigError(
+            f"radio.bandwidth_ghz: {section.bandwidth_ghz:g} received with radio.carrier_ghz = {section.carrier_ghz:g};"
+            " keep it below twice the carrier"
+        )
     array = RxArray(section.array.rows, section.array.cols, section.array.spacing_wavelengths, section.array.pattern)
     radio = RadioConfig(
         carrier=section.carrier_ghz * 1e9,

@@ -119,7 +119,10 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
         items = [item for item in items if item["loc"] == ("kind",)] or items  # a file of another kind has other keys
         items = [item for item in items if item["type"] == "missing" or _is_said(content, item["loc"])] or items
         raise ConfigError(
-            *(f"{_source(path, _place(item), changed)}: {_remark(item, model)}" for item in items)
+            *(
+                f"{_source(path, _place(item), changed, item['type'] == 'extra_forbidden')}: {_remark(item, model)}"
+                for item in items
+            )
         ) from None
     try:
         check(spec)
@@ -181,9 +184,10 @@ def _value(text: str) -> Any:
         return text
 
 
-def _source(path: Path, place: str, changed: Sequence[str]) -> str:
-    """Where the field at fault was read: the command line if that set it, else the file."""
-    return "--set" if any(place == key or place.startswith((f"{key}.", f"{key}[")) for key in changed) else str(path)
+def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:
+    """Where the field at fault was read: the command line if that set it, or something in it, else the file."""
+    set_there = any(f"{place}.".startswith((f"{key}.", f"{key}[")) for key in changed)
+    return "--set" if set_there or (unknown and any(key.startswith(f"{place}.") for key in changed)) else str(path)
 
 
 def _place(item: Any) -> str:

@@ -1,6 +1,5 @@
 """Exports of a run, in forms that others read: trajectories, maps, configuration, scores, and its room."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from rislam_rt.model import MapEstimate, Scene, SlamResult
 from rislam_rt.scene.write import scene_files, tum_bytes
+from rislam_rt.storage.files import json_file
 from rislam_rt.toml import toml_bytes
 
 SUMMARY_FILE = "summary.json"
@@ -25,9 +25,9 @@ def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, by
 def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
     """Exported record of a result: maps, configuration, summary and its room, name -> content."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
-    files = {"map.json": json_text(maps), "config.toml": toml_bytes(_without_none({**result.config}))}
+    files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(_without_none({**result.config}))}
     files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
-    return files | {SUMMARY_FILE: json_text(summary)}
+    return files | {SUMMARY_FILE: json_file(summary, indent=2)}
 
 
 def map_table(estimate: MapEstimate) -> dict[str, Any]:
@@ -50,11 +50,6 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
         for normal, offset, (a, b) in zip(estimate.wall_normal, estimate.wall_offset, estimate.wall_std, strict=True)
     ]
     return {"landmarks": features, "walls": walls}
-
-
-def json_text(content: Any) -> bytes:
-    """Exported JSON as people read it."""
-    return (json.dumps(content, indent=2, allow_nan=False) + "\n").encode()
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:

@@ -23,11 +23,11 @@ from rislam_rt.pipeline.dataset import (
     scheme_to_dataset,
     seal_dataset,
 )
-from rislam_rt.pipeline.recordings.recorded_inputs import given_to_dataset
-from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files, json_text
+from rislam_rt.pipeline.recordings.inputs import given_to_dataset
+from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
-from rislam_rt.storage.files import TEMPORARY, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.storage.files import TEMPORARY, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.netcdf import dataset_bytes, read_dataset
 from rislam_rt.storage.seal import file_digest, read_sealed, seal
@@ -97,7 +97,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             The disk refused.
         """
         about = {"state": state, "identity": self.identity.digest, **self.identity.content, **(more or {})}
-        write_atomic(self.folder / RUN_FILE, json_text(seal({**about, "files": self.files})))
+        write_atomic(self.folder / RUN_FILE, json_file(seal({**about, "files": self.files}), indent=2))
 
     def complete(self, result: SlamResult, summary: Mapping[str, Any]) -> Path:
         """Add what the schemes' files do not hold; the last step is the marker. Returns the folder.

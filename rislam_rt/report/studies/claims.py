@@ -1,15 +1,12 @@
 """The claims as a page and a table."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from rislam_rt.report.swept.entries import paragraph, table_lines
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import csv_file, json_file, write_all
 from rislam_rt.studies.claims import Claim
-from rislam_rt.sweeps.record import json_bytes
 
 
 def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any], folder: Path) -> Path:
@@ -20,17 +17,13 @@ def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any],
     StoreError
         The disk refused.
     """
-    page = folder / f"{name}.md"  # first: the others are known as the program's by it
-    write_atomic(page, claims_page(claims, sources).encode())
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(Claim._fields)
-    table.writerows(claims)
-    write_atomic(folder / f"{name}.csv", text.getvalue().encode())
-    write_atomic(
-        folder / f"{name}.json", json_bytes({"sources": dict(sources), "claims": [c._asdict() for c in claims]})
-    )
-    return page
+    content = {"sources": dict(sources), "claims": [claim._asdict() for claim in claims]}
+    files = {
+        f"{name}.md": claims_page(claims, sources).encode(),
+        f"{name}.csv": csv_file(Claim._fields, claims),
+        f"{name}.json": json_file(content, sort_keys=True),
+    }
+    return write_all(folder, files)
 
 
 def claims_page(claims: Sequence[Claim], sources: Mapping[str, Any]) -> str:

@@ -1,7 +1,5 @@
 """Fig. 4(a) as a figure, as a table, and as a page that says what holds."""
 
-import csv
-import io
 from typing import Any
 
 import numpy as np
@@ -11,6 +9,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design import GainCurves
 from rislam_rt.report.style import SCHEME, TRUTH, styled
 from rislam_rt.report.swept.entries import picture
+from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.fig4a import Fig4a
 from rislam_rt.studies.spec import Fig4aSpec
 
@@ -43,21 +42,20 @@ def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
     return figure
 
 
-def fig4a_csv(found: Fig4a) -> str:
+def fig4a_csv(found: Fig4a) -> bytes:
     """Fig. 4(a) as CSV, one row a pattern and place."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([
+    head = [
         "element", "distance_m", "x_m", "y_m", "z_m", "optimized_db", "optimized_low_db", "optimized_high_db",
         "random_rms_db", "random_low_db", "random_high_db", "exact_db", "continuous_db", "sphere_db",
-    ])  # fmt: skip
+    ]  # fmt: skip
+    rows: list[list[str]] = []
     for element, curves in found.curves.items():
         columns = (
             found.distance, *found.position.T, *curves.optimized, *curves.random, curves.exact, curves.continuous,
             found.sphere,
         )  # fmt: skip
-        writer.writerows([element, *(f"{x:.4f}" for x in row)] for row in zip(*columns, strict=True))
-    return text.getvalue()
+        rows += [[element, *(f"{x:.4f}" for x in row)] for row in zip(*columns, strict=True)]
+    return csv_file(head, rows)
 
 
 def fig4a_table(found: Fig4a) -> dict[str, Any]:

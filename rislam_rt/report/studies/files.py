@@ -8,7 +8,7 @@ from rislam_rt.channel.compare import validation_page
 from rislam_rt.report.studies.certificate import draw_certificate
 from rislam_rt.report.studies.fig4a import draw_fig4a, fig4a_csv, fig4a_page
 from rislam_rt.report.style import to_png
-from rislam_rt.storage.files import json_file, write_atomic
+from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.compare import Comparison
 from rislam_rt.studies.fig4a import Fig4a
 from rislam_rt.studies.spec import CompareSpec, Fig4aSpec
@@ -30,7 +30,7 @@ def write_comparison(
     files = {f"{COMPARISON}.md": validation_page(found.rows, seed=spec.seed).encode()}
     if figures and found.certificate is not None:
         files[CERTIFICATE] = to_png(draw_certificate(found.certificate))
-    return _write(files | {f"{COMPARISON}.json": json_file(content)}, folder)
+    return write_all(folder, files | {f"{COMPARISON}.json": json_file(content)})
 
 
 def write_fig4a(
@@ -44,14 +44,7 @@ def write_fig4a(
         The disk refused.
     """
     page = fig4a_page(found, spec, scene, CURVES_FIGURE if figures else None)
-    files = {f"{CURVES}.md": page.encode(), f"{CURVES}.csv": fig4a_csv(found).encode()}
+    files = {f"{CURVES}.md": page.encode(), f"{CURVES}.csv": fig4a_csv(found)}
     if figures:
         files[CURVES_FIGURE] = to_png(draw_fig4a(found, spec))
-    return _write(files | {f"{CURVES}.json": json_file(content)}, folder)
-
-
-def _write(files: Mapping[str, bytes], folder: Path) -> Path:
-    """Write all files, the first of which is the page."""
-    for name, content in files.items():
-        write_atomic(folder / name, content)
-    return folder / next(iter(files))
+    return write_all(folder, files | {f"{CURVES}.json": json_file(content)})

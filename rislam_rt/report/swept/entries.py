@@ -1,7 +1,5 @@
 """Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
 
-import csv
-import io
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.swept import Group, paired_gain, spread
 
 NEAR_BOUND = 1.5
@@ -67,14 +66,10 @@ def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> st
     return "association" if (entry["association"] or 0.0) < GOOD_ASSOCIATION else "filter"
 
 
-def csv_text(entries: Sequence[Mapping[str, Any]]) -> str:
+def entries_csv(entries: Sequence[Mapping[str, Any]]) -> bytes:
     """Entries as CSV; lists are left out, numbers have six digits."""
     names = [name for name, value in entries[0].items() if not isinstance(value, list)] if entries else []
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(names)
-    table.writerows([_cell(entry[name]) for name in names] for entry in entries)
-    return text.getvalue()
+    return csv_file(names, ([_cell(entry[name]) for name in names] for entry in entries))
 
 
 def metres(value: float | None) -> str:

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import ablations, fig4b, fig4c, hardware, robustness, rooms
-from rislam_rt.report.swept.entries import csv_text, failure_notes, paragraph
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.report.swept.entries import entries_csv, failure_notes, paragraph
+from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.swept import (
     AblationsSpec,
     Fig4bSpec,
@@ -22,7 +22,7 @@ from rislam_rt.studies.swept import (
     group_rows,
 )
 from rislam_rt.sweeps import Row
-from rislam_rt.sweeps.record import json_bytes, plain_result
+from rislam_rt.sweeps.record import plain_result
 
 
 class StudyLayout(NamedTuple):
@@ -71,13 +71,13 @@ def write_swept(
     failures = hardware.failed_cells(groups) if _of_receiver(spec) else failure_notes(groups)
     lines = [f"# {layout.title}", "", *about_lines(groups, spec, record, len(rows)), "",
              *layout.body(content, spec, figure), "", "## Failures", "", *failures]  # fmt: skip
-    page = folder / f"{spec.name}.md"  # first: the others are known as the program's by it
-    write_atomic(page, ("\n".join(lines) + "\n").encode())
+    # the page first: the others are known as the program's by it
+    files = {f"{spec.name}.md": ("\n".join(lines) + "\n").encode()}
     if figure is not None:
-        write_atomic(folder / figure, to_png(layout.draw(content, spec)))
-    write_atomic(folder / f"{spec.name}.csv", csv_text(content["entries"]).encode())
-    write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, **content})))
-    return page
+        files[figure] = to_png(layout.draw(content, spec))
+    files[f"{spec.name}.csv"] = entries_csv(content["entries"])
+    files[f"{spec.name}.json"] = json_file(plain_result({**record, **content}), sort_keys=True)
+    return write_all(folder, files)
 
 
 def _of_receiver(spec: SweptSpec) -> bool:

@@ -10,10 +10,10 @@ from rislam_rt.report.style import to_png
 from rislam_rt.report.unseen.figure import draw_unseen
 from rislam_rt.report.unseen.page import SHOWN, about_lines, unseen_page
 from rislam_rt.report.unseen.score_cards import SchemeRun, by_series, card, class_cards, cycle_times, read_runs
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.sweeps import Row
-from rislam_rt.sweeps.record import json_bytes, plain_result
+from rislam_rt.sweeps.record import plain_result
 from rislam_rt.sweeps.store import csv_bytes
 
 
@@ -42,13 +42,13 @@ def write_unseen(
     figure = f"figures/{spec.name}.png" if figures else None
     there = sum(row.state == "done" for row in rows)
     about = about_lines(spec, record, tests, there, len(rows))
-    page = folder / f"{spec.name}.md"  # first: the others are known as the program's by it
-    write_atomic(page, unseen_page(content, runs, spec, about, figure).encode())
+    # the page first: the others are known as the program's by it
+    files = {f"{spec.name}.md": unseen_page(content, runs, spec, about, figure).encode()}
     if figure is not None:
-        write_atomic(folder / figure, to_png(draw_unseen(runs)))
-    write_atomic(folder / f"{spec.name}.csv", csv_bytes(run_entries(runs)))
-    write_atomic(folder / f"{spec.name}.json", json_bytes(plain_result({**record, "tests": tests, **content})))
-    return page
+        files[figure] = to_png(draw_unseen(runs))
+    files[f"{spec.name}.csv"] = csv_bytes(run_entries(runs))
+    whole = plain_result({**record, "tests": tests, **content})
+    return write_all(folder, files | {f"{spec.name}.json": json_file(whole, sort_keys=True)})
 
 
 def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

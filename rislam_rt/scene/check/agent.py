@@ -71,7 +71,7 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
     cycles, walls = crossings(motion.position[:-1], motion.position[1:], room.triangles)
     if len(cycles):
         message = f"the path goes through '{room.name(int(walls[0]))}' after cycle {int(cycles[0])}"
-        yield room.error("agent.trajectory", message, "lead it around the object")
+        yield room.error("agent", message, "lead it around the object")
         return
     cycles, walls = crossings(motion.tx, motion.rx, room.triangles)
     if len(cycles):
@@ -114,4 +114,5 @@ def _where(part: str, cycle: int, points: Floats) -> str:
 
 
 def _field(cycle: int) -> str:
-    return "agent.start" if cycle == 0 else "agent.trajectory"
+    """The key that says where the agent is at a cycle; how it moves on, several can say."""
+    return "agent.start" if cycle == 0 else "agent"

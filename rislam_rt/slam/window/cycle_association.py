@@ -91,7 +91,7 @@ def associate_cycle(
     lead = groups.leader
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
-        extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * np.median(observed.std, axis=0) ** 2
+        extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
         mean, covariance, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
@@ -103,6 +103,12 @@ def associate_cycle(
     due = view.shows[alone]
     surprise = (due.sum() - found[alone].sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
     return view._replace(row=row, pick=pick, score=score, surprise=float(surprise))
+
+
+def _median(values: Floats) -> Floats:
+    """(A,) of columns (M, A): numpy's own takes ten times as long for so few."""
+    values, middle = np.sort(values, axis=0), len(values) // 2
+    return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 
 
 def _now(window: Window, scene: KnownEnvironment) -> tuple[Floats, Floats]:

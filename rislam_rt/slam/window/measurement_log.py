@@ -95,8 +95,6 @@ class Residuals(NamedTuple):
     """(A,) pose of the window."""
     left: Floats
     """(A, 3) measured less predicted, in standard deviations."""
-    jacobian: Floats
-    """(A, 3, 4 + 3F) of the prediction by its pose and the features, likewise."""
 
     def take(self, rows: Any) -> "Residuals":
         """Only some of the residuals."""
@@ -111,20 +109,20 @@ def residuals(
     heading: Floats,
     rows: Integers,
     slot: Integers,
-) -> Residuals:
-    """Of some explained rows of the log, at the present estimate; `heading` (K,) as the compass tells."""
+) -> tuple[Residuals, Floats]:
+    """Of some explained rows of the log, at the present estimate, with the slopes (A, 3, 4 + 3F) of the predictions by
+    pose and features, likewise in standard deviations; `heading` (K,) as the compass tells."""
     form, features = log.form[rows], window.features
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
     place = poses(window)[at]
     ends = poses_of(place[:, :3], heading[at] + place[:, 3], scene.body)
     returns = compile_forms(landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])), at)
-    linear = linearise_each(returns, features, landmarks.anchor, ends)
-    jacobian = np.zeros((len(at), 3, POSE + features.size))
+    linear = linearise_each(returns, features, landmarks.anchor, ends, POSE)
+    jacobian = linear.wide
     jacobian[..., :3] = linear.by_pose
     if window.turns:
         jacobian[..., 3] = linear.by_heading(ends, place[:, :3])
-    jacobian[..., POSE:] = linear.by_feature.reshape(len(at), 3, features.size)
     count, share = len(rows), log.share[rows[both], None]
     (seen, other), (jacobian, by_other) = ((each[:count], each[count:]) for each in (linear.seen, jacobian))
     gap = other - seen[both]
@@ -134,7 +132,8 @@ def residuals(
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
     left = log.seen[rows] - seen
     left[:, 0] = scene.sensor.nearest(left[:, 0])
-    return Residuals(rows, slot, left / std, jacobian / std[..., None])
+    jacobian /= std[..., None]
+    return Residuals(rows, slot, left / std), jacobian
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
@@ -163,28 +162,20 @@ def renew(
 ) -> tuple[Window, Residuals]:
     """The quadratics of some slots, made at the present estimate; the last pose is that of `cycle`."""
     slot = log.cycle - (cycle - window.num_poses + 1)
-    wanted = np.zeros(window.num_poses, dtype=np.bool_)
-    wanted[slots] = True
-    rows = (log.explained & wanted[np.maximum(slot, 0)]).nonzero()[0]
+    rows = (log.explained & np.isin(slot, slots)).nonzero()[0]
     size, place = POSE + window.features.size, poses(window)
     hessian, gradient, middle = (field.copy() for field in window.slots)
-    hessian[slots], gradient[slots] = 0.0, 0.0
     middle[slots] = np.concatenate(
         [place[slots], np.broadcast_to(window.features.ravel(), (len(slots), size - POSE))], 1
     )
-    if not len(rows):
-        nothing = Residuals(rows, rows, np.zeros((0, 3)), np.zeros((0, 3, size)))
-        return window._replace(slots=Quadratic(hessian, gradient, middle)), nothing
-    found = residuals(log, window, landmarks, scene, heading, rows, slot[rows])
-    weight = trust(found.left)
-    start = np.searchsorted(found.slot, slots)
-    stop = np.searchsorted(found.slot, slots, side="right")
-    most = int((stop - start).max())
-    index = start[:, None] + np.arange(most)
-    inside = (index < stop[:, None]).astype(np.float64)
-    index = np.minimum(index, len(rows) - 1)
-    wide = found.jacobian[index].reshape(len(slots), 3 * most, size)
-    heavy = wide * np.repeat(weight[index] * inside, 3, axis=1)[..., None]
-    hessian[slots] = np.swapaxes(heavy, 1, 2) @ wide
-    gradient[slots] = -(np.swapaxes(heavy, 1, 2) @ found.left[index].reshape(len(slots), 3 * most, 1))[..., 0]
+    found, slopes = residuals(log, window, landmarks, scene, heading, rows, slot[rows])
+    # the components of each slot side by side
+    of, first = np.searchsorted(slots, found.slot), np.searchsorted(found.slot, slots)
+    at = np.arange(len(rows)) - first[of]
+    most = int(at.max(initial=-1)) + 1
+    wide, heavy, left = (np.zeros((len(slots), most, 3, width)) for width in (size, 1, 1))
+    wide[of, at], heavy[of, at], left[of, at, :, 0] = slopes, trust(found.left)[:, None, None], found.left
+    flat, thick = (each.reshape(len(slots), 3 * most, size) for each in (wide, heavy * wide))
+    hessian[slots] = np.swapaxes(thick, 1, 2) @ flat
+    gradient[slots] = -(np.swapaxes(thick, 1, 2) @ left.reshape(len(slots), 3 * most, 1))[..., 0]
     return window._replace(slots=Quadratic(hessian, gradient, middle)), found

@@ -14,7 +14,7 @@ from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.scene.random_rooms import draw_room
-from rislam_rt.storage.files import write_atomic
+from rislam_rt.storage.files import csv_file, write_atomic
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.unseen.cell import FUNCTION, scheme_here
 from rislam_rt.studies.unseen.spec import UnseenSpec
@@ -91,10 +91,6 @@ def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
         return len(rows)
     names = " ".join(variant.name for variant in spec.variants)
     entry = (datetime.now(UTC).date(), spec.first, spec.rooms, " ".join(f"{snr:g}" for snr in spec.snr_db), names)
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(LEDGER)
-    table.writerows([[row[name] for name in LEDGER] for row in rows])
-    table.writerow([*entry, code_digest()[:CODE_DIGITS], settings])
-    write_atomic(file, text.getvalue().encode())
+    known = [[row[name] for name in LEDGER] for row in rows]
+    write_atomic(file, csv_file(LEDGER, [*known, [*entry, code_digest()[:CODE_DIGITS], settings]]))
     return len(rows) + 1

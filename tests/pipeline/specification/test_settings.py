@@ -42,7 +42,7 @@ def test_no_setting_is_left_out() -> None:
         # What follows is checked by the records themselves; their ranges are found by trying.
         ("receiver.converter_bits", 0, "at least 0, at most 32", ""),
         ("receiver.min_delay", 0.0, "at least 0, at most 8e-08", ""),
-        ("receiver.max_delay", 80e-9, "above 0", ""),
+        ("receiver.max_delay", 80e-9, "above 0, at most 1", ""),
         ("design.population", 50, "at least 12", ""),
         ("design.elite", 10, "at least 0, at most 48", ""),
         ("design.mutation", 0.02, "at least 0, at most 1", ""),

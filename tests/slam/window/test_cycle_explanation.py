@@ -23,7 +23,7 @@ def log_of(scatter):
     log = Log(slot, np.zeros((count, 3)), std, none, none, slot, slot, forms, none, extra, shared)
     raw = scatter[slot, which][:, None] * np.ones(3)
     left = np.sqrt(raw / (1.0 + extra / std**2))
-    return log, Residuals(np.arange(count), slot, left, np.zeros((count, 3, 4)))
+    return log, Residuals(np.arange(count), slot, left)
 
 
 def scatter_held(log):

@@ -73,11 +73,15 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
 def condemned(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
     """(F,) features to take back: that do not exist, or that their measurements contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
-    square = np.vecdot(left.left, left.left)
     form = log.form[left.row, 0]
-    for row, ident in enumerate(landmarks.ident):
-        own = form[:, 0] == ident if not landmarks.is_wall[row] else (form[:, 1:] == ident).any(axis=1)
-        alone = own & ((form[:, 1:] != NONE).sum(axis=1) <= int(landmarks.is_wall[row]))
-        if alone.sum() >= FEWEST and np.median(square[alone]) > CONSTANTS.against:
-            gone[row] = True
+    bounces = (form[:, 1:] != NONE).sum(axis=1)
+    # a wall is told of by what comes over it alone, a point by what comes straight
+    own = np.where(bounces == 1, form[:, 1:].max(axis=1), np.where(bounces == 0, form[:, 0], NONE))
+    square = np.vecdot(left.left, left.left)
+    order = np.lexsort((square, own))
+    first = np.searchsorted(own[order], landmarks.ident)
+    count = np.searchsorted(own[order], landmarks.ident, side="right") - first
+    told = (count >= FEWEST).nonzero()[0]
+    low, high = (square[order[first[told] + half]] for half in ((count[told] - 1) // 2, count[told] // 2))
+    gone[told[0.5 * (low + high) > CONSTANTS.against]] = True
     return np.asarray(gone)

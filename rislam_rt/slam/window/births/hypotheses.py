@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.gaussian_draws import square_root
+from rislam_rt.slam.gaussian_draws import square_roots
 from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary
@@ -24,6 +24,10 @@ FAR = (TX_IMAGE, OTHER_LEG)
 """Kinds whose new wall mirrors a known point on the leg to the Tx."""
 WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES)
 """Kinds whose new feature is a wall."""
+IS_WALL, IS_IMAGE, IS_FAR, IS_POINT = (
+    np.isin(np.arange(len(KINDS)), some) for some in (WALLS, IMAGES, FAR, (POINT, OVER_RX, OVER_TX, OVER_SAME))
+)
+"""Of which kinds (15,) that is, which are images of known points, on the leg to the Tx, and new points."""
 
 
 class KnownFeatures(NamedTuple):
@@ -70,61 +74,57 @@ def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, mid
         square = np.vecdot(span, span)[:, None]
         turn[walls] = AXES - 2.0 * span[:, :, None] * (span / square)[:, None, :]
         shift[walls] = span * (np.vecdot(span, place[walls] + middle)[:, None] / square)
-    roots = np.zeros((count, 3, 3))
-    for row in range(count):
-        root = square_root(blocks[row])
-        roots[row, :, : root.shape[1]] = root
-    return KnownFeatures(place, roots, turn, shift)
+    return KnownFeatures(place, square_roots(blocks), turn, shift)
 
 
 def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
     """Every kind for every track, with its first guess; images of known points stand in `image_hypotheses`."""
-    count, walls = len(digest.seen), landmarks.walls
-    seen, tx, rx = digest.mean
-    ray, length = digest.direction, seen[:, 0]
-    middle, image = digest.middle, rx + length[:, None] * digest.direction
-    kinds, knowns, starts, legs, spots = [], [], [], [], []
+    (seen, tx, rx), ray, count = digest.mean, digest.direction, len(digest.seen)
+    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, digest.middle
+    walls, once = landmarks.walls, np.array([NONE])
+    turn, shift = known.turn[walls], known.shift[walls, None]
 
-    def add(kind: int, wall: int, start: Floats, first: int, second: int, at: tuple[Floats, Floats]) -> None:
-        kinds.append(kind)
-        knowns.append(wall)
-        starts.append(start)
-        legs.append((first, second))
-        spots.append(at)
+    def mirror(spots: Floats) -> Floats:
+        return np.asarray(spots @ np.swapaxes(turn, 1, 2) + shift)
 
-    anchor = np.broadcast_to(middle, image.shape)
-    direct = place_on_ray(ray, length, tx, rx)
-    add(WALL, NONE, reflect(anchor, image, tx), NONE, NONE, (tx, tx))
-    add(POINT, NONE, direct, NONE, NONE, (tx, tx))
-    for wall in walls.tolist():
-        turn, shift = known.turn[wall], known.shift[wall]
-        tx_image, behind = tx @ turn.T + shift, image @ turn.T + shift
-        add(KNOWN_WALL, wall, reflect(anchor, image, tx_image), wall, NONE, (tx, tx))
-        add(WALL_KNOWN, wall, reflect(anchor, behind, tx), NONE, wall, (tx, behind))
-        apparent = place_on_ray(ray, length, tx_image, rx)
-        mirrored, same = apparent @ turn.T + shift, direct @ turn.T + shift
-        add(OVER_RX, wall, mirrored, NONE, wall, (tx, mirrored))
-        add(OVER_TX, wall, apparent, wall, NONE, (apparent, tx))
-        add(OVER_SAME, wall, same, wall, wall, (same, same))
-        if abs(turn[2, 2]) > LEVEL_TURN:
-            upright = reflect(anchor, image, tx)
-            upright[:, 2] = middle[2]  # what lies higher comes of the edge
-            add(BESIDE, wall, upright, NONE, NONE, (tx, tx))
-    pairs = _pairs(ray)
-    for pair in pairs:
-        add(TWO_WALLS, NONE, image - (pair @ tx[..., None])[..., 0], NONE, NONE, (tx, tx))
-    turns, shifts, spreads = _over(known, np.array(legs), np.array(spots), middle)
-    for row, pair in zip((np.array(kinds) == TWO_WALLS).nonzero()[0], pairs, strict=True):
-        turns[row, :, 0] = pair
-    kind, walled = np.repeat(kinds, count), np.repeat(knowns, count)
-    rows = len(kind)
-    none = np.zeros(rows, dtype=np.bool_)
+    def wall_of(behind: Floats, base: Floats) -> Floats:
+        return reflect(np.broadcast_to(middle, image.shape), behind, base)
+
+    direct, alone, pairs = place_on_ray(ray, length, tx, rx), wall_of(image, tx), _pairs(ray)
+    tx_image, behind, same = mirror(tx), mirror(image), mirror(direct)
+    apparent = place_on_ray(ray, length, tx_image, rx)
+    mirrored, level = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > LEVEL_TURN]
+    upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])  # what lies higher comes of the edge
+    # kind, known walls (W,), first guesses (W, T, 3), the walls on either leg, and about where these are met
+    kinds: list[Any] = [
+        (WALL, once, alone, NONE, NONE, tx, tx),
+        (POINT, once, direct, NONE, NONE, tx, tx),
+        (KNOWN_WALL, walls, wall_of(image, tx_image), walls, NONE, tx, tx),
+        (WALL_KNOWN, walls, wall_of(behind, tx), NONE, walls, tx, behind),
+        (OVER_RX, walls, mirrored, NONE, walls, tx, mirrored),
+        (OVER_TX, walls, apparent, walls, NONE, apparent, tx),
+        (OVER_SAME, walls, same, walls, walls, same, same),
+        (BESIDE, level, upright, NONE, NONE, tx, tx),
+        (TWO_WALLS, np.full(len(pairs), NONE), image - (pairs @ tx[..., None])[..., 0], NONE, NONE, tx, tx),
+    ]
+    kind, walled = _every(kinds, 0, ()), _every(kinds, 1, ())
+    start, *spots = (_every(kinds, column, (count, 3)) for column in (2, 5, 6))
+    legs = np.stack([_every(kinds, column, ()) for column in (3, 4)], axis=1)
+    turns, shifts, spreads = _over(known, legs, np.stack(spots, axis=1), middle)
+    turns[kind == TWO_WALLS, :, 0] = pairs
+    kind, walled = np.repeat(kind, count), np.repeat(walled, count)
+    none = np.zeros(len(kind), dtype=np.bool_)
     trials = Trials(
-        np.tile(np.arange(count), len(kinds)), np.isin(kind, WALLS), kind == TWO_WALLS, np.concatenate(starts),
+        np.tile(np.arange(count), len(start)), IS_WALL[kind], kind == TWO_WALLS, start.reshape(-1, 3),
         turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), spreads.reshape(-1, 2, 3, 3), kind == BESIDE,
-        _beyond(kind, walled, known), none, none, none, np.zeros((rows, 3)),
+        _beyond(kind, walled, known), none, none, none, np.zeros((len(kind), 3)),
     )  # fmt: skip
-    return Hypotheses(kind, walled, np.full(rows, NONE), trials)
+    return Hypotheses(kind, walled, np.full(len(kind), NONE), trials)
+
+
+def _every(kinds: list[Any], column: int, shape: tuple[int, ...]) -> Any:
+    """A column of the table of kinds, of that shape for each of their walls."""
+    return np.concatenate([np.broadcast_to(kind[column], (len(kind[1]), *shape)) for kind in kinds])
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
@@ -150,13 +150,13 @@ LEVEL_TURN = 0.9
 """Part of a reflection's vertical axis that it turns over, from which on its wall is level."""
 
 
-def _pairs(ray: Floats) -> list[Floats]:
-    """What two walls do to the Tx: opposite ones, two upright ones, an upright and a level one: (T, 3, 3) each."""
+def _pairs(ray: Floats) -> Floats:
+    """(3, T, 3, 3) what two walls do to the Tx: opposite ones, two upright ones, an upright and a level one."""
     count = len(ray)
     corner = np.broadcast_to(np.diag([-1.0, -1.0, 1.0]), (count, 3, 3))
     edge = np.stack([-ray[:, 1], ray[:, 0], np.zeros(count)], axis=1)
     edge = edge / np.maximum(np.linalg.norm(edge, axis=1), 1e-6)[:, None]
-    return [np.broadcast_to(AXES, (count, 3, 3)), corner, 2.0 * edge[:, :, None] * edge[:, None, :] - AXES]
+    return np.stack([np.broadcast_to(AXES, (count, 3, 3)), corner, 2.0 * edge[:, :, None] * edge[:, None, :] - AXES])
 
 
 def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:

@@ -10,7 +10,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     BESIDE,
-    IMAGES,
+    IS_IMAGE,
     LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
@@ -46,7 +46,7 @@ ASIDE = 10.0
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
     """(H,) log prior of the kinds: walls on the way; over known features, of all of them together."""
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
-    rivals[np.isin(table.kind, IMAGES)] = np.log(max(len(landmarks.points), 1))
+    rivals[IS_IMAGE[table.kind]] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     return np.asarray(2.0 * CONSTANTS.wall_ratio * MORE_WALLS[table.kind] - rivals)
 
@@ -149,7 +149,7 @@ def log_amplitudes(
     surplus = np.maximum(level - free - 0.2, 0.0)  # a mirror does not amplify
     wall = -0.5 * (level - mirror) ** 2 / spread - 0.5 * np.log(spread) - 20.0 * surplus**2
     reach = np.linalg.norm(fits.place - rx, axis=1)
-    far = np.where(np.isin(table.kind, (POINT, OVER_TX)), reach, 0.5 * seen[:, 0])
+    far = np.where((table.kind == POINT) | (table.kind == OVER_TX), reach, 0.5 * seen[:, 0])
     far = np.clip(far, 0.05, np.maximum(seen[:, 0] - 0.05, 0.06))
     unit = np.log(point_amplitude(np.ones(len(far)), np.maximum(seen[:, 0] - far, 0.05), far, radio))
     bounces = np.where(table.kind == OVER_SAME, 2.0, 1.0)

@@ -10,14 +10,15 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
-from rislam_rt.slam.gaussian_draws import square_root
+from rislam_rt.slam.gaussian_draws import square_roots
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypotheses import (
     BOTH_LEGS,
     FAR,
     IMAGE,
-    IMAGES,
+    IS_FAR,
+    IS_IMAGE,
     OTHER_LEG,
     THEN_WALL,
     TX_IMAGE,
@@ -52,8 +53,7 @@ def _images(digest: TrackSummary, known: KnownFeatures, point: int, wall: int) -
         turn, shift = known.turn[wall], known.shift[wall]
         mirror, around = turn @ spot + shift, (rx + seen[:, :1] * digest.direction).mean(axis=0)
         move, behind = (by_wall(at, known.place[wall], digest.middle) @ known.root[wall] for at in (spot, around))
-        wide = square_root(turn @ root @ root.T @ turn.T + move @ move.T)
-        wide = np.pad(wide, ((0, 0), (0, 3 - wide.shape[1])))
+        wide = square_roots((turn @ root @ root.T @ turn.T + move @ move.T)[None])[0]
         ways = [
             (BOTH_LEGS, spot, root, mirror, (AXES, np.zeros(3), move)),
             (THEN_WALL, mirror, wide, spot, still),
@@ -75,7 +75,7 @@ def _images(digest: TrackSummary, known: KnownFeatures, point: int, wall: int) -
     trials = Trials(
         np.tile(np.arange(count), len(kinds)), every, ~every, np.concatenate(starts),
         np.repeat(turns, count, axis=0), np.repeat(shifts, count, axis=0), np.repeat(roots, count, axis=0),
-        ~every, np.zeros((len(every), 3, 4)), every, np.isin(kind, FAR), kind == BOTH_LEGS,
+        ~every, np.zeros((len(every), 3, 4)), every, IS_FAR[kind], kind == BOTH_LEGS,
         np.repeat(others, count, axis=0),
     )  # fmt: skip
     return Hypotheses(kind, np.full(len(every), point), np.full(len(every), wall), trials)
@@ -138,7 +138,9 @@ def image_amplitudes(
 ) -> tuple[Integers, Floats]:
     """Rows (R,) of images of known points, and the log probability (R,) of their amplitudes; the panel's hangs on
     codes."""
-    rows = np.isin(table.kind, IMAGES).nonzero()[0]
+    rows = IS_IMAGE[table.kind].nonzero()[0]
+    if not len(rows):
+        return rows, np.zeros(0)
     track, point, over = table.trials.track[rows], table.known[rows], table.over[rows]
     first = np.maximum(np.linalg.norm(table.trials.other[rows] - digest.mean[1][track], axis=1), 0.05)
     unit = point_amplitude(np.ones(len(rows)), first, np.maximum(digest.mean[0][track, 0] - first, 0.05), radio)

@@ -11,7 +11,7 @@ from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.returns import poses_of
-from rislam_rt.slam.window.births.hypotheses import OVER_RX, OVER_SAME, OVER_TX, POINT, Hypotheses
+from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.ris_identification import (
@@ -49,7 +49,7 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
         return found
-    point = np.isin(table.kind, (POINT, OVER_RX, OVER_TX, OVER_SAME))
+    point = IS_POINT[table.kind]
     taken = -np.logaddexp.reduce(
         np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
     )  # but one

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
-    IMAGES,
+    IS_IMAGE,
     TWO_WALLS,
     WALLS,
     Hypotheses,
@@ -160,9 +160,7 @@ def judge(
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
-            evidence += np.where(
-                np.isin(table.kind, IMAGES) & (table.known == panel), over.elsewhere[track, number], 0.0
-            )
+            evidence += np.where(IS_IMAGE[table.kind] & (table.known == panel), over.elsewhere[track, number], 0.0)
     smooth, _ = smooth_paths(digest)
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))

@@ -4,6 +4,7 @@ What the map lacks shares cells with what a track is, and moves its measurements
 turn. Their scatter about a smooth path tells by how much more than the receiver reports.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
 
 
-class TrackSummary(NamedTuple):
+class _Points(NamedTuple):
     """T tracks, B normal points each; where `weight` is 0 there is none."""
 
     seen: Floats
@@ -50,6 +51,10 @@ class TrackSummary(NamedTuple):
     twist: Floats
     """(T, B, 3, H) square root of the covariance with which the heading's error moves what is seen; H = 0 if known."""
 
+
+class TrackSummary(_Points):
+    """T tracks, B normal points each, with what is read off them once."""
+
     def take(self, rows: Integers) -> "TrackSummary":
         """Only some of the tracks, or some more than once."""
         per_track = {name: field[rows] for name, field in self._asdict().items() if name not in ("middle", "speed")}
@@ -71,7 +76,7 @@ class TrackSummary(NamedTuple):
         found.seen[..., 0] += period * turn[:, None]
         return found, owner
 
-    @property
+    @cached_property
     def mean(self) -> tuple[Floats, Floats, Floats]:
         """Averages: what is seen, Tx and Rx (T, 3)."""
         weight = self.weight[..., :1] ** 2
@@ -79,7 +84,7 @@ class TrackSummary(NamedTuple):
         seen, tx, rx = ((weight * field).sum(axis=1) for field in (self.seen, self.tx, self.rx))
         return seen, tx, rx
 
-    @property
+    @cached_property
     def direction(self) -> Floats:
         """(T, 3) mean directions of arrival in the room's axes."""
         return rays(self.mean[0], 0.0)
@@ -185,12 +190,10 @@ def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:
     rows = np.stack([x**power for power in range(order)], axis=1)
     trust = np.ones(len(time))
     for _ in range(2):
-        squared = np.zeros((len(time), 3))
-        for axis in range(3):
-            weight = trust / std[:, axis] ** 2
-            normal = (rows * weight[:, None]).T @ rows
-            best = np.linalg.solve(normal + 1e-12 * np.eye(order), (rows * weight[:, None]).T @ seen[:, axis])
-            squared[:, axis] = ((seen[:, axis] - rows @ best) / std[:, axis]) ** 2
+        heavy = rows * (trust[:, None] / std**2).T[:, :, None]
+        normal = np.swapaxes(heavy, 1, 2) @ rows + 1e-12 * np.eye(order)
+        best = np.linalg.solve(normal, np.swapaxes(heavy, 1, 2) @ seen.T[:, :, None])
+        squared = ((seen - (rows @ best)[..., 0].T) / std) ** 2
         chi = (trust[:, None] * squared).sum(axis=0) / max(len(time) - order, 1)
         trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + (squared / np.maximum(chi, 1.0)).sum(axis=1))
     return np.sqrt(np.maximum(chi, 1.0))

@@ -143,9 +143,9 @@ def _starts(found: Rates, told: Floats) -> Floats:
     x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
     y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
     every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * CONSTANTS.walk]
-    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR)
+    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR) @ [1.0, 1e6]
     order = np.argsort(-level, kind="stable")
-    _, first = np.unique(cell[order], axis=0, return_index=True)
+    _, first = np.unique(cell[order], return_index=True)
     return np.concatenate([told[None, :2], every[order[np.sort(first)[:MOST]]]])
 
 
@@ -158,10 +158,10 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
-    close = np.log(0.5) - 0.5 * left**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
-    kept = -0.5 * found.rate**2 / found.variance - 0.5 * np.log(2.0 * np.pi * found.variance)
-    either = np.logaddexp(close, np.log(0.5 / 4.0) + np.logaddexp(kept, np.log(3.0 / (4.0 * CONSTANTS.walk))))
-    return either, np.exp(close - either) / variance
+    close = 0.5 * np.exp(-0.5 * left**2 / variance) / np.sqrt(2.0 * np.pi * variance)
+    kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
+    either = close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk))
+    return np.log(either), close / either / variance
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

@@ -62,8 +62,10 @@ class WindowTable(NamedTuple):
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (F,) of the log strength."""
-        return strength_moments(self.log_grid)
+        """Mean and standard deviation (F,) of the log strength of points; 0 for walls."""
+        found, points = np.zeros((2, len(self.ident))), self.points
+        found[:, points] = strength_moments(self.log_grid[points])
+        return found[0], found[1]
 
     def rows(self, idents: Integers) -> Integers:
         """Rows of features by ident; negative ones (`TX`, `NONE`) stay as they are."""

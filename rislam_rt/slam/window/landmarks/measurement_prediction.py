@@ -74,20 +74,19 @@ def predict_returns(
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
     sight = observe(returns, features, landmarks.anchor, poses)
-    level, spread = amplitudes(returns, features, landmarks, sight.tx_length, sight.rx_length, poses, scene, code)
-    strong = scene.radio.integrated_snr(np.exp(level + spread)) > FAINT
     heard = scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT
     reported = (heard >= scene.sensor.window[0]) & (heard <= scene.sensor.window[1])
-    audible = ((sight.up > -LEVEL) & strong & reported).nonzero()[0]
-    returns = compact(returns, audible)
-    linear, level, spread = linearise(returns, features, landmarks.anchor, poses), level[audible], spread[audible]
-    count = len(audible)
-    jacobian = np.zeros((count, 3, HEAD + 3 * len(features)))
+    rows = ((sight.up > -LEVEL) & reported).nonzero()[0]
+    returns, bounces, ways = compact(returns, rows), bounces[rows], (sight.tx_length[rows], sight.rx_length[rows])
+    level, spread = amplitudes(returns, features, landmarks, *ways, poses, scene, code)
+    rows = (scene.radio.integrated_snr(np.exp(level + spread)) > FAINT).nonzero()[0]
+    returns, bounces, level, spread = compact(returns, rows), bounces[rows], level[rows], spread[rows]
+    linear = linearise(returns, features, landmarks.anchor, poses, HEAD)
+    jacobian = linear.wide
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
-    jacobian[..., HEAD:] = linear.by_feature.reshape(count, 3, features.size)
     linear.seen[:, 0] = scene.sensor.heard_as(linear.seen[:, 0])
     return ExpectedComponents(
-        forms_of(returns), linear.seen, jacobian, level, spread, bounces[audible],
+        forms_of(returns), linear.seen, jacobian, level, spread, bounces,
         detection_probability(level, spread, scene.sensor),
     )  # fmt: skip
 
@@ -259,22 +258,21 @@ def _taken_in(
     """Which of R returns are taken in, the strongest that each took in, the probability that each comes out by itself,
     and its power with what it took in; `second` lies in the cell of `first` and is weaker.
     """
-    count = len(strength)
-    taken, partner, by_itself, total = np.zeros(count, np.bool_), np.full(count, -1), np.ones(count), power.copy()
+    count, level, weaker = len(strength), strength.tolist(), second.tolist()
+    owner, partner = [-1] * count, np.full(count, -1)
     begin = np.flatnonzero(np.diff(first, prepend=-1))
     crowded, end = first[begin], np.append(begin[1:], len(first))
     order = np.argsort(-strength[crowded], kind="stable")
     for leader, low, high in zip(crowded[order].tolist(), begin[order].tolist(), end[order].tolist(), strict=True):
-        if taken[leader]:
-            continue
-        members = second[low:high]
-        members = members[~taken[members]]
-        if len(members):
-            taken[members] = True
-            by_itself[members] = max(1.0 - clear[leader], CONSTANTS.rare)
-            partner[leader] = members[strength[members].argmax()]
-            total[leader] += power[members].sum()
-    return taken, partner, by_itself, total
+        members = [] if owner[leader] >= 0 else [member for member in weaker[low:high] if owner[member] < 0]
+        for member in members:
+            owner[member] = leader
+        if members:
+            partner[leader] = max(members, key=level.__getitem__)
+    of = np.array(owner, dtype=np.int64)
+    taken = of >= 0
+    by_itself = np.where(taken, np.maximum(1.0 - clear[of], CONSTANTS.rare), 1.0)
+    return taken, partner, by_itself, power + np.bincount(of[taken], power[taken], count)
 
 
 TWIN_STD = 0.03

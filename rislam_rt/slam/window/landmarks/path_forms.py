@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
+from rislam_rt.slam.returns import NONE, TX, Poses, Returns
 from rislam_rt.slam.window.solver_limits import STEP
 
 UNKNOWN = -9
@@ -78,9 +78,9 @@ def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: 
     base = np.where((legs[:, 0] == TX)[:, None], poses.tx, features[legs[:, 0]] if len(features) else 0.0)
     sound, ahead = np.ones(count, dtype=np.bool_), np.full(count, np.inf)
     one, two = ((legs[:, 1] != NONE) & (legs[:, 2] == NONE)).nonzero()[0], (legs[:, 2] != NONE).nonzero()[0]
-    far = np.broadcast_to(poses.rx, (len(one), 3))
-    near, device = _depths(base[one], far, features[legs[one, 1]], anchor[legs[one, 1]])
-    sound[one], ahead[one] = np.abs(near) > CONSTANTS.depth, np.sign(near) * device
+    normal, offset = _planes(features[legs[one, 1]], anchor[legs[one, 1]])
+    near = np.vecdot(base[one], normal) - offset
+    sound[one], ahead[one] = np.abs(near) > CONSTANTS.depth, np.sign(near) * (normal @ poses.rx - offset)
     ahead[two], near, outer, opposite = _margin(base[two], poses.rx, anchor[legs[two, 1:]], features[legs[two, 1:]])
     sound[two] = opposite & (np.minimum(np.abs(near), np.abs(outer)) > CONSTANTS.depth)
     fine = sound & (ahead > 0.0)
@@ -98,15 +98,15 @@ def _margin(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tupl
     """By how much (N,) the ray that leaves `device` (3,) for the wall `walls[:, 1]` and `walls[:, 0]` (N, 2, 3), to
     `base` (N, 3), meets the one before the other; the depths of the base before the one, and of its image before the
     other (N,); whether that image and the device are on one side."""
-    image = reflect(base, walls[:, 0], anchor[:, 0])
-    far = np.broadcast_to(device, base.shape)
-    outer, own = _depths(image, far, walls[:, 1], anchor[:, 1])
+    normal, offset = _planes(walls, anchor)
+    near = np.vecdot(base, normal[:, 0]) - offset[:, 0]
+    image = base - 2.0 * near[:, None] * normal[:, 0]
+    outer, own = np.vecdot(image, normal[:, 1]) - offset[:, 1], np.vecdot(device, normal[:, 1]) - offset[:, 1]
     # where the ray from the device meets the outer wall: the next end for the inner one
-    mirrored = image - 2.0 * outer[:, None] * _normals(walls[:, 1], anchor[:, 1])
+    mirrored = image - 2.0 * outer[:, None] * normal[:, 1]
     share = own / np.where(np.abs(own + outer) > 1e-9, own + outer, 1e-9)
-    edge = far + np.clip(share, 0.0, 1.0)[:, None] * (mirrored - far)
-    near, depth = _depths(base, edge, walls[:, 0], anchor[:, 0])
-    return np.sign(near) * depth, near, outer, outer * own > 0.0
+    edge = device + np.clip(share, 0.0, 1.0)[:, None] * (mirrored - device)
+    return np.sign(near) * (np.vecdot(edge, normal[:, 0]) - offset[:, 0]), near, outer, outer * own > 0.0
 
 
 def _margin_std(
@@ -131,12 +131,8 @@ def _swapped(legs: Integers, two: Integers) -> Integers:
     return np.searchsorted(code, other)
 
 
-def _normals(wall: Floats, anchor: Floats) -> Floats:
+def _planes(wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
+    """Unit normals (..., 3) of walls (..., 3), images of anchors alike, and their offsets (...,): `n . x = offset`."""
     span = wall - anchor
-    return np.asarray(span / np.sqrt(np.vecdot(span, span))[:, None])
-
-
-def _depths(first: Floats, second: Floats, wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
-    """Signed distances (W,) of two sets of points (W, 3) from walls (W, 3)."""
-    normal, middle = _normals(wall, anchor), 0.5 * (wall + anchor)
-    return np.vecdot(first - middle, normal), np.vecdot(second - middle, normal)
+    normal = np.asarray(span / np.sqrt(np.vecdot(span, span))[..., None])
+    return normal, 0.5 * np.vecdot(wall + anchor, normal)

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
-from rislam_rt.slam.gaussian_draws import even_draws, square_root
+from rislam_rt.slam.gaussian_draws import even_draws, square_roots
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.panel_evidence import (
@@ -97,11 +97,7 @@ class PanelObservation(NamedTuple):
 
 def spread_places(mean: Floats, covariance: Floats) -> Floats:
     """(N, S, 3) equally likely places of means (N, 3) and covariances (N, 3, 3)."""
-    draws = []
-    for middle, spread in zip(mean, covariance, strict=True):
-        root = square_root(spread)
-        draws.append(middle + even_draws(DRAWS, root.shape[1]) @ root.T)
-    return np.array(draws).reshape(len(mean), -1, 3)
+    return np.asarray(mean[:, None] + even_draws(DRAWS, mean.shape[1]) @ np.swapaxes(square_roots(covariance), 1, 2))
 
 
 def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:

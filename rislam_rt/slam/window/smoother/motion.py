@@ -78,20 +78,21 @@ def forward(before: Floats, log_like: Floats, stay: float) -> Floats:
 def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Floats]:
     """Posterior probabilities (N, K, L) of the levels of N chains, and the last step's (N, L), filtered."""
     move, (chains, count, levels) = transition(stay), log_like.shape
-    like = np.exp(log_like - log_like.max(axis=2, keepdims=True))
-    # all chains at once, forward and backward: what comes in, and what goes on with each step's own likelihood
-    ways = np.concatenate([np.tile(move, (chains, 1, 1)), np.tile(move.T, (chains, 1, 1))])
-    both = np.concatenate([like, like[:, ::-1]]).swapaxes(0, 1)[:, :, None]
-    coming, message = np.empty((count, 2 * chains, 1, levels)), np.ones((2 * chains, 1, levels))
-    message[:chains, 0] = before
-    for row in range(count):
-        coming[row] = message @ ways
-        message = coming[row] * both[row]
+    like = np.exp(log_like - log_like.max(axis=2, keepdims=True)).swapaxes(0, 1)
+    # forward and backward at once, side by side: what comes in, and what goes on with each step's own likelihood
+    ways = np.zeros((2 * levels, 2 * levels))
+    ways[:levels, :levels], ways[levels:, levels:] = move, move.T
+    both = np.concatenate([like, like[::-1]], axis=2)
+    coming, message = np.empty(both.shape), np.ones((chains, 2 * levels))
+    message[:, :levels] = before
+    for row, (into, own) in enumerate(zip(coming, both, strict=True)):
+        np.dot(message, ways, out=into)
+        np.multiply(into, own, out=message)
         if row % 16 == 15 or row == count - 1:  # nothing can vanish in fewer steps
-            message /= message.sum(axis=2, keepdims=True)
-    ahead, back = coming[:, :chains, 0], coming[::-1, chains:, 0]
-    posterior = np.swapaxes(ahead * like.swapaxes(0, 1) * back, 0, 1)
-    return posterior / posterior.sum(axis=2, keepdims=True), message[:chains, 0]
+            each = message.reshape(chains, 2, levels)
+            each /= each.sum(axis=2, keepdims=True)
+    posterior = np.swapaxes(coming[..., :levels] * like * coming[::-1, :, levels:], 0, 1)
+    return posterior / posterior.sum(axis=2, keepdims=True), message[:, :levels].copy()
 
 
 def expected_precision(posterior: Floats) -> Floats:

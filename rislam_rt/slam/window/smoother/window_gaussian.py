@@ -237,7 +237,7 @@ def slide(window: Window) -> Window:
     covariance = window.covariance.copy()
     covariance[:HEAD] = carry @ covariance[moved]
     covariance[:, :HEAD] = covariance[:, moved] @ carry.T
-    kept = np.concatenate([np.arange(size), np.arange(size + free, len(covariance))])
+    covariance = np.delete(np.delete(covariance, slice(size, size + free), axis=0), slice(size, size + free), axis=1)
     return window._replace(
         head=head,
         accel=window.accel[1:],
@@ -248,7 +248,7 @@ def slide(window: Window) -> Window:
         prior=prior,
         noise=_without(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
-        covariance=covariance[np.ix_(kept, kept)],
+        covariance=covariance,
     )
 
 
@@ -283,17 +283,14 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     slope, slots = window.slots.slope(spot), window.slots.hessian
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
-    along, start = _basis(window), starts(free)
-    back = np.swapaxes(along, 1, 2)
-    inner = back[:, None] @ (np.moveaxis(slots[:, :free, :free], 0, 2)[..., None] * along)
-    inner = np.moveaxis(inner, 2, 0).swapaxes(2, 3)
-    cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape((steps + 2) * free, size - HEAD)
+    along, start, edge = _basis(window), starts(free), 2 * free
+    many, back = len(start), np.swapaxes(along, 1, 2)
+    inner = back[:, None] @ (np.ascontiguousarray(np.moveaxis(slots[:, :free, :free], 0, 2))[..., None] * along)
+    inner = inner.transpose(2, 0, 3, 1).reshape(edge + steps * free, -1)
+    cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
-    many, edge = len(start), 2 * free
-    hessian[start[:, None], start] = inner[:2, :, :2].reshape(edge, edge)[:many, :many]
-    hessian[start, size:] = inner[:2, :, 2:].reshape(edge, steps * free)[:many]
-    hessian[size:, start] = hessian[start, size:].T
-    hessian[size:, size:] = inner[2:, :, 2:].reshape(steps * free, steps * free)
+    hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]
+    hessian[start, size:], hessian[size:, start] = inner[:many, edge:], inner[edge:, :many]
     hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
     hessian[HEAD:size, start], hessian[HEAD:size, size:] = cross[:many].T, cross[edge:].T
     hessian[HEAD:size, HEAD:size] = slots[:, POSE:, POSE:].sum(axis=0)
@@ -301,11 +298,10 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
-    holds = window.holds
-    for feature, force, information in zip(holds.feature, *holds.pulls(window.features[holds.feature]), strict=True):
-        own = slice(HEAD + 3 * feature, HEAD + 3 * feature + 3)
-        hessian[own, own] += information
-        gradient[own] += force
+    force, information = window.holds.pulls(window.features[window.holds.feature])
+    own = HEAD + 3 * window.holds.feature[:, None] + np.arange(3)
+    np.add.at(hessian, (own[:, :, None], own[:, None, :]), information)
+    np.add.at(gradient, own, force)
     at = np.arange(size, len(hessian))
     hessian[at, at] += window.precision.ravel()
     gradient[at] += (window.precision * window.accel).ravel()

@@ -1,22 +1,19 @@
-"""The record of a run: a list of cycles as arrays over all cycles."""
+"""The result of a scheme: a list of its cycles as arrays over all cycles."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import NOTHING, RisCode, SchemeResult
 from rislam_rt.pipeline.cycle import Cycle
-from rislam_rt.pipeline.recordings.recorded_inputs import RecordedInputs
+from rislam_rt.pipeline.recordings.inputs import RecordedInputs
 from rislam_rt.storage.netcdf import padded
-
-if TYPE_CHECKING:
-    pass
 
 
 def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: RecordedInputs) -> SchemeResult:
-    """All cycles of a scheme, whose times (K,) [s] these are, as one record."""
+    """All cycles of a scheme, whose times (K,) [s] these are, as one result."""
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
     ident = np.unique(np.concatenate([m.ident for m in maps]))
@@ -69,6 +66,6 @@ def _codes(codes: Sequence[RisCode | None]) -> Integers:
 
 
 def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:
-    """Record of the filter's diagnostics: the scalar numbers among the fields of its infos, (K,) each."""
+    """Result of the filter's diagnostics: the scalar numbers among the fields of its infos, (K,) each."""
     names = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
     return {name: np.array([float(getattr(info, name)) for info in infos]) for name in names}
