@@ -165,16 +165,20 @@ def log_amplitudes(
 
 
 def log_opacity(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
+    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known.
+
+    With wall returns a new wall that is heard over a known one stands where its path meets it.
+    """
     middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
-    rows, spot = bounces(table, fits.place, digest, known)
-    foot[rows] = spot
+    if use_vt:
+        rows, spot = bounces(table, fits.place, digest, known)
+        foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total, small = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
     span = fits.place - middle
@@ -190,8 +194,6 @@ def log_opacity(
     if len(landmarks.points):
         depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
         small = small + (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    if ONCE:
-        small = np.minimum(small, 1)
     return total + np.where(wall, CONSTANTS.log_rare, 0.0) * small
 
 
@@ -227,11 +229,6 @@ def direction_beliefs(
     )  # fmt: skip
 
 
-import os
-ONCE = int(os.environ.get('ONCE','0'))
-SLANT = int(os.environ.get('SLANT','1'))
-
-
 class HeldWalls(NamedTuple):
     """H hypotheses by what walls are beforehand."""
 
@@ -246,12 +243,17 @@ class HeldWalls(NamedTuple):
 
 
 def log_upright(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> HeldWalls:
-    """What walls are beforehand: each direction held, or anywhere in its width."""
-    gain = np.zeros(len(fits.cost))
+    """What walls are beforehand: upright, level, at right angles to another, or in any direction alike.
+
+    Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
+    along each axis: rivals that are rarer let ghosts of points through.
+    """
     trials, tx = table.trials, digest.mean[1]
-    right, spread, odds = fits.place.copy(), fits.covariance.copy(), np.full(len(fits.cost), -np.inf)
+    held = HeldWalls(
+        np.zeros(len(fits.cost)), fits.place.copy(), fits.covariance.copy(), np.full(len(fits.cost), -np.inf)
+    )
     for row in ((trials.is_wall | trials.is_pair) & np.isfinite(fits.cost)).nonzero()[0]:
         place, turn = fits.place[row], trials.turn[row, 0]
         if trials.is_pair[row]:  # what two walls do together goes across them both
@@ -259,28 +261,26 @@ def log_upright(
                 continue  # an edge under the ceiling: any elevation
             at = tx[trials.track[row]]
             place = digest.middle + turn @ at + place - at
-        holds = direction_beliefs(place, digest, known, landmarks)
-        span = place - digest.middle
-        if not len(holds.axis):  # it slants
-            gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright) if SLANT == 1 else 0.0
+        beliefs, span = direction_beliefs(place, digest, known, landmarks), place - digest.middle
+        if not len(beliefs.axis):  # it slants
+            held.gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright) if use_vt else 0.0
             continue
-        level = holds.axis[0, 2] == 0.0
-        axis, std, share = holds.axis, holds.std[0], holds.log_odds
-        if not level and trials.is_pair[row] and turn[0, 0] < 0.0:
-            axis, share = axis[:1], share[:1]
-        block = axis @ fits.covariance[row] @ axis.T + std**2 * np.eye(len(axis))
-        off = axis @ span
-        if level and SLANT:  # along both axes at once
-            log_right = -0.5 * off @ np.linalg.solve(block, off) - 0.5 * np.linalg.slogdet(2.0 * np.pi * block)[1]
+        level, spread = beliefs.axis[0, 2] == 0.0, fits.covariance[row]
+        across = not level and trials.is_pair[row] and turn[0, 0] < 0.0
+        axis, share = (beliefs.axis[:1], beliefs.log_odds[:1]) if across else (beliefs.axis, beliefs.log_odds)
+        off, inside = axis @ span, axis @ spread @ axis.T + beliefs.std[0] ** 2 * AXES[: len(axis), : len(axis)]
+        # odds hold the width: right against a density of one over it
+        if level and use_vt:  # along both axes at once
+            log_right = -0.5 * off @ np.linalg.solve(inside, off) - 0.5 * np.linalg.slogdet(2.0 * np.pi * inside)[1]
             each = np.array([CONSTANTS.log_upright + 2.0 * np.log(np.linalg.norm(span)) + log_right])
         else:
-            each = share - 0.5 * off**2 / np.diag(block) - 0.5 * np.log(2.0 * np.pi * np.diag(block))
-        # odds hold the width: right against a density of one over it
-        gain[row] = (np.logaddexp(0.0, each) - np.logaddexp(0.0, CONSTANTS.log_upright)).sum()
+            variance = np.diag(inside)
+            each = share - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+        held.gain[row] = (np.logaddexp(0.0, each) - np.logaddexp(0.0, CONSTANTS.log_upright)).sum()
         if not trials.is_pair[row]:
-            keep = slice(None) if level else slice(1)
-            pull = np.linalg.solve(block[keep, keep], axis[keep] @ spread[row]).T
-            right[row] -= pull @ off[keep]
-            spread[row] -= pull @ axis[keep] @ spread[row]
-            odds[row] = each[0]
-    return HeldWalls(gain, right, spread, odds)
+            told = slice(None) if level else slice(1)
+            pull = np.linalg.solve(inside[told, told], axis[told] @ spread).T
+            held.place[row] -= pull @ off[told]
+            held.covariance[row] -= pull @ axis[told] @ spread
+            held.log_odds[row] = each[0]
+    return held

@@ -22,8 +22,9 @@ def over_known(table: Hypotheses) -> Booleans:
 def log_possible(
     table: Hypotheses, place: Floats, spread: Floats, digest: TrackSummary, known: KnownFeatures
 ) -> Floats:
-    """(H,) log probability that the path can be, with new walls at `place` (H, 3) [m] within covariances `spread`
-    (H, 3, 3) [m^2], known ones as uncertain as they are; 0 where no known and new wall throw it together."""
+    """(H,) log probability that the path can be, over that beforehand, with new walls at `place` (H, 3) [m] within
+    covariances `spread` (H, 3, 3) [m^2], known ones as uncertain as they are; 0 where it is not over a known and a new
+    wall. Beforehand it is one half: of twins one can."""
     found, rows = np.zeros(len(table.kind)), over_known(table).nonzero()[0]
     if not len(rows):
         return found
@@ -41,7 +42,7 @@ def log_possible(
         each.append(_margins(tx, rx, np.where(first, new, old), np.where(first, old, new), digest.middle))
     margin = each[0]
     std = np.sqrt(sum((other - margin) ** 2 for other in each[1:]) + STEP**2)
-    found[rows] = log_ndtr(margin / std).sum(axis=1)
+    found[rows] = np.log(2.0) + log_ndtr(margin / std).sum(axis=1)
     return found
 
 

@@ -38,10 +38,6 @@ from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_
 from rislam_rt.slam.window.state import WindowState
 
 
-import os
-UNHEARD = int(os.environ.get('UNHEARD','1'))
-
-
 class TrackDecision(NamedTuple):
     """What a track is held to be."""
 
@@ -123,15 +119,15 @@ def _weigh(
     # of what is heard too early, single returns may lie beyond the window
     evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track]], 0.0)
     evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
-        table, fits, digest, known, landmarks
+        table, fits, digest, known, landmarks, scene.use_vt
     )
     evidence += log_beside(table, digest, known, context)
-    held = log_upright(table, fits, digest, known, landmarks)
-    right = log_possible(table, held.place, held.covariance, digest, known) + held.log_odds
-    gain = held.gain + np.logaddexp(right, log_possible(table, fits.place, fits.covariance, digest, known))
-    gain -= np.logaddexp(held.log_odds, 0.0)
-    evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
-    if scene.use_vt and UNHEARD:
+    held = log_upright(table, fits, digest, known, landmarks, scene.use_vt)
+    evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
+    if scene.use_vt:
+        right = held.log_odds + log_possible(table, held.place, held.covariance, digest, known)
+        free = log_possible(table, fits.place, fits.covariance, digest, known)
+        evidence += np.logaddexp(right, free) - np.logaddexp(held.log_odds, 0.0)
         upright = held.log_odds > 0.0
         place = np.where(upright[:, None], held.place, fits.place)
         spread = np.where(upright[:, None, None], held.covariance, fits.covariance)

@@ -1,8 +1,9 @@
-"""What it tells of a new wall, found by a path over a known one too, that its own return is not heard."""
+"""What it tells of a new wall that is heard over a known one that its own return is not heard."""
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
@@ -15,61 +16,75 @@ from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.solver_limits import LEVEL
 from rislam_rt.slam.window.state import WindowState
 
-ASIDE = 10.0
+BEHIND = 10.0
+"""Log evidence behind a track's best from which on a hypothesis is not asked for its wall's own return."""
 
 
 def log_unheard(
     context: WindowState, table: Hypotheses, ats: list[Integers], owner: Integers, evidence: Floats, place: Floats,
     spread: Floats, digest: TrackSummary,
 ) -> Floats:  # fmt: skip
-    """(H,) log probability that the new walls of paths over a known wall and a new one, at `place` (H, 3) [m] within
-    covariances `spread` (H, 3, 3), are heard by themselves no oftener than they are, in the cycles of the track.
+    """(H,) log probability that the own returns of new walls at `place` (H, 3) [m], within covariances `spread`
+    (H, 3, 3) [m^2], are heard no oftener than they are; 0 where the track is that return itself.
 
-    Something may hide them: the hidden chain of every return (`landmark_update.recall_forms`). A component in the
-    return's cell may be it.
+    `ats` are the tracks' rows of the log, `owner` the track of each row of the digest, `evidence` (H,) without this.
     """
-    found = np.zeros(len(table.kind))
-    track = owner[table.trials.track]
+    found, track = np.zeros(len(table.kind)), owner[table.trials.track]
     best = np.full(len(ats), -np.inf)
     np.maximum.at(best, track, evidence)
-    rows = (over_known(table) & (evidence > best[track] - ASIDE)).nonzero()[0]
+    rows = (over_known(table) & (evidence > best[track] - BEHIND)).nonzero()[0]
     if not len(rows):
         return found
-    log, scene, landmarks = context.log, context.scene, context.landmarks
-    where = poses(context.window)
+    log, scene, where = context.log, context.scene, poses(context.window)
     ends = poses_of(where[:, :3], context.heading + where[:, 3], scene.body)
-    first = context.cycle - context.window.num_poses + 1
-    slot = log.cycle - first
-    heard = rays(log.seen, 0.0)
-    cos, sin = np.cos(ends.heading[slot]), np.sin(ends.heading[slot])
-    seen = np.stack([log.seen[:, 0], cos * heard[:, 0] - sin * heard[:, 1], sin * heard[:, 0] + cos * heard[:, 1]], 1)
-    for row in rows:
-        image = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), digest.middle)
-        out = image - ends.rx
+    slot = log.cycle - (context.cycle - len(where) + 1)
+    seen = log.seen.copy()
+    for number in range(len(where)):
+        own = slot == number
+        seen[own, 1:] = rays(log.seen[own], float(ends.heading[number]))[:, :2]
+    for row in rows.tolist():
+        out = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), digest.middle) - ends.rx
         length = np.linalg.norm(out, axis=1)
-        ray = out / length[:, None]
-        # how loud it would be, by what the path over both walls leaves
-        both, wall = digest.mean[0][table.trials.track[row], 0], table.known[row]
-        doubt = landmarks.ratio_variance[wall] + CONSTANTS.fading**2
-        told = digest.log_amplitude[table.trials.track[row]] - free_space(scene.radio) + np.log(both)
-        gain = CONSTANTS.wall_ratio_std**2 / (CONSTANTS.wall_ratio_std**2 + doubt)
-        ratio = CONSTANTS.wall_ratio + gain * (told - landmarks.ratio[wall] - CONSTANTS.wall_ratio)
-        level = free_space(scene.radio) - np.log(length) + ratio
-        std = np.full(len(length), np.sqrt(gain * doubt + CONSTANTS.fading**2))
-        shows = CONSTANTS.shown * detection_probability(level, std, scene.sensor) * (ray[:, 2] > -LEVEL)
-        widest = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[row])[-1])
-        gate = scene.sensor.cell_length + widest * np.array([1.0, 1.0 / length[-1], 1.0 / length[-1]])
-        off = seen - np.concatenate([length[:, None], ray[:, :2]], axis=1)[slot]
+        due = np.concatenate([length[:, None], out[:, :2] / length[:, None]], axis=1)
+        off = seen - due[slot]
         off[:, 0] = scene.sensor.nearest(off[:, 0])
-        present = np.zeros(len(length), dtype=np.bool_)
-        present[slot[(np.abs(off) < gate).all(axis=1)]] = True
+        doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[row])[-1])
+        near = scene.sensor.cell_length + doubt * np.array([1.0, 1.0 / length[-1], 1.0 / length[-1]])
+        present = np.zeros(len(where), dtype=np.bool_)
+        present[slot[(np.abs(off) < near).all(axis=1)]] = True
+        shows = _shows(context, table, row, length, digest) * (out[:, 2] > -LEVEL * length)
         mine = slot[ats[track[row]]]
-        clear = CONSTANTS.steady**2
-        for at in range(mine.min(), mine.max() + 1):
-            if present[at]:
-                clear = 1.0
-            else:
-                found[row] += np.log1p(-clear * shows[at])
-                clear *= (1.0 - shows[at]) / (1.0 - clear * shows[at])
-            clear = clear * (1.0 - CONSTANTS.rare) + (1.0 - clear) * CONSTANTS.cleared
+        span = slice(mine.min(), mine.max() + 1)
+        found[row] = log_silence(shows[span], present[span])
+    return found
+
+
+def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, digest: TrackSummary) -> Floats:
+    """(K,) probability that the own returns of these lengths (K,) [m] of hypothesis `row`'s wall are above the
+    threshold: as loud as what the wall leaves of the path over the known one as well tells."""
+    radio, track, wall = context.scene.radio, table.trials.track[row], table.known[row]
+    told = digest.log_amplitude[track] - free_space(radio) + np.log(digest.mean[0][track, 0])
+    noise = context.landmarks.ratio_variance[wall] + CONSTANTS.fading**2
+    gain = CONSTANTS.wall_ratio_std**2 / (CONSTANTS.wall_ratio_std**2 + noise)
+    ratio = CONSTANTS.wall_ratio + gain * (told - context.landmarks.ratio[wall] - CONSTANTS.wall_ratio)
+    std = np.full(len(length), np.sqrt(gain * noise + CONSTANTS.fading**2))
+    return CONSTANTS.shown * detection_probability(
+        free_space(radio) - np.log(length) + ratio, std, context.scene.sensor
+    )
+
+
+def log_silence(shows: Floats, present: Booleans) -> float:
+    """Log probability that a return that shows with probabilities (K,), were nothing in its way, is silent in the
+    cycles in which nothing is `present` (K,) where it would be; what is there may be it, and tells nothing.
+
+    What stands in its way comes and goes as it does for every return (`landmark_update.recall_forms`).
+    """
+    found, clear = 0.0, CONSTANTS.steady**2
+    for show, heard in zip(shows, present, strict=True):
+        if heard:
+            clear = 1.0
+        else:
+            found += float(np.log1p(-clear * show))
+            clear *= (1.0 - show) / (1.0 - clear * show)
+        clear = clear * (1.0 - CONSTANTS.rare) + (1.0 - clear) * CONSTANTS.cleared
     return found
