@@ -40,7 +40,7 @@ CLOSE = 0.8
 LOG_APART = np.log(1e-4)
 """Log probability that two that lie apart come out as one."""
 ASIDE = 10.0
-"""Log evidence behind a track's best from which on a hypothesis does not speak for others."""
+"""Log evidence behind a track's best from which on a hypothesis does not speak for others, nor is asked for more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:

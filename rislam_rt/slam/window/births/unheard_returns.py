@@ -9,15 +9,13 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.returns import poses_of, reflect
 from rislam_rt.slam.window.births.hypotheses import Hypotheses
+from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.solver_limits import LEVEL
 from rislam_rt.slam.window.state import WindowState
-
-BEHIND = 10.0
-"""Log evidence behind a track's best from which on a hypothesis is not asked for its wall's own return."""
 
 
 def log_unheard(
@@ -32,7 +30,7 @@ def log_unheard(
     found, track = np.zeros(len(table.kind)), owner[table.trials.track]
     best = np.full(len(ats), -np.inf)
     np.maximum.at(best, track, evidence)
-    rows = (over_known(table) & (evidence > best[track] - BEHIND)).nonzero()[0]
+    rows = (over_known(table) & (evidence > best[track] - ASIDE)).nonzero()[0]
     if not len(rows):
         return found
     log, scene, where = context.log, context.scene, poses(context.window)
@@ -60,17 +58,18 @@ def log_unheard(
 
 
 def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, digest: TrackSummary) -> Floats:
-    """(K,) probability that the own returns of these lengths (K,) [m] of hypothesis `row`'s wall are above the
-    threshold: as loud as what the wall leaves of the path over the known one as well tells."""
+    """(K,) probability that the own returns of these lengths (K,) [m] of hypothesis `row`'s wall are in the
+    window and above the threshold: as loud as what the wall leaves of the path over the known one as well tells."""
     radio, track, wall = context.scene.radio, table.trials.track[row], table.known[row]
     told = digest.log_amplitude[track] - free_space(radio) + np.log(digest.mean[0][track, 0])
     noise = context.landmarks.ratio_variance[wall] + CONSTANTS.fading**2
     gain = CONSTANTS.wall_ratio_std**2 / (CONSTANTS.wall_ratio_std**2 + noise)
     ratio = CONSTANTS.wall_ratio + gain * (told - context.landmarks.ratio[wall] - CONSTANTS.wall_ratio)
     std = np.full(len(length), np.sqrt(gain * noise + CONSTANTS.fading**2))
-    return CONSTANTS.shown * detection_probability(
-        free_space(radio) - np.log(length) + ratio, std, context.scene.sensor
-    )
+    sensor, level = context.scene.sensor, free_space(radio) - np.log(length) + ratio
+    delay = sensor.heard_as(length) / SPEED_OF_LIGHT
+    reported = (delay >= sensor.window[0]) & (delay <= sensor.window[1])
+    return np.asarray(CONSTANTS.shown * detection_probability(level, std, sensor) * reported)
 
 
 def log_silence(shows: Floats, present: Booleans) -> float:
