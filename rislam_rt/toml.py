@@ -53,6 +53,14 @@ def _too_long(value: Any, place: str) -> Iterator[str]:
         yield from _too_long(part, f"{place}[{number}]")
 
 
+def parse_value(text: str) -> Any:
+    """The TOML value that a text stands for, or the text itself, so that strings need no quotes."""
+    try:
+        return parse_toml(f"value = {text}")["value"]
+    except (ValueError, KeyError):
+        return text
+
+
 def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     """The settings with one dotted key replaced; tables on the way are copied, or made.
 

@@ -25,32 +25,15 @@ _NO_HISTORY = np.zeros(0)
 _DEFAULT = DesignConfig()
 
 
-def _genetic(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return genetic_search(o, p.target.size, p.levels, rng=rng, config=c)
-
-
-def _exact(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return exact_codes(p), _NO_HISTORY
-
-
-def _coordinate(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return coordinate_search(p, o, c.starts, c.max_steps)
-
-
-def _random(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return rng.integers(p.levels, size=p.target.size), _NO_HISTORY
-
-
-def _zero(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return np.zeros(p.target.size, dtype=np.int64), _NO_HISTORY
-
-
-def _nearest(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Integers, Floats]:
-    return np.concatenate([nearest_code(target, p.levels) for target in p.targets]), _NO_HISTORY
-
-
-def _continuous(p: DesignProblem, o: Objective, rng: np.random.Generator, c: DesignConfig) -> tuple[Floats, Floats]:
-    return np.concatenate([continuous_phases(target) for target in p.targets]), _NO_HISTORY
+_SEARCHES: Mapping[str, _Search] = {
+    "genetic": lambda p, o, rng, c: genetic_search(o, p.target.size, p.levels, rng=rng, config=c),
+    "exact": lambda p, o, rng, c: (exact_codes(p), _NO_HISTORY),
+    "coordinate": lambda p, o, rng, c: coordinate_search(p, o, c.starts, c.max_steps),
+    "random": lambda p, o, rng, c: (rng.integers(p.levels, size=p.target.size), _NO_HISTORY),
+    "zero": lambda p, o, rng, c: (np.zeros(p.target.size, dtype=np.int64), _NO_HISTORY),
+    "nearest": lambda p, o, rng, c: (np.concatenate([nearest_code(one, p.levels) for one in p.targets]), _NO_HISTORY),
+    "continuous": lambda p, o, rng, c: (np.concatenate([continuous_phases(one) for one in p.targets]), _NO_HISTORY),
+}
 
 
 def _designer(name: str, search: _Search) -> Designer:
@@ -100,20 +83,7 @@ def _db(magnitude: Floats) -> Floats:
     return 20.0 * np.log10(np.maximum(magnitude, 1e-20))
 
 
-DESIGNERS: Mapping[str, Designer] = MappingProxyType(
-    {
-        name: _designer(name, search)
-        for name, search in (
-            ("genetic", _genetic),
-            ("exact", _exact),
-            ("coordinate", _coordinate),
-            ("random", _random),
-            ("zero", _zero),
-            ("nearest", _nearest),
-            ("continuous", _continuous),
-        )
-    }
-)
+DESIGNERS: Mapping[str, Designer] = MappingProxyType({name: _designer(name, one) for name, one in _SEARCHES.items()})
 """Every designer by name. `continuous` breaks the panel's levels and is a reference only."""
 
 

@@ -12,7 +12,7 @@ from rislam_rt.evaluate.confidence_intervals import (
 )
 from rislam_rt.evaluate.consistency import normalised_squares
 from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
-from rislam_rt.evaluate.set_distances import Gospa, gospa, match_points
+from rislam_rt.evaluate.set_distances import Gospa, gospa, match_nearest, match_points
 
 __all__ = [
     "AssociationScore",
@@ -25,6 +25,7 @@ __all__ = [
     "bootstrap_ratio",
     "gospa",
     "label_switches",
+    "match_nearest",
     "match_points",
     "mean_over_runs",
     "median_over_runs",

@@ -51,6 +51,18 @@ def match_points(estimate: Floats, truth: Floats, *, cutoff: float = np.inf) -> 
     return index
 
 
+def match_nearest(distance: Floats, limit: float) -> Integers:
+    """Column (N,) of the partner of each row of distances (N, M), -1 for none within the limit; one to one.
+
+    The pairs with the least sum of distances, where one beyond ten limits costs no more than that.
+    """
+    partner = np.full(len(distance), -1)
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 10.0 * limit))
+    near = distance[rows, columns] <= limit
+    partner[rows[near]] = columns[near]
+    return partner
+
+
 def _distances(estimate: Floats, truth: Floats, cutoff: float, order: float) -> Floats:
     if not (cutoff > 0.0 and order >= 1.0):
         raise ConfigError(

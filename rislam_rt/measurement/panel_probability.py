@@ -83,7 +83,8 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
 def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
     """(A,) odds of each component for being a leak of one of the sources and no panel's, against a path of its own
     kind."""
-    cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * radio.array.spacing) for n in _shape(radio))])
+    array = radio.array
+    cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     gap = found.points[:, None] - sources.points
     variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2
     place = np.prod(np.exp(-0.5 * gap**2 / variance) / np.sqrt(2.0 * np.pi * variance) * cell, axis=-1)
@@ -94,10 +95,6 @@ def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexe
     leak = np.mean(np.exp(-miss / spread) / (np.pi * spread), axis=-1)
     own = DENSITY / (2.0 * np.pi * DYNAMIC_RANGE * np.abs(found.gain) ** 2)
     return np.asarray(np.sum(place * leak, axis=1) / own)
-
-
-def _shape(radio: RadioConfig) -> tuple[int, int]:
-    return radio.array.rows, radio.array.cols
 
 
 def _pick(found: ComponentSides, rows: Booleans) -> ComponentSides:

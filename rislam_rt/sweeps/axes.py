@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.toml import parse_toml
+from rislam_rt.toml import parse_toml, parse_value
 
 Scalar = str | int | float | bool
 Value = Scalar | list[Scalar]
@@ -52,17 +52,10 @@ def parse_axis(text: str) -> Axis:
     try:
         found = parse_toml(f"values = [{values}]")["values"]
     except (ValueError, KeyError):
-        found = [_parse(part) for part in parts]
+        found = [parse_value(part) for part in parts]
     if {type(value) for value in found} == {int, float}:
         found = [float(value) for value in found]
     return Axis(key.strip(), tuple(found))
-
-
-def _parse(text: str) -> Any:
-    try:
-        return parse_toml(f"value = {text}")["value"]
-    except (ValueError, KeyError):
-        return text
 
 
 def _plain(value: Any) -> bool:

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.cylinder import cylinder_rcs
+from rislam_rt.channel.cross_section import cross_section, cylinder_rcs
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import PathKind, RadioConfig, Scatterer
 

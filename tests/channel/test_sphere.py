@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.channel.cross_section import cross_section
+from rislam_rt.channel.cross_section import cross_section, mie_amplitudes, mie_coefficients, sphere_rcs
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.sphere import mie_amplitudes, mie_coefficients, sphere_rcs
 from rislam_rt.model import RadioConfig
 
 

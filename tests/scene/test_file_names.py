@@ -60,7 +60,7 @@ def test_ply_comments_reach_for_no_texture(capfd):
 
 
 def test_a_sphere_too_large_for_its_series_is_told():
-    from rislam_rt.channel.sphere import MAX_SIZE, mie_amplitudes
+    from rislam_rt.channel.cross_section import MAX_SIZE, mie_amplitudes
 
     with pytest.raises(SceneError, match="leave 'mie' out"):
         mie_amplitudes(1.01 * MAX_SIZE, np.array(-1.0))

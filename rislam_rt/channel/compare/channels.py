@@ -2,15 +2,25 @@
 
 import zlib
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.channel.compare.match import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
 from rislam_rt.channel.compare.report import PathReport
-from rislam_rt.channel.compare.table import Validation
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
+
+
+class Validation(NamedTuple):
+    """One room's comparison."""
+
+    scene: str
+    depth: int
+    numbers: str
+    """Whose numbers: `traced` (the tracer's float32) or `refined`."""
+    report: PathReport
 
 
 def compare_channels(

@@ -130,7 +130,7 @@ def drop(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> LeastSquaresFit:
     """The estimate without paths that left the window or the sky, or whose loss costs less than the threshold."""
-    keep = _inside(fit.parameters, window)
+    keep = np.all(np.abs(fit.parameters - into_range(fit.parameters, window)) <= SLACK, axis=-1)
     if not keep.all():
         fit = subset_fit(sounding, fit, keep, samples)
     keep = without_idle(fit, threshold)
@@ -173,11 +173,6 @@ def _neighbours_instead(
     rest = fit.parameters.copy()
     rest[near[others]] = trial.parameters
     return np.delete(rest, row, axis=0)
-
-
-def _inside(parameters: Floats, window: tuple[float, float]) -> Booleans:
-    """(P,) whether estimated parameters (P, 3) stayed within the window and the sky, or near enough."""
-    return np.all(np.abs(parameters - into_range(parameters, window)) <= SLACK, axis=-1)
 
 
 def _among(parameters: Floats, marked: Floats) -> Booleans:

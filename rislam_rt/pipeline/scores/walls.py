@@ -3,10 +3,10 @@
 from typing import Any
 
 import numpy as np
-import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.evaluate import match_nearest
 from rislam_rt.model import MapEstimate, Scene
 from rislam_rt.pipeline.scores.bound import SchemeBound
 
@@ -55,9 +55,7 @@ def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = No
     if not planes or not len(asked):
         return match
     cost = np.array([[surface_rms(walls, int(w), n, float(d)) for n, d in planes] for w in asked])
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
-    good = cost[rows, columns] <= NEAR_WALL
-    match[asked[rows[good]]] = columns[good]
+    match[asked] = match_nearest(cost, NEAR_WALL)
     return match
 
 

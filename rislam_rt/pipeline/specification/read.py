@@ -14,7 +14,7 @@ from rislam_rt.pipeline.specification.section import Section
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
 from rislam_rt.spelling import did_you_mean, nearest
-from rislam_rt.toml import MAX_LEVELS, parse_toml
+from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
 
 MAX_BYTES = 1_000_000
 """A pipeline file is written by people; anything larger is another file by mistake."""
@@ -163,7 +163,7 @@ def _override(table: dict[str, Any], setting: str) -> str:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
             raise ConfigError(f"--set {setting[:80]!r}: '{part}' is not a section; mend the key")
-    table[parts[-1]] = _value(text.strip())
+    table[parts[-1]] = parse_value(text.strip())
     return ".".join(parts)
 
 
@@ -174,14 +174,6 @@ def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
         if len(given) == 1:
             for key in set(keys) - set(given):
                 table[section].pop(key, None)
-
-
-def _value(text: str) -> Any:
-    """A setting's TOML value, or the text itself (so that strings need no quotes)."""
-    try:
-        return parse_toml(f"value = {text}")["value"]
-    except (ValueError, KeyError):
-        return text
 
 
 def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:

@@ -31,7 +31,7 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
     size = np.ptp(corners, axis=0)
     check_size(float(np.linalg.norm(size)), options.units)
     remarks = [f"{size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} m, with units = {units}, up = {up}"]
-    facing = _facing(placed)
+    facing = np.abs(triangle_cross(np.concatenate(placed))).sum(axis=0)  # twice the area seen along each axis
     other = "y" if up == "z" else "z"
     if options.up is None and facing[1] > 1.2 * facing[2] and size[1] < size[2]:
         remarks.append(f"its largest surfaces look sideways: if it lies on its side, give --up {other}")
@@ -54,8 +54,3 @@ def check_size(diagonal: float, units: str | None) -> None:
     if not words and diagonal < SMALLEST_ROOM:
         mend += "; degrees of longitude and latitude have to be projected to metres first"
     raise Fault(f"in metres it would measure {diagonal:.4g} m across", mend)
-
-
-def _facing(placed: list[Floats]) -> Floats:
-    """(3,) area [m^2] seen along each axis, which tells how a mesh is to be placed."""
-    return np.asarray(0.5 * np.abs(triangle_cross(np.concatenate(placed))).sum(axis=0))

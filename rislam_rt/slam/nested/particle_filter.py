@@ -33,7 +33,7 @@ from rislam_rt.slam.window.births.feature_removal import release
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle
 from rislam_rt.slam.window.cycle_explanation import grow, learn_cycle, listen, outcome_of, take_in, unexplained
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.measurement_log import renew as renew_slots
+from rislam_rt.slam.window.relinearisation import renew as renew_slots
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
 from rislam_rt.slam.window.solver_limits import REFRESH
@@ -104,12 +104,12 @@ def step(
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _look(front, told.belief, config)
     slots = np.arange(front.window.num_poses)[0 if front.cycle % REFRESH == 0 else -1 :]
-    left = renew_slots(front.window, front.log, landmarks, scene, front.heading, front.cycle, slots)[1]
+    left = renew_slots(front, slots)[1]
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED
 
-    grown = grow(front, left, view.expected, view.groups)
+    grown = grow(front, left, view)
     # a wall found by a point that it stands before is gone with it
     found = grown.landmarks.ident
     grown = release(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))

@@ -31,7 +31,7 @@ class CycleAssociation(NamedTuple):
     mean: Floats
     """(7 + 3F,) of the present..."""
     covariance: Floats
-    """(7 + 3F, 7 + 3F) ...the height's with what it may be off by."""
+    """(7 + 3F, 7 + 3F)."""
     poses: Poses
     expected: ExpectedComponents
     groups: UnresolvedClusters
@@ -80,7 +80,8 @@ def associate_cycle(
     observed: Observations, strangers: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, covariance = _now(window, scene)
+    mean, held = window_gaussian.now(window)
+    covariance = _with_height(held, window, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = predict_returns(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
@@ -94,7 +95,7 @@ def associate_cycle(
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, covariance, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
+        mean, held, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
@@ -111,16 +112,17 @@ def _median(values: Floats) -> Floats:
     return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 
 
-def _now(window: Window, scene: KnownEnvironment) -> tuple[Floats, Floats]:
-    """Mean and covariance of the present, the height's with what it may be off by beyond the window's own variance.
+def _with_height(covariance: Floats, window: Window, scene: KnownEnvironment) -> Floats:
+    """Covariance of the present, the height's with what it may be off by beyond the window's own variance.
 
     Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
     returns next to nothing measures the height: a gate as wide as it may be off holds anything.
     """
-    mean, covariance = window_gaussian.now(window)
-    if scene.use_vt:
-        covariance[2, 2] += window_gaussian.excess(window)[2, 2]
-    return mean, covariance
+    if not scene.use_vt:
+        return covariance
+    wide = covariance.copy()
+    wide[2, 2] += window_gaussian.excess(window)[2, 2]
+    return wide
 
 
 def score_again(

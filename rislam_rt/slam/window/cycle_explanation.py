@@ -18,12 +18,7 @@ from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import learn
-from rislam_rt.slam.window.landmarks.measurement_prediction import (
-    ExpectedComponents,
-    KnownEnvironment,
-    UnresolvedClusters,
-    conditioned_share,
-)
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
@@ -61,10 +56,8 @@ def take_in(state: WindowState, observed: Observations, view: CycleAssociation) 
     forms, row, pick = view.expected.forms, view.row, view.pick
     used = np.ones(len(row), dtype=np.bool_) if state.scene.use_vt else forms[view.groups.leader[row], 0] != TX
     log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
-    log = _explain(
-        log, view.expected, view.groups, state.landmarks, view.scatter, row[used], pick[used], len(observed.seen)
-    )
-    return state._replace(log=log), used
+    at = len(log.cycle) - len(observed.seen) + pick[used]
+    return state._replace(log=_explain(log, view, state.landmarks, row[used], at)), used
 
 
 def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) -> tuple[Floats, Floats]:
@@ -108,33 +101,22 @@ def learn_cycle(
         state.scene, code,
     )  # fmt: skip
     landmark = heard.landmark.copy()
-    landmark[heard.free[pick]] = np.where(used, _names(landmarks, expected, groups, row), REMOVED)
+    landmark[heard.free[pick]] = np.where(used, _names(landmarks, expected.forms[groups.leader[row]]), REMOVED)
     return state._replace(visibility=visibility, landmarks=landmarks), landmark
 
 
-def _explain(
-    log: Log,
-    expected: ExpectedComponents,
-    groups: UnresolvedClusters,
-    landmarks: WindowTable,
-    scatter: Floats,
-    row: Integers,
-    pick: Integers,
-    count: int,
-) -> Log:
-    """The log's last `count` components with what they were taken for."""
+def _explain(log: Log, view: CycleAssociation, landmarks: WindowTable, row: Integers, at: Integers) -> Log:
+    """The log with its components `at` (A,) held for clusters `row` (A,)."""
     if not len(row):
         return log
-    at = len(log.cycle) - count + pick
+    expected, groups = view.expected, view.groups
     lead, mate = groups.leader[row], groups.partner[row]
     share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
     both = (mate >= 0)[:, None]
     forms = np.stack([expected.forms[lead], np.where(both, expected.forms[mate], UNKNOWN)], axis=1)
     shared = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
-    return log.explain(
-        at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), shared,
-        scatter_variance(scatter[lead], log.std[at]),
-    )  # fmt: skip
+    scatter = scatter_variance(view.scatter[lead], log.std[at])
+    return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), shared, scatter)
 
 
 def scatter_variance(scatter: Floats, std: Floats) -> Floats:
@@ -220,24 +202,23 @@ def _follow(
     return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
 
 
-def _names(landmarks: WindowTable, expected: ExpectedComponents, groups: UnresolvedClusters, row: Integers) -> Integers:
-    """Ident of what each of the clusters `row` (A,) came over first: a point, its image in a wall, a wall."""
-    if not len(row):
+def _names(landmarks: WindowTable, forms: Integers) -> Integers:
+    """Ident (A,) of what each of the forms (A, 5) came over first: a point, its image in a wall, a wall."""
+    if not len(forms):
         return np.zeros(0, dtype=np.int64)
-    forms = expected.forms[groups.leader[row]]
     wall = np.where(forms[:, 3] >= 0, forms[:, 3], forms[:, 1])
     own = landmarks.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
     image = (forms[:, 0] >= 0) & (wall >= 0)
     return np.where(image, image_ident(own, landmarks.ident[wall]), own)
 
 
-def grow(state: WindowState, left: Residuals, expected: ExpectedComponents, groups: UnresolvedClusters) -> WindowState:
+def grow(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:
     """With what the evidence has turned against taken back, or else with what is born."""
     fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
         gone = condemned(state.landmarks, left, state.log)
         state, fresh = release(state, ~gone), not gone.any()
-    return births(state, expected, groups) if fresh else state
+    return births(state, view) if fresh else state
 
 
 def outcome_of(heard: int, features: int, lost: bool) -> StepOutcome:

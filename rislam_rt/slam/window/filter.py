@@ -26,7 +26,8 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.measurement_log import Residuals, empty_log, renew
+from rislam_rt.slam.window.measurement_log import Residuals, empty_log
+from rislam_rt.slam.window.relinearisation import renew
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
@@ -84,7 +85,7 @@ def step(
     if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
         state = state._replace(log=weigh_again(state.log, left, state.window.num_poses))
     state, wrong = recovery.ask(state)
-    state = grow(state, left, view.expected, view.groups)
+    state = grow(state, left, view)
     outcome = outcome_of(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
@@ -133,7 +134,7 @@ def _notice(
     calm = best = view_of(state.window)
     window = state.window
     if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
-        lively = window_gaussian.now_under(window, _livelier(window.solved))
+        lively = window_gaussian.now_under(window, _livelier(window.solved), (calm.mean, calm.covariance))
         score = score_again(calm, *lively, observed, strangers)
         if score + CONSTANTS.log_rare > calm.score:
             trial = window_gaussian.solve(window._replace(precision=_livelier(window.precision)))
@@ -199,11 +200,11 @@ def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
 def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[WindowState, Residuals, float]:
     """The window after this cycle's components: two Gauss-Newton steps, the first on what the association expected; the
     whole of it again now and then."""
-    window, log, landmarks, scene = state.window, state.log, state.landmarks, state.scene
-    innovation, jacobian = innovations(view, log, used, state.cycle)
-    window = window_gaussian.solve(window_gaussian.with_present(window, innovation, jacobian), spread=False)
-    slots = np.arange(window.num_poses) if state.cycle % REFRESH == 0 else np.array([window.num_poses - 1])
-    window, left = renew(window, log, landmarks, scene, state.heading, state.cycle, slots)
+    innovation, jacobian = innovations(view, state.log, used, state.cycle)
+    window = window_gaussian.with_present(state.window, innovation, jacobian)
+    window = window_gaussian.solve(window, spread=False)
+    slots = np.arange(window.num_poses)[0 if state.cycle % REFRESH == 0 else -1 :]
+    window, left = renew(state._replace(window=window), slots)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
 

@@ -1,4 +1,4 @@
-"""Log of the window's measurements, and what each is held to be; their quadratics on poses and features."""
+"""Log of the window's measurements, and what each is held to be."""
 
 from typing import Any, NamedTuple
 
@@ -7,12 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import linearise_each, poses_of
-from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.smoother.steps import POSE
-from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 
 
 class Log(NamedTuple):
@@ -101,41 +96,6 @@ class Residuals(NamedTuple):
         return Residuals._make(field[rows] for field in self)
 
 
-def residuals(
-    log: Log,
-    window: Window,
-    landmarks: WindowTable,
-    scene: KnownEnvironment,
-    heading: Floats,
-    rows: Integers,
-    slot: Integers,
-) -> tuple[Residuals, Floats]:
-    """Of some explained rows of the log, at the present estimate, with the slopes (A, 3, 4 + 3F) of the predictions by
-    pose and features, likewise in standard deviations; `heading` (K,) as the compass tells."""
-    form, features = log.form[rows], window.features
-    both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
-    at = np.concatenate([slot, slot[both]])
-    place = poses(window)[at]
-    ends = poses_of(place[:, :3], heading[at] + place[:, 3], scene.body)
-    returns = compile_forms(landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])), at)
-    linear = linearise_each(returns, features, landmarks.anchor, ends, POSE)
-    jacobian = linear.wide
-    jacobian[..., :3] = linear.by_pose
-    if window.turns:
-        jacobian[..., 3] = linear.by_heading(ends, place[:, :3])
-    count, share = len(rows), log.share[rows[both], None]
-    (seen, other), (jacobian, by_other) = ((each[:count], each[count:]) for each in (linear.seen, jacobian))
-    gap = other - seen[both]
-    gap[:, 0] = scene.sensor.nearest(gap[:, 0])
-    seen[both] += share * gap
-    jacobian[both] += share[..., None] * (by_other - jacobian[both])
-    std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
-    left = log.seen[rows] - seen
-    left[:, 0] = scene.sensor.nearest(left[:, 0])
-    jacobian /= std[..., None]
-    return Residuals(rows, slot, left / std), jacobian
-
-
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
     """Distinct forms (U, 5), and which of them each (N, 5) is."""
     base = int(forms.max(initial=0)) + 3
@@ -144,38 +104,3 @@ def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
         code = code * base + column + 1
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
     return forms[first], place
-
-
-def trust(left: Floats) -> Floats:
-    """(A,) weight that Student's t gives residuals (A, 3)."""
-    return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))
-
-
-def renew(
-    window: Window,
-    log: Log,
-    landmarks: WindowTable,
-    scene: KnownEnvironment,
-    heading: Floats,
-    cycle: int,
-    slots: Integers,
-) -> tuple[Window, Residuals]:
-    """The quadratics of some slots, made at the present estimate; the last pose is that of `cycle`."""
-    slot = log.cycle - (cycle - window.num_poses + 1)
-    rows = (log.explained & np.isin(slot, slots)).nonzero()[0]
-    size, place = POSE + window.features.size, poses(window)
-    hessian, gradient, middle = (field.copy() for field in window.slots)
-    middle[slots] = np.concatenate(
-        [place[slots], np.broadcast_to(window.features.ravel(), (len(slots), size - POSE))], 1
-    )
-    found, slopes = residuals(log, window, landmarks, scene, heading, rows, slot[rows])
-    # the components of each slot side by side
-    of, first = np.searchsorted(slots, found.slot), np.searchsorted(found.slot, slots)
-    at = np.arange(len(rows)) - first[of]
-    most = int(at.max(initial=-1)) + 1
-    wide, heavy, left = (np.zeros((len(slots), most, 3, width)) for width in (size, 1, 1))
-    wide[of, at], heavy[of, at], left[of, at, :, 0] = slopes, trust(found.left)[:, None, None], found.left
-    flat, thick = (each.reshape(len(slots), 3 * most, size) for each in (wide, heavy * wide))
-    hessian[slots] = np.swapaxes(thick, 1, 2) @ flat
-    gradient[slots] = -(np.swapaxes(thick, 1, 2) @ left.reshape(len(slots), 3 * most, 1))[..., 0]
-    return window._replace(slots=Quadratic(hessian, gradient, middle)), found

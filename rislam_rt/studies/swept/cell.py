@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.measurement import paper_snr_db
-from rislam_rt.model import SlamResult
 from rislam_rt.pipeline.cycle import Receptions
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, result_of, run_scheme
 from rislam_rt.pipeline.scores.summary import summarise_scheme
@@ -17,7 +16,7 @@ from rislam_rt.pipeline.specification.read import Table, build_spec
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene import load_scene
-from rislam_rt.sweeps.work import one_line
+from rislam_rt.sweeps.cell_work import one_line
 from rislam_rt.toml import put_dotted
 
 FUNCTION = f"{__name__}:run_cell"
@@ -37,7 +36,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
         begin = process_time()
         try:
             result = result_of(setup, spec, {name: run_scheme(name, setup, spec, tell_nobody)}, seed=seed)
-            scores = _scores(result, name)
+            scores = summarise_scheme(result, result.schemes[name])
         except Exception as error:  # whatever it is, it is this scheme's alone
             schemes[name] = {"failed": one_line(error)}
             continue
@@ -60,10 +59,6 @@ def cell_spec(settings: Mapping[str, Any], path: Path | None = None) -> Pipeline
     for key, value in settings["variants"].get(settings.get("variant", ""), {}).items():
         content = put_dotted(content, key, value)
     return build_spec(Table(path or Path("run"), content, ()), PipelineSpec, build_settings)
-
-
-def _scores(result: SlamResult, name: str) -> dict[str, Any]:
-    return summarise_scheme(result, result.schemes[name])
 
 
 def _paper_snr(setup: RunSetup, spec: PipelineSpec) -> float:

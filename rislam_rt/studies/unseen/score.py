@@ -3,10 +3,9 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.evaluate import gospa, match_points, normalised_squares, root_mean_square
+from rislam_rt.evaluate import gospa, match_nearest, match_points, normalised_squares, root_mean_square
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
@@ -183,9 +182,7 @@ def match_planes(truth: Truth, found: MapEstimate, heard: Booleans, told: Floats
     if not len(asked) or not len(found.wall_offset):
         return match
     cost = plane_distance(truth, found, told)[asked]
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(cost, 10.0 * NEAR_WALL))
-    good = cost[rows, columns] <= NEAR_WALL
-    match[asked[rows[good]]] = columns[good]
+    match[asked] = match_nearest(cost, NEAR_WALL)
     return match
 
 

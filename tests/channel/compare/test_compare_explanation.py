@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.channel.compare import Validation, compare_paths, random_poses, validation_page, validation_table
+from rislam_rt.channel.compare import Validation, compare_paths, random_poses
 from rislam_rt.channel.compare.explanation import SHORTEST_SEGMENT, DifferenceExplainer
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import RadioConfig
+from rislam_rt.report.studies.channel_validation import validation_page, validation_table
 
 RADIO = RadioConfig()
 

@@ -17,16 +17,9 @@ from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import CandidatePairs, View, claims, likelihoods, spread_of
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_update import absorb
-from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
-    POINT,
-    WALL,
-    Ends,
-    GaussianFeatures,
-    look,
-    prune,
-    returns_of,
-)
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import POINT, WALL, Ends, GaussianFeatures, look, returns_of
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
+from rislam_rt.slam.schemes.shared.sums import prune
 from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)

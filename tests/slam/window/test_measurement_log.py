@@ -1,5 +1,7 @@
 """The log's components and the poses of the window that they were heard at."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from rislam_rt.model import Body, RadioConfig, SensorModel
@@ -11,7 +13,8 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import append, empty_log, renew
+from rislam_rt.slam.window.measurement_log import append, empty_log
+from rislam_rt.slam.window.relinearisation import renew
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 
@@ -29,12 +32,13 @@ def test_a_cycle_in_which_nothing_was_heard_takes_nothing_of_the_one_before():
     )
     form = np.array([[[TX, NONE, NONE, 0, NONE], [UNKNOWN] * 5]])
     log = append(empty_log(), observed, 3, 0).explain(np.array([0]), form, 0.0, 0.0, np.zeros((1, 3)))
+    known = {"window": window, "log": log, "landmarks": landmarks, "scene": SCENE, "heading": np.zeros(2)}
     for cycle, heard in ((3, True), (4, False)):
-        found, left = renew(window, log, landmarks, SCENE, np.zeros(2), cycle, np.array([1]))
+        found, left = renew(SimpleNamespace(**known, cycle=cycle), np.array([1]))
         assert len(left.row) == heard
         assert found.slots.hessian[-1].any() == heard
     # the whole window then: it is the pose before that heard it
-    found, left = renew(window, log, landmarks, SCENE, np.zeros(2), 4, np.array([0, 1]))
+    found, left = renew(SimpleNamespace(**known, cycle=4), np.array([0, 1]))
     np.testing.assert_array_equal(left.slot, [0])
 
 

@@ -147,26 +147,3 @@ def through(rows: Floats, matrix: Floats) -> Floats:
 def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
     """Covariance (C, 3, 3) that features' rows (C, 3, n) make of the course's."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)
-
-
-def join(one: GaussianFeatures, other: GaussianFeatures) -> GaussianFeatures:
-    """Old and new features together."""
-    moved = other._replace(owner=other.owner + len(one.ident))
-    return GaussianFeatures._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
-
-
-def prune(features: GaussianFeatures, least_existence: float, least_share: float, most: int) -> GaussianFeatures:
-    """Without improbable features, and without Gaussians of small share; every feature keeps its best."""
-    rank = np.argsort(np.argsort(-features.existence, kind="stable"), kind="stable")
-    keep = (features.existence >= least_existence) & (rank < most)
-    best = np.zeros(len(keep))
-    np.maximum.at(best, features.owner, features.share)
-    own = features.share
-    rows = keep[features.owner] & ((own >= least_share) | (own >= best[features.owner]))
-    owner = (np.cumsum(keep) - 1)[features.owner[rows]]
-    total = np.bincount(owner, own[rows], minlength=int(keep.sum()))
-    return GaussianFeatures(
-        features.existence[keep], features.ident[keep], owner, features.kind[rows], own[rows] / total[owner],
-        features.mean[rows], features.slope[rows], features.covariance[rows], features.strength[rows],
-        features.strength_variance[rows], features.log_scatter[rows],
-    )  # fmt: skip

@@ -5,7 +5,7 @@ direction that it walked in, and turn about that direction. On a straight walk r
 third; in these coordinates the belief stays Gaussian while it shrinks along two axes only.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -66,6 +66,12 @@ class Sums(NamedTuple):
     """(C, 3, 3) given the course."""
     share: Floats
     """(C,) shares of one feature sum to one."""
+
+
+OF_FEATURES = ("base", "base_slope", "walk", "walk_slope", "speed", "existence", "ident")
+"""Fields that have a row a feature; all others have one a Gaussian."""
+Features = TypeVar("Features", bound=Any)
+"""Features as named tuples with the fields `existence`, `ident`, `owner` and `share`, as `Sums`."""
 
 
 class PredictedRanges(NamedTuple):
@@ -205,28 +211,23 @@ def born(
     )  # fmt: skip
 
 
-def join(one: Sums, other: Sums) -> Sums:
-    """Both sets of Gaussian sums as one."""
+def join(one: Features, other: Features) -> Features:
+    """Both sets of features with their Gaussians as one."""
     moved = other._replace(owner=other.owner + len(one.ident))
-    return Sums._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
+    return type(one)._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
 
 
-def prune(sums: Sums, least_existence: float, least_share: float, most: int) -> Sums:
+def prune(features: Features, least_existence: float, least_share: float, most: int) -> Features:
     """Without improbable features, and without Gaussians of small share; every feature keeps its best."""
-    count = len(sums.ident)
-    rank = np.argsort(np.argsort(-sums.existence, kind="stable"), kind="stable")
-    keep = (sums.existence >= least_existence) & (rank < most)
-    best = np.zeros(count)
-    np.maximum.at(best, sums.owner, sums.share)
-    rows = keep[sums.owner] & ((sums.share >= least_share) | (sums.share >= best[sums.owner]))
-    number = np.cumsum(keep) - 1
-    owner = number[sums.owner[rows]]
-    total = np.bincount(owner, sums.share[rows], minlength=int(keep.sum()))
-    return Sums(
-        sums.base[keep], sums.base_slope[keep], sums.walk[keep], sums.walk_slope[keep], sums.speed[keep],
-        sums.existence[keep], sums.ident[keep], owner, sums.kind[rows], sums.mean[rows], sums.slope[rows],
-        sums.covariance[rows], sums.share[rows] / total[owner],
-    )  # fmt: skip
+    rank = np.argsort(np.argsort(-features.existence, kind="stable"), kind="stable")
+    keep = (features.existence >= least_existence) & (rank < most)
+    best = np.zeros(len(keep))
+    np.maximum.at(best, features.owner, features.share)
+    rows = keep[features.owner] & ((features.share >= least_share) | (features.share >= best[features.owner]))
+    owner = (np.cumsum(keep) - 1)[features.owner[rows]]
+    total = np.bincount(owner, features.share[rows], minlength=int(keep.sum()))
+    kept = {name: value[keep if name in OF_FEATURES else rows] for name, value in features._asdict().items()}
+    return features._replace(**kept | {"owner": owner, "share": kept["share"] / total[owner]})
 
 
 def range_moments(sums: Sums, sight: PredictedRanges, course: AgentTrajectory) -> tuple[Floats, Floats]:

@@ -6,15 +6,16 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.returns import TX, linearise
+from rislam_rt.slam.returns import TX, Poses, linearise
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, judge, wanted
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
+from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import seed
-from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, UnresolvedClusters
+from rislam_rt.slam.window.landmarks.measurement_prediction import UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
@@ -22,7 +23,7 @@ from rislam_rt.slam.window.solver_limits import ALIGNED, MOST, NEAR, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
-def births(context: WindowState, expected: ExpectedComponents, groups: UnresolvedClusters) -> WindowState:
+def births(context: WindowState, view: CycleAssociation) -> WindowState:
     """Every track whose time has come is weighed; the shortest of those that are clear enters."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
@@ -35,16 +36,8 @@ def births(context: WindowState, expected: ExpectedComponents, groups: Unresolve
     rows, ats = rows[full], [ats[place] for place in full]
     mean, covariance = window_gaussian.now(context.window)
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
-    histories = summarise_tracks(
-        context.log,
-        ats,
-        context.window,
-        context.scene.body,
-        context.heading,
-        context.cycle,
-        use_vt=context.scene.use_vt,
-    )
-    told = explanations(context, rows, histories, expected, groups, mean, covariance)
+    histories = summarise_tracks(context, ats)
+    told = explanations(context, rows, histories, view, mean, covariance)
     panels = context.landmarks.panels
     lonely = _missing_legs(context, histories, mean)
     beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, ats, histories, mean)
@@ -60,7 +53,7 @@ def births(context: WindowState, expected: ExpectedComponents, groups: Unresolve
                 continue
             named = idents(context.landmarks, forms)
             if not _taken(context, ats[row], named[0]):
-                part = float(groups.share[column])
+                part = float(view.groups.share[column])
                 context = _assign(context, ats[row], named, histories.scatter[row], part)
                 gone[rows[row]] = True
     born = -1
@@ -143,31 +136,25 @@ LEG = 0.04
 
 
 def explanations(
-    context: WindowState, rows: Integers, histories: TrackSummary, expected: ExpectedComponents,
-    groups: UnresolvedClusters, mean: Floats,
+    context: WindowState, rows: Integers, histories: TrackSummary, view: CycleAssociation, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
     """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
+    expected, groups = view.expected, view.groups
     if not len(groups.leader):
         return []
     lead, mate, share = groups.leader, groups.partner, groups.share[:, None]
-    features = mean[HEAD:].reshape(-1, 3)
-    size = features.size
-    inside = covariance[HEAD:, HEAD:]
-    root = np.asarray(
-        np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + 1e-14 * np.eye(size)), dtype=np.float64
-    )
+    inside, wide = covariance[HEAD:, HEAD:], 1e-14 * np.eye(len(mean) - HEAD)
+    root = np.asarray(np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + wide), dtype=np.float64)
     found: list[tuple[int, float, Integers, int]] = []
     for row, place in enumerate(rows):
         off = np.abs(expected.seen[lead] + share * groups.gap - context.tracks.mean[place, :, 0]) / NEAR
         near = (off < 1.0).all(axis=1).nonzero()[0]
-        for column in near[np.argsort(off[near].sum(axis=1))][:MOST]:
-            forms = np.full((2, 5), UNKNOWN)
-            forms[0] = expected.forms[lead[column]]
-            if mate[column] >= 0:
-                forms[1] = expected.forms[mate[column]]
-            value = _explain(context, histories, row, forms, groups, int(column), features, root)
-            found.append((row, value, forms, int(column)))
+        for column in near[np.argsort(off[near].sum(axis=1))][:MOST].tolist():
+            partner = expected.forms[mate[column]] if mate[column] >= 0 else np.full(5, UNKNOWN)
+            forms = np.stack([expected.forms[lead[column]], partner])
+            value = _explain(context, histories, row, forms, groups, column, mean[HEAD:].reshape(-1, 3), root)
+            found.append((row, value, forms, column))
     return found
 
 
@@ -176,28 +163,23 @@ def _explain(
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
     """Log evidence of one explanation."""
-    from rislam_rt.slam.returns import Poses
-
-    used = histories.weight[row, :, 0] > 0.0
+    nearest, used = context.scene.sensor.nearest, histories.weight[row, :, 0] > 0.0
     poses = Poses(histories.tx[row, used], histories.rx[row, used], np.zeros(int(used.sum())))
     parts = forms[forms[:, 0] != UNKNOWN]
     linear = linearise(compile_forms(parts), features, context.landmarks.anchor, poses)
-    weight = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
-    weight = weight / weight.sum()
-    linear.seen[..., 0] = linear.seen[..., :1, 0] + context.scene.sensor.nearest(
-        linear.seen[..., 0] - linear.seen[..., :1, 0]
+    share = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
+    share = share / share.sum()
+    linear.seen[..., 0] = linear.seen[..., :1, 0] + nearest(linear.seen[..., 0] - linear.seen[..., :1, 0])
+    value, by_pose, by_map = (
+        np.einsum("r,kr...->k...", share, each) for each in (linear.seen, linear.by_pose, linear.wide)
     )
-    value = np.einsum("r,krj->kj", weight, linear.seen)
-    by_pose = np.einsum("r,krij->kij", weight, linear.by_pose) @ histories.uncertainty[row, used]
-    by_pose = np.concatenate([by_pose, histories.twist[row, used]], axis=-1)
-    wide = linear.by_feature.reshape(*linear.seen.shape, features.size)
-    by_map = np.einsum("r,krij->kij", weight, wide) @ root
+    by_pose = np.concatenate([by_pose @ histories.uncertainty[row, used], histories.twist[row, used]], axis=-1)
     extra = groups.disturbance[column] + groups.share_variance[column] * groups.gap[column] ** 2
     reported = histories.weight[row, used] ** -1.0
     std = np.sqrt(reported**2 + extra)
-    jacobian = np.concatenate([by_pose, by_map], axis=-1) / std[..., None]
+    jacobian = np.concatenate([by_pose, by_map @ root], axis=-1) / std[..., None]
     left = histories.seen[row, used] - value
-    left[:, 0] = context.scene.sensor.nearest(left[:, 0])
+    left[:, 0] = nearest(left[:, 0])
     left = left / std
     flat, trust = jacobian.reshape(-1, jacobian.shape[-1]), np.ones(len(left))
     for _ in range(2):
@@ -207,11 +189,10 @@ def _explain(
         squared = np.sum((left - (flat @ error).reshape(-1, 3)) ** 2, axis=1)
         trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + squared)
     cost = (CONSTANTS.tail + 3.0) * np.log1p(squared / CONSTANTS.tail).sum() + error @ error
-    cost += 2.0 * np.log(std / reported).sum()
+    cost += 2.0 * np.log(std / reported).sum() + np.linalg.slogdet(normal)[1]
     level = histories.log_amplitude[row] - groups.log_amplitude[column]
     variance = groups.log_amplitude_std[column] ** 2 + CONSTANTS.fading**2
-    evidence = -0.5 * cost - 0.5 * np.linalg.slogdet(normal)[1] - 0.5 * level**2 / variance - 0.5 * np.log(variance)
-    return float(evidence)
+    return float(-0.5 * (cost + level**2 / variance + np.log(variance)))
 
 
 def _taken(context: WindowState, at: Integers, form: Integers) -> bool:

@@ -8,7 +8,8 @@ from rislam_rt.slam.returns import NONE
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import Log, Residuals, renew
+from rislam_rt.slam.window.measurement_log import Log, Residuals
+from rislam_rt.slam.window.relinearisation import renew
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
@@ -17,12 +18,11 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
     """Gauss-Newton over the whole window."""
-    window, landmarks, scene = context.window, context.landmarks, context.scene
-    every = np.arange(window.num_poses)
+    every = np.arange(context.window.num_poses)
     for _ in range(steps):
-        window, left = renew(window, context.log, landmarks, scene, context.heading, context.cycle, every)
-        window = window_gaussian.weigh_holds(window_gaussian.solve(window))
-    return window, left
+        window, left = renew(context, every)
+        context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
+    return context.window, left
 
 
 def release(context: WindowState, keep: Booleans) -> WindowState:

@@ -93,7 +93,7 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
     direct, alone, pairs = place_on_ray(ray, length, tx, rx), wall_of(image, tx), _pairs(ray)
     tx_image, behind, same = mirror(tx), mirror(image), mirror(direct)
     apparent = place_on_ray(ray, length, tx_image, rx)
-    mirrored, level = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > LEVEL_TURN]
+    mirrored, level = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > ALIGNED_TURN]
     upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])  # what lies higher comes of the edge
     # kind, known walls (W,), first guesses (W, T, 3), the walls on either leg, and about where these are met
     kinds: list[Any] = [
@@ -146,8 +146,8 @@ def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
     return found
 
 
-LEVEL_TURN = 0.9
-"""Part of a reflection's vertical axis that it turns over, from which on its wall is level."""
+ALIGNED_TURN = 0.9
+"""Part of the vertical that a reflection keeps or turns over, from which on its wall is upright or level."""
 
 
 def _pairs(ray: Floats) -> Floats:

@@ -9,9 +9,9 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
+    ALIGNED_TURN,
     BESIDE,
     IS_IMAGE,
-    LEVEL_TURN,
     OVER_SAME,
     OVER_TX,
     POINT,
@@ -64,18 +64,18 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at a level wall.
+    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at another wall.
 
-    It hangs on how far apart the two would be, and on whether the level wall is heard by itself: where it ends, so does
-    its edge.
+    It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
+    so does its edge.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
-    level = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > LEVEL_TURN]
-    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in level], dtype=np.int64).reshape(-1, 5)
-    heard, _ = recall_forms(context.visibility, forms, np.ones(len(level), dtype=np.int64), landmarks)
-    for wall, clear in zip(level, heard, strict=True):
+    aligned = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > ALIGNED_TURN]
+    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in aligned], dtype=np.int64).reshape(-1, 5)
+    heard, _ = recall_forms(context.visibility, forms, np.ones(len(aligned), dtype=np.int64), landmarks)
+    for wall, clear in zip(aligned, heard, strict=True):
         rise = float(np.linalg.norm(known.place[wall] - digest.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)

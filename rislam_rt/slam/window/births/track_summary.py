@@ -11,15 +11,15 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.model import Body, SensorModel
+from rislam_rt.model import SensorModel
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, free_space
 from rislam_rt.slam.returns import poses_of
-from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother.steps import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.solver_limits import PERIODS, POINTS, STRENGTHS
+from rislam_rt.slam.window.state import WindowState
 
 TOGETHER = 10.0
 """Measurements over which the pull of neighbours keeps its sign."""
@@ -90,14 +90,13 @@ class TrackSummary(_Points):
         return rays(self.mean[0], 0.0)
 
 
-def summarise_tracks(
-    log: Log, rows: list[Integers], window: Window, body: Body, heading: Floats, cycle: int, *, use_vt: bool
-) -> TrackSummary:
-    """The histories `rows` of T tracks (rows of the log each, in time); `use_vt`: wall returns are among them."""
+def summarise_tracks(state: WindowState, rows: list[Integers]) -> TrackSummary:
+    """The histories `rows` of T tracks (rows of the log each, in time)."""
+    log, window = state.log, state.window
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
-    ends = poses_of(place[:, :3], heading + place[:, 3], body)
-    slots = [log.cycle[at] - (cycle - window.num_poses + 1) for at in rows]
+    ends = poses_of(place[:, :3], state.heading + place[:, 3], state.scene.body)
+    slots = [log.cycle[at] - (state.cycle - window.num_poses + 1) for at in rows]
     seen = [_turned(log.seen[at], ends.heading[slot]) for at, slot in zip(rows, slots, strict=True)]
     scatter = np.array([
         scatter_of(track, log.std[at], time[slot]) for track, at, slot in zip(seen, rows, slots, strict=True)
@@ -106,7 +105,7 @@ def summarise_tracks(
     pure = np.array([bool((log.side[at] >= PANEL).all()) for at in rows])[:, None]
     number, count = np.array([len(at) for at in rows])[:, None], len(rows)
     shown = scatter**2
-    if use_vt:  # what the others show is what a short history has yet to show
+    if state.scene.use_vt:  # what the others show is what a short history has yet to show
         around = max(CONSTANTS.crowd, float(np.mean(np.minimum(scatter, 10.0) ** 2)))
         expected = (CONSTANTS.memory * around + number * shown) / (CONSTANTS.memory + number)
     else:

@@ -143,12 +143,12 @@ def now(window: Window) -> tuple[Floats, Floats]:
     return _among(window, np.append(window.head, window.accel)[None])[0], _among(window, _present(window))
 
 
-def now_under(window: Window, precision: Floats) -> tuple[Floats, Floats]:
+def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
     """`now`, had the last solution had prior precisions (K - 1, A) that are not its own in a few steps.
 
-    By Woodbury's identity, so that nothing is solved anew.
+    `present` is `now`, where it is known. By Woodbury's identity, so that nothing is solved anew.
     """
-    (mean, covariance), change = now(window), (precision - window.solved).ravel()
+    (mean, covariance), change = present or now(window), (precision - window.solved).ravel()
     at = change.nonzero()[0]
     own, change = len(window.head) + at, change[at, None]
     wide = window.covariance[own]
@@ -161,7 +161,8 @@ def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
     """The last slot's quadratic from residuals (A, 3) of the present, in deviations, and their jacobian (A, 3, 7 + 3F):
     every component counts in full."""
     spot = np.concatenate([poses(window)[-1], window.head[HEAD:]])
-    flat = np.delete(jacobian, [3, 4, 5], axis=2).reshape(-1, len(spot))  # what is seen does not hang on the velocity
+    # what is seen does not hang on the velocity
+    flat = np.concatenate([jacobian[..., :3], jacobian[..., 6:]], axis=2).reshape(-1, len(spot))
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[-1], gradient[-1], middle[-1] = flat.T @ flat, -left.ravel() @ flat, spot
     return window._replace(slots=Quadratic(hessian, gradient, middle))

@@ -1,5 +1,7 @@
 """How far a track's components are expected to err: neighbours in their cell, by its SNR and by what it has shown."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -81,7 +83,11 @@ def scatter_expected(log: Log) -> float:
     for _ in range(number - 1):
         window = window_gaussian.extend(window, 0.1, np.full(3, 25.0))
     window = window_gaussian.solve(window)
-    found = summarise_tracks(log, [np.arange(number)], window, Body(), np.zeros(number), number - 1, use_vt=False)
+    state = SimpleNamespace(
+        log=log, window=window, heading=np.zeros(number), cycle=number - 1,
+        scene=SimpleNamespace(body=Body(), use_vt=False),
+    )  # fmt: skip
+    found = summarise_tracks(state, [np.arange(number)])
     return float(np.mean(found.scatter**2))
 
 

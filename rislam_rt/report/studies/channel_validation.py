@@ -1,9 +1,10 @@
-"""The table of the validation page: one row a room, from the reports of one run."""
+"""The page on the validation of the channels: what was compared, and a table with a row a room."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from rislam_rt.channel.compare.report import PathReport
+from rislam_rt.channel.compare import Validation
+from rislam_rt.report.swept.entries import table_lines
 
 _HEAD = [
     "room", "depth", "numbers", "poses", "matched", "explained", "unexplained",
@@ -36,19 +37,9 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 """
 
 
-class Validation(NamedTuple):
-    """One room's comparison."""
-
-    scene: str
-    depth: int
-    numbers: str
-    """Whose numbers: `traced` (the tracer's float32) or `refined`."""
-    report: PathReport
-
-
 def validation_table(rows: Sequence[Validation]) -> str:
     """Markdown table: paths per room, every reason with its count and weakest proof, largest errors."""
-    lines = [_row(_HEAD), _row(["---"] * len(_HEAD))]
+    cells = []
     for scene, depth, kind, report in rows:
         numbers = report.as_dict()
         spread = numbers["percentiles"]
@@ -56,8 +47,8 @@ def validation_table(rows: Sequence[Validation]) -> str:
         errors = [_error(spread[name]) for name in columns]
         counts = [str(report.cycles), str(report.matched), _reasons(numbers), str(report.unexplained)]
         shares = " ".join(_share(limits) for limits in numbers["limits"].values())
-        lines.append(_row([scene, str(depth), kind, *counts, str(report.num_breaches), *errors, shares]))
-    return "\n".join(lines) + "\n"
+        cells.append([scene, str(depth), kind, *counts, str(report.num_breaches), *errors, shares])
+    return "\n".join(table_lines(_HEAD, cells)) + "\n"
 
 
 def validation_page(rows: Sequence[Validation], *, seed: int) -> str:
@@ -90,7 +81,3 @@ def _error(spread: Mapping[str, float]) -> str:
         text.format("< 1e-12" if value < 1e-12 else f"{value:.1e}")
         for text, value in (("{}", spread["max"]), ("({})", spread["p99"]))
     )
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
