@@ -28,7 +28,7 @@ from rislam_rt.studies.compare import comparison_table, run_comparison
 from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept import build_sweep
-from rislam_rt.studies.swept.record import swept_record
+from rislam_rt.studies.swept.sweep import swept_record
 from rislam_rt.sweeps import Row, Sweep, SweepOptions, build_cells, run_sweep
 from rislam_rt.sweeps.store import check_folder
 

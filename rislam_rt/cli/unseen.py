@@ -11,7 +11,7 @@ from rislam_rt.report.unseen import write_unseen
 from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.studies import UnseenSpec
 from rislam_rt.studies.unseen import build_unseen, count_tests
-from rislam_rt.studies.unseen.record import unseen_record
+from rislam_rt.studies.unseen.sweep import unseen_record
 from rislam_rt.sweeps import Row, build_cells
 from rislam_rt.sweeps.store import check_folder, read_timings
 

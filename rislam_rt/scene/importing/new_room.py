@@ -24,6 +24,8 @@ from rislam_rt.scene.write import write_files
 
 PLANS = (".svg", ".geojson", ".json")
 MAX_PLAN_BYTES = 10_000_000
+IMMEASURABLE = 1e12
+"""Coordinates beyond this have no size worth a word."""
 
 
 def import_room(
@@ -73,7 +75,7 @@ def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:
     content = read_content(file, MAX_PLAN_BYTES)
     shapes = parse_svg(content) if file.suffix.lower() == ".svg" else parse_geojson(content)
     points = np.concatenate([shape.points for shape in shapes] or [np.zeros((1, 2))])
-    if np.isfinite(points).all():
+    if (np.abs(points) < IMMEASURABLE).all():  # what is beyond is refused with its shape's name
         check_size(float(np.linalg.norm(np.ptp(points, axis=0))), options.units)
     origin = np.array(options.origin[:2])
     unit = UNITS[options.units or "m"]

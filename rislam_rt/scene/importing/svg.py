@@ -51,12 +51,13 @@ def parse_svg(content: bytes) -> list[PlanShape]:
         raise Fault(f"not readable SVG ({one_line(str(error))[:60]})", "export it again as plain SVG") from None
     if not str(root.tag).endswith("svg"):
         raise Fault(f"'{one_line(str(root.tag))[:30]}' is no SVG drawing", "export it as plain SVG")
-    shapes = list(_walk(root, np.eye(3), "", 0))
-    if not shapes:
-        raise Fault("the drawing has no lines", "draw rooms as closed shapes, walls, doors and windows as lines")
-    points = np.concatenate([shape.points for shape in shapes])
-    left, bottom = points[:, 0].min(), points[:, 1].max()
-    return [shape._replace(points=(shape.points - [left, bottom]) * [1.0, -1.0]) for shape in shapes]
+    with np.errstate(invalid="ignore", over="ignore"):  # what is no number is refused with its shape's name
+        shapes = list(_walk(root, np.eye(3), "", 0))
+        if not shapes:
+            raise Fault("the drawing has no lines", "draw rooms as closed shapes, walls, doors and windows as lines")
+        points = np.concatenate([shape.points for shape in shapes])
+        left, bottom = points[:, 0].min(), points[:, 1].max()
+        return [shape._replace(points=(shape.points - [left, bottom]) * [1.0, -1.0]) for shape in shapes]
 
 
 def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> Iterator[PlanShape]:

@@ -1,4 +1,4 @@
-"""A swept study as a sweep: its axes, what its cells depend on, and a check of all of them beforehand."""
+"""A swept study as a sweep: its axes, what its cells depend on, a check of all of them beforehand, and its record."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -10,6 +10,7 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.scene import load_scene
+from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept.cell import FUNCTION, cell_spec
 from rislam_rt.studies.swept.spec import (
     AblationsSpec,
@@ -110,3 +111,10 @@ def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str,
         return {"config": config, "scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
 
     return depends
+
+
+def swept_record(spec: SweptSpec, sweep: Sweep, pipeline: Path) -> dict[str, Any]:
+    """Configuration, the main job's settings with defaults filled in, seed, versions, and the hash of every scene."""
+    named = next((axis.values for axis in sweep.axes if axis.key == "scene"), [sweep.base.get("scene")])
+    scenes = [load_scene(pipeline.parent / str(name)) for name in named]
+    return study_record(spec, scenes, settings=cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"))

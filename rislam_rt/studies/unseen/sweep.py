@@ -94,3 +94,16 @@ def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
     known = [[row[name] for name in LEDGER] for row in rows]
     write_atomic(file, csv_file(LEDGER, [*known, [*entry, code_digest()[:CODE_DIGITS], settings]]))
     return len(rows) + 1
+
+
+def unseen_record(spec: UnseenSpec) -> dict[str, Any]:
+    """What is needed to repeat a study in unseen rooms: configuration, the main job's settings with defaults filled in,
+    versions, code."""
+    return {
+        "kind": spec.kind,
+        "name": spec.name,
+        "versions": library_versions(),
+        "code": code_digest(),
+        "config": spec.model_dump(mode="json"),
+        "settings": cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"),
+    }

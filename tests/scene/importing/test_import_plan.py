@@ -127,6 +127,20 @@ def test_corners_that_enclose_nothing(tmp_path: Path, corners: str, says: str) -
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("far.svg", '<svg xmlns="http://www.w3.org/2000/svg"><path d="M0 0 L4 0 L4 3 L0 1e3083 Z"/></svg>'),
+        ("far.geojson", '{"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 3], [0, 1e300], [0, 0]]]}'),
+    ],
+)
+def test_a_plan_with_a_number_beyond_all_measure_is_one_line(tmp_path: Path, name: str, content: str) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(SceneError, match="a coordinate is not finite or beyond 100 km"):
+        import_room(tmp_path / name, tmp_path / "room", ImportOptions())
+    assert not (tmp_path / "room").exists()
+
+
 def test_a_plan_comes_back_from_its_own_triangles(two_rooms: Path, tmp_path: Path) -> None:
     """As a soup of quads whose corners meet edges: every wall is found again, in full, and so is the doorway."""
     import trimesh
