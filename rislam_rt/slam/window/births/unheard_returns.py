@@ -4,6 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
@@ -37,9 +38,7 @@ def log_unheard(
     ends = poses_of(where[:, :3], context.heading + where[:, 3], scene.body)
     slot = log.cycle - (context.cycle - len(where) + 1)
     seen = log.seen.copy()
-    for number in range(len(where)):
-        own = slot == number
-        seen[own, 1:] = rays(log.seen[own], float(ends.heading[number]))[:, :2]
+    seen[:, 1:] = (rotation_z(ends.heading[slot]) @ rays(log.seen, 0.0)[..., None])[:, :2, 0]
     for row in rows.tolist():
         out = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), digest.middle) - ends.rx
         length = np.linalg.norm(out, axis=1)
