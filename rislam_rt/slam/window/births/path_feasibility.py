@@ -5,7 +5,7 @@ throws the same path. Which of the two it is nothing that is measured tells, but
 """
 
 import numpy as np
-from scipy.special import log_ndtr
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.returns import reflect
@@ -42,7 +42,7 @@ def log_possible(
         each.append(_margins(tx, rx, np.where(first, new, old), np.where(first, old, new), digest.middle))
     margin = each[0]
     std = np.sqrt(sum((other - margin) ** 2 for other in each[1:]) + STEP**2)
-    found[rows] = np.log(2.0) + log_ndtr(margin / std).sum(axis=1)
+    found[rows] = np.log(2.0) + scipy.special.log_ndtr(margin / std).sum(axis=1)
     return found
 
 
