@@ -55,6 +55,9 @@ def interruptible() -> Iterator[list[int]]:
 
 
 def end_quietly() -> None:
-    """While Python ends, there is nothing left to interrupt."""
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, signal.SIG_IGN)
+    """While Python ends, there is nothing left to interrupt.
+
+    Signals are blocked, not ignored: where an interrupt fell into code that a library makes from text, `python -m`
+    would end by a signal to itself, and not with our exit code.
+    """
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))

@@ -2,6 +2,7 @@
 
 import json
 import signal
+import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -176,6 +177,16 @@ def test_a_run_interrupted_at_once_says_that_nothing_was_kept(run, monkeypatch):
     code, _, err = run("run", PIPELINE, *SHORT, "--no-report")
     assert code == 130
     assert err.splitlines()[-1] == "interrupted: nothing was kept"
+
+
+def test_an_interrupt_in_code_made_from_text_has_its_exit_code_too(tmp_path):
+    (tmp_path / "ended.py").write_text(
+        "import atexit, sys\n"
+        "from rislam_rt.cli.interrupts import end_quietly\n"
+        "try:\n    exec('raise KeyboardInterrupt')\nexcept KeyboardInterrupt:\n    atexit.register(end_quietly)\n"
+        "sys.exit(130)\n"
+    )
+    assert subprocess.run([sys.executable, "-m", "ended"], cwd=tmp_path, check=False).returncode == 130
 
 
 def test_an_interrupt_that_an_import_took_for_a_fault_is_one_line(run, monkeypatch):
