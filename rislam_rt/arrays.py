@@ -21,12 +21,16 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
     Raises
     ------
     GeometryError
-        The value has another shape, or holds a NaN.
+        The value is no array of that type, has another shape, or holds a NaN.
     """
     if isinstance(value, np.ndarray) and value.dtype == dtype and value.base is None and not value.flags.writeable:
         array = value
     else:
-        array = np.array(value, dtype=dtype)
+        try:
+            array = np.array(value, dtype=dtype)
+        except (TypeError, ValueError, OverflowError):
+            what = " ".join(repr(value).split())[:60]
+            raise GeometryError(f"{name}: {what} received; give an array of {np.dtype(dtype)}") from None
     if array.shape != shape and not _fits(array.shape, shape):
         wanted = ", ".join("any" if n is None else str(n) for n in shape)
         raise GeometryError(f"{name}: shape {array.shape} received, ({wanted}) needed")

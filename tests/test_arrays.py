@@ -35,3 +35,9 @@ def test_checks_hold_for_both():
             frozen(array, np.float64, (2,), "x")
         with pytest.raises(GeometryError, match=r"x: shape \(2,\) received, \(3\) needed"):
             frozen(array, np.float64, (3,), "x")
+
+
+@pytest.mark.parametrize("value", ["abc", {}, [[1.0], [2.0, 3.0]], [None, object()], 1j, [10**400]])
+def test_what_is_no_array_of_numbers_is_refused_with_its_name(value):
+    with pytest.raises(GeometryError, match=r"^x: .* received; give an array of float64$"):
+        frozen(value, np.float64, (None,), "x")

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rislam_rt.errors import RislamError
 
+LONGEST = 1000
+"""Characters of a line on the error stream; what is longer repeats what a user gave."""
+
 
 def main() -> None:
     """Entry point of `rislam-rt`: run a command; a failure that was foreseen is one line and its exit code."""
@@ -75,5 +78,7 @@ def _tell(error: "RislamError") -> int:
 
 
 def _say(line: str, code: int) -> int:
-    print(" ".join(line.split()), file=sys.stderr)
+    """Print one line, the middle of a long one left out: what is wrong stands before it, how to mend it behind."""
+    line = " ".join(line.split())
+    print(line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}", file=sys.stderr)
     return code

@@ -125,6 +125,8 @@ class LandmarkModel:
             yield self._rows_of(cycle, least_snr, angles, use_vt)
 
     def _rows_of(self, cycle: int, least_snr: float, angles: bool, use_vt: bool) -> LinearMeasurements:
+        """Measurements of a cycle: range, and with `angles` both cosines, of every heard landmark path and wall
+        return."""
         snr = self.radio.integrated_snr(self.paths.gain[cycle])
         heard = self.paths.valid[cycle] & (snr >= least_snr)
         joined = np.flatnonzero(heard & (self.tx_point >= 0))

@@ -24,6 +24,7 @@ def build_designer(
 
 
 def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolicy:
+    """The usual policy: codes designed on the agent's belief alone."""
     section, panel, settings = spec.design, told.panel, told.settings
     assert panel is not None
     last: RisCode | None = None

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.measurement import Clutter, FrontEnd, measure
 from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, SlamEstimate, Trajectory
 from rislam_rt.pipeline.assumed_model import AssumedModel, tell_measurement
-from rislam_rt.pipeline.control import ControlLink, message_seconds, send_code
+from rislam_rt.pipeline.control_link import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
 from rislam_rt.ris import PanelErrors, rephase

@@ -14,7 +14,7 @@ from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.assumed_model import tilted_motion
-from rislam_rt.pipeline.control import check_control
+from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel

@@ -10,7 +10,7 @@ from rislam_rt.measurement import FrontEnd
 from rislam_rt.model import Body, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
 from rislam_rt.pipeline.code_policies import build_designer
-from rislam_rt.pipeline.control import open_link
+from rislam_rt.pipeline.control_link import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, Receptions, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import given_of

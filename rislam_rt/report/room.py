@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths, Scene
-from rislam_rt.report.geometry import wall_edges
+from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.map_from_above import SHADE, WALL_NAME, draw_plan, name_walls, wall_places
 from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, styled
 

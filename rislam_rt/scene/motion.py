@@ -130,6 +130,7 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
 
 
 def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Trajectory:
+    """The motion of a recording (TUM or CSV), as far as the agent section contradicts none of it."""
     assert agent.trajectory is not None
     named = agent.columns or {}
     is_csv = agent.trajectory.lower().endswith(".csv")

@@ -158,6 +158,7 @@ def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _clip_ears(ring: list[int], points: Floats) -> list[tuple[int, int, int]] | None:
+    """Triangles of a polygon's ring, ear by ear; None where none can be clipped off."""
     ring, found = list(ring), []
     size = float(np.ptp(points, axis=0).max())
     flat = 1e-12 * size * size

@@ -26,6 +26,8 @@ def images_in(
     mean: Floats, covariance: Floats, anchors: Floats, points: Integers, walls: Integers
 ) -> tuple[Floats, Floats]:
     """Mirror images (Q, 3) of points in walls, and their covariances (Q, 3, 3) from both."""
+    if not len(points):
+        return np.zeros((0, 3)), np.zeros((0, 3, 3))
     point, wall, anchor = mean[points], mean[walls], anchors[walls]
     span = wall - anchor
     square = np.vecdot(span, span)[:, None, None]

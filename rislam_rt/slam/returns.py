@@ -176,7 +176,8 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
     rows, part = (parts >= 0).nonzero()
     each = np.swapaxes(heard.reshape(*heard.shape[:-1], 3, 3), -3, -2)
     block[..., rows, parts[rows, part], :, :] = each[..., rows, part, :, :]
-    still = (returns.point != TX).nonzero()[0]  # the Tx leg of a moving base is the Tx itself
+    moving = parts[:, 0] == TX  # the Tx leg of a moving base is the Tx itself
+    still = (~moving).nonzero()[0]
     if len(still):
         parts = returns.legs[returns.tx[still]]
         rows, part = (parts >= 0).nonzero()
@@ -184,7 +185,7 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
         each = length.reshape(*length.shape[:-2], 3, 3)
         block[..., still[rows], parts[rows, part], 0, :] += each[..., rows, part, :]
     # the images of a moving base move with it
-    tx_jacobian = np.where((returns.point == TX)[:, None, None], heard[..., :3], 0.0)
+    tx_jacobian = np.where(moving[:, None, None], heard[..., :3], 0.0)
     tx_jacobian[..., 0, :] -= by_tx
     return Linear(seen, wide, tx_jacobian, -by_rx)
 

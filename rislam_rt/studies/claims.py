@@ -75,6 +75,7 @@ def judge(results: Mapping[str, Mapping[str, Any]]) -> list[Claim]:
 
 
 def _fig4a(content: Mapping[str, Any] | None) -> list[Claim]:
+    """Claims on the panel's gain, judged at every place and element pattern of Fig. 4(a)."""
     where = "Fig. 4(a)"
     claims = ("optimised above random codes, intervals apart", "optimised above the sphere")
     if content is None:
@@ -151,6 +152,7 @@ def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
 
 
 def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
+    """Claims on the fall of the errors with the panel's size, judged by Fig. 4(c)."""
     where = "Fig. 4(c)"
     what = {"agent": "agent's error falls with the panel's size", "panel": "panel's error falls with the panel's size"}
     own = [] if content is None else [fall for fall in content["falls"] if fall["scheme"] == OURS]

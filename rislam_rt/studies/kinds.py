@@ -1,7 +1,8 @@
 """Which kind of pipeline a file is."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.specification.radio import build_radio
@@ -12,11 +13,20 @@ from rislam_rt.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
 from rislam_rt.studies.swept import SWEPT, SweptSpec, check_swept
 from rislam_rt.studies.unseen.spec import UnseenSpec
 
-KINDS = ("slam", "compare_channels", "fig4a", *SWEPT, "unseen", "claims", "train_classifier")
-"""What `kind` may say; `slam` if it is not there."""
-
-
 AnySpec = PipelineSpec | CompareSpec | Fig4aSpec | SweptSpec | ClaimsSpec | ClassifierSpec
+
+MAIN_KIND = "slam"
+"""Of a file that does not say its kind."""
+KINDS: Mapping[str, tuple[type[AnySpec], Callable[[Any], object]]] = {
+    MAIN_KIND: (PipelineSpec, build_settings),
+    "compare_channels": (CompareSpec, lambda spec: build_radio(spec.radio)),
+    "fig4a": (Fig4aSpec, lambda spec: (build_radio(spec.radio), build_design(spec.design))),
+    **{kind: (study, check_swept) for kind, study in SWEPT.items()},
+    "unseen": (UnseenSpec, check_swept),
+    "claims": (ClaimsSpec, lambda spec: None),
+    "train_classifier": (ClassifierSpec, lambda spec: (build_radio(spec.radio), build_receiver(spec.receiver))),
+}
+"""What `kind` may say: the specification of such a file, and what tries it."""
 
 
 def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
@@ -28,20 +38,14 @@ def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
         The file cannot be read or is not TOML; a key is unknown, a value of the wrong type or out of range. One line.
     """
     table = read_table(path, overrides)
-    kind = table.content.get("kind", KINDS[0])
-    if kind == "compare_channels":
-        return build_spec(table, CompareSpec, lambda spec: build_radio(spec.radio))
-    if kind == "fig4a":
-        return build_spec(table, Fig4aSpec, lambda spec: (build_radio(spec.radio), build_design(spec.design)))
-    if isinstance(kind, str) and kind in SWEPT:
-        return build_spec(table, SWEPT[kind], check_swept)
-    if kind == "unseen":
-        return build_spec(table, UnseenSpec, check_swept)
-    if kind == "train_classifier":
-        return build_spec(table, ClassifierSpec, lambda spec: (build_radio(spec.radio), build_receiver(spec.receiver)))
-    if kind == "claims":
-        return build_spec(table, ClaimsSpec, lambda spec: None)
-    if kind in KINDS:
-        return build_spec(table, PipelineSpec, build_settings)
-    source = "--set" if "kind" in table.changed else path
-    raise ConfigError(f"{source}: kind: {str(kind)[:60]!r} received; give one of {', '.join(map(repr, KINDS))}")
+    kind = table.content.get("kind", MAIN_KIND)
+    if not isinstance(kind, str) or kind not in KINDS:
+        source = "--set" if "kind" in table.changed else path
+        raise ConfigError(f"{source}: kind: {str(kind)[:60]!r} received; give one of {', '.join(map(repr, KINDS))}")
+    model, check = KINDS[kind]
+    keys = set(table.content)
+    if "kind" not in keys and not keys <= set(model.model_fields):
+        others = [repr(name) for name, (study, _) in KINDS.items() if keys <= set(study.model_fields)]
+        if others:
+            raise ConfigError(f"{path}: kind: missing; with these keys, give {' or '.join(others)}")
+    return build_spec(table, model, check)

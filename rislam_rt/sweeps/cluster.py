@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import Any
 
 from rislam_rt.errors import ConfigError, SetupError
+from rislam_rt.sweeps.cell_work import LOST, CellOutcome, Task, attempt
 from rislam_rt.sweeps.local_pool import SAME_BITS, Run, outcome_of
-from rislam_rt.sweeps.work import LOST, CellOutcome, Task, attempt
 from rislam_rt.worker_pool import Pool
 
 CONNECT_SECONDS = 3

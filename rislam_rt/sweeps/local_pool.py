@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from rislam_rt.sweeps.work import DIED, HUNG, LOST, CellOutcome, Task, attempt
+from rislam_rt.sweeps.cell_work import DIED, HUNG, LOST, CellOutcome, Task, attempt
 from rislam_rt.worker_pool import Lost, open_pool
 
 Run = Callable[[Iterable[tuple[str, Task]]], Iterator[tuple[str, CellOutcome]]]

@@ -8,6 +8,7 @@ from time import monotonic
 from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.sweeps.cell_work import LOST, CellOutcome, Task, find_function
 from rislam_rt.sweeps.cost import SweepCost, estimate_cost
 from rislam_rt.sweeps.local_pool import Run, local_pool
 from rislam_rt.sweeps.store import (
@@ -23,7 +24,6 @@ from rislam_rt.sweeps.store import (
     write_table,
 )
 from rislam_rt.sweeps.sweep import Cell, Sweep, build_cells
-from rislam_rt.sweeps.work import LOST, CellOutcome, Task, find_function
 
 TABLE_SECONDS = 1.0
 """Least time between two writings of the growing table."""

@@ -25,9 +25,9 @@ from rislam_rt.storage.files import (
 )
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import read_sealed, seal
-from rislam_rt.sweeps.record import flatten
+from rislam_rt.sweeps.cell_work import CellOutcome
+from rislam_rt.sweeps.plain_data import flatten
 from rislam_rt.sweeps.sweep import Cell, Sweep
-from rislam_rt.sweeps.work import CellOutcome
 
 SWEEP_FILE = "sweep.json"
 """The folder's marker."""

@@ -48,6 +48,22 @@ def test_several_faults_are_several_lines(run, tmp_path):
     assert err.startswith("error: --set: slamm: unknown key")
 
 
+def test_a_study_that_does_not_say_its_kind_is_told_which_it_may_be(run, tmp_path):
+    text = (ROOT / "pipelines" / "fig4b.toml").read_text()
+    assert '\nkind = "fig4b"\n' in text
+    (tmp_path / "mine.toml").write_text(text.replace('\nkind = "fig4b"\n', "\n"))
+    code, _, err = run("run", "mine.toml")
+    assert (code, err) == (2, "error: mine.toml: kind: missing; with these keys, give 'fig4b'\n")
+
+
+def test_a_line_ends_where_a_screen_does_and_still_says_how_to_mend_it(run):
+    code, _, err = run("config", "--set", f"receiver.estimator={'x' * 5000}")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert len(err) < 1100
+    assert err.startswith("error: --set: receiver.estimator: 'xxx")
+    assert err.endswith("received; give 'bound' or 'waveform'\n")
+
+
 def test_several_faults_of_a_scene_are_several_lines(run, tmp_path):
     import shutil
 

@@ -14,8 +14,8 @@ from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run, read_run
 from rislam_rt.scene import load_scene
 from rislam_rt.sweeps import Sweep, build_cells
+from rislam_rt.sweeps.cell_work import CellOutcome
 from rislam_rt.sweeps.store import DONE, MISSING, read_row, write_cell
-from rislam_rt.sweeps.work import CellOutcome
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

@@ -12,7 +12,7 @@ from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
-from rislam_rt.report.geometry import ellipse, plane_trace, section, wall_edges
+from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
 from rislam_rt.report.page import build_page
 from rislam_rt.report.room import path_points
 from rislam_rt.report.tables import summary_rows

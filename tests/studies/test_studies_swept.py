@@ -70,7 +70,7 @@ def test_what_a_cell_runs_is_the_study_then_the_size_then_the_variant():
     [
         ("fig4b", "run.cyles=3", "did you mean 'cycles'"),
         ("ablations", "variants=[{name='a',set={'slam.filter'='kalman'}}]", "variant 'a'.*slam.filter"),
-        ("fig4b", "cases=[{name='a'},{name='a'}]", "a name comes twice"),
+        ("fig4b", "cases=[{name='a'},{name='a'}]", "the name 'a' comes twice"),
         ("rooms", "scenes=[]", "scenes"),
     ],
 )

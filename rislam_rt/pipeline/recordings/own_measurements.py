@@ -215,6 +215,7 @@ def _numbers(column: Any, name: str, place: str) -> Floats:
 
 
 def _check_names(columns: Mapping[str, Floats], place: str) -> None:
+    """Refuse columns of own measurements that are unknown, missing, given in two forms or of different lengths."""
     for name in columns:
         if name not in COLUMNS:
             raise ConfigError(f"{place}: {name}: unknown column; the known ones are {', '.join(COLUMNS)}")

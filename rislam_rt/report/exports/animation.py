@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from rislam_rt.arrays import Floats
 from rislam_rt.model import SchemeResult, SlamResult
 from rislam_rt.progress import Tell, tell_nobody
-from rislam_rt.report.geometry import ellipse
+from rislam_rt.report.drawing_geometry import ellipse
 from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import TRUTH, close_up, scheme_colour, styled
 from rislam_rt.report.view.room_data import spread

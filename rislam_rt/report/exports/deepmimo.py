@@ -108,6 +108,7 @@ def _interactions(paths: Paths, path: int) -> int:
 
 
 def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, Any]:
+    """What DeepMIMO's `params.json` says of the scenario: tracer, scene, materials, Tx and Rx."""
     from rislam_rt import __version__
 
     faces = sum(len(one.faces) for one in scene.reflectors)

@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SetupError
 from rislam_rt.model import Scene, SchemeResult, SlamResult
-from rislam_rt.report.geometry import wall_edges
+from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.style import scheme_colour
 
 TIMELINE = "time"

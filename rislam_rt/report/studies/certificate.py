@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from rislam_rt.channel.compare import OneSidedPath
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths
-from rislam_rt.report.geometry import wall_edges
+from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.room import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
 from rislam_rt.studies.compare import Certificate

@@ -35,9 +35,9 @@ def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
         "median_m": float(np.median(known)) if len(known) else None,
         "bound_m": least.value if least else None,
         "over_bound": overall.value / least.value if overall and least and least.value else None,
-        "nees_per_dof": _mean(group.column(scheme, "nees_per_dof")),
-        "association": _mean(group.column(scheme, "association", "accuracy")),
-        "gospa_m": _mean(group.column(scheme, "map", "gospa_m")),
+        "nees_per_dof": mean_known(group.column(scheme, "nees_per_dof")),
+        "association": mean_known(group.column(scheme, "association", "accuracy")),
+        "gospa_m": mean_known(group.column(scheme, "map", "gospa_m")),
         **_landmarks(group, scheme),
         **_walls(group, scheme),
     }
@@ -181,7 +181,7 @@ def _walls(group: Group, scheme: str) -> dict[str, float | None]:
         "wall_m": _rms(offset),
         "wall_bound_m": bound_beside(near, offset),
         "wall_found": _share(angle[heard]),
-        "ghost_walls": _mean(group.column(scheme, "ghost_walls")),
+        "ghost_walls": mean_known(group.column(scheme, "ghost_walls")),
     }
 
 
@@ -202,7 +202,8 @@ def _rms(values: Floats) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if len(known) else None
 
 
-def _mean(values: Floats) -> float | None:
+def mean_known(values: Floats) -> float | None:
+    """Mean of an entry's values that are known; None without any."""
     known = values[~np.isnan(values)]
     return float(np.mean(known)) if len(known) else None
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rislam_rt.arrays import Floats
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.error_curves import mark_metres
-from rislam_rt.report.unseen.score_cards import CLASSES, SchemeRun, column
+from rislam_rt.report.unseen.score_cards import CLASSES, SchemeRun, column, in_order
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SCORE, BOUND = "relative_rmse_m", "relative_bound_m"
@@ -40,8 +40,7 @@ def draw_unseen(runs: Mapping[str, Sequence[SchemeRun]]) -> Figure:
 
 def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[SchemeRun]]) -> None:
     of = CLASSES[division]
-    names = {of(run.traits) for members in runs.values() for run in members if run.scores}
-    order = sorted(names, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
+    order = in_order({of(run.traits) for members in runs.values() for run in members if run.scores})
     width = 0.8 / max(len(runs), 1)
     for number, members in enumerate(runs.values()):
         colour = COLOURS[number % len(COLOURS)]

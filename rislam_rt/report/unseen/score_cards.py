@@ -1,12 +1,13 @@
 """From the cells of a study in unseen rooms to score cards: over all rooms, and by class of room and motion."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval, bootstrap, median_over_runs, share_interval
+from rislam_rt.report.swept.entries import mean_known
 from rislam_rt.studies.unseen.sweep import SNR
 from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.store import DONE
@@ -101,7 +102,7 @@ def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
     ):  # fmt: skip
         entry |= _spread(name, column(good, name))
     nees = column(good, "nees")
-    entry["nees_mean"] = _mean(nees)
+    entry["nees_mean"] = mean_known(nees)
     inside = int(np.sum((nees >= CONSISTENT[0]) & (nees <= CONSISTENT[1])))
     entry |= _share("consistent", inside, int(np.sum(~np.isnan(nees))))
     entry |= _share("lost", _count(good, "lost"), len(good))
@@ -112,7 +113,7 @@ def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
     entry |= _share("panel_found", _count(good, "panel_found"), _count(good, "panel_heard"))
     entry |= _share("births_right", _count(good, "births_right"), _count(good, "births_judged"))
     for name in ("births", "ghost_walls", "ghost_points"):
-        entry[name] = _mean(column(good, name))
+        entry[name] = mean_known(column(good, name))
     return entry
 
 
@@ -124,9 +125,13 @@ def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
         members: dict[str, list[SchemeRun]] = {}
         for run in known:
             members.setdefault(of(run.traits), []).append(run)
-        order = sorted(members, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
-        cards += [{"division": division, "class": name, **card(members[name])} for name in order]
+        cards += [{"division": division, "class": name, **card(members[name])} for name in in_order(members)]
     return cards
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Classes on a score card: what is below the first limit, those by name, what is from the last on."""
+    return sorted(names, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
 
 
 def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
@@ -175,8 +180,3 @@ def _share(name: str, count: int, runs: int) -> dict[str, Any]:
     found = share_interval(count, runs) if runs and count <= runs else Interval(np.nan, np.nan, np.nan)
     value, low, high = (None if np.isnan(part) else float(part) for part in found)
     return {name: value, f"{name}_low": low, f"{name}_high": high, f"{name}_count": count, f"{name}_of": runs}
-
-
-def _mean(values: Floats) -> float | None:
-    known = values[~np.isnan(values)]
-    return float(np.mean(known)) if len(known) else None

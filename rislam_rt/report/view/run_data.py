@@ -31,6 +31,7 @@ def run_data(result: SlamResult) -> dict[str, Any]:
 
 
 def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[str, Any]:
+    """What the view of a run shows of one scheme: way, ellipses, errors, map."""
     error = np.linalg.norm(scheme.position - result.scene.agent.position, axis=1)[rows]
     sigma = np.sqrt(np.maximum(np.trace(scheme.covariance[rows, :2, :2], axis1=1, axis2=2), 0.0))
     data = {

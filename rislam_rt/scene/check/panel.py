@@ -87,6 +87,7 @@ def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioCon
 
 
 def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
+    """Whether a panel lies on the wall that is named as its host, and flat on it."""
     names = [r.name for r in room.scene.reflectors]
     _, near = touching(panel.center[None], room.triangles, MIN_CLEARANCE)
     behind = sorted({room.name(int(t)) for t in near})

@@ -109,6 +109,7 @@ def _features(table: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def _shapes(geometry: Any, about: dict[str, Any]) -> Iterator[PlanShape]:
+    """Shapes of a floor plan from one GeoJSON geometry."""
     kind, found = geometry["type"], geometry.get("coordinates")
     many = {"MultiPolygon": "Polygon", "MultiLineString": "LineString"}
     if kind in many:
@@ -151,6 +152,7 @@ def build_plan(shapes: list[PlanShape], unit: float, height: float) -> FloorPlan
 
 
 def _add(plan: FloorPlan, shape: PlanShape, unit: float, height: float) -> None:
+    """Put one shape into a floor plan, in metres: a room, walls, or an opening."""
     points = shape.points * unit
     if not np.isfinite(points).all() or np.abs(points).max(initial=0.0) > 1e5:
         raise Fault("a coordinate is not finite or beyond 100 km", "give metres, or --units")

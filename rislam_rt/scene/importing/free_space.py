@@ -55,6 +55,7 @@ def find_free(triangles: Floats, floor: float) -> FreeSpace | None:
 
 
 def _free_at(points: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
+    """Free space at one clearance [m]: stations that see each other, a way among them; None where there is none."""
     gap = distance_to_triangles(points, triangles)
     points, gap = points[gap >= clearance], gap[gap >= clearance]
     if len(points) < 2:

@@ -61,6 +61,7 @@ def parse_svg(content: bytes) -> list[PlanShape]:
 
 
 def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> Iterator[PlanShape]:
+    """Shapes of an SVG element and of those in it, by the transforms and kinds of the groups around them."""
     if depth > _DEEPEST:
         raise Fault(f"groups {_DEEPEST} deep", "save it as plain SVG")
     tag = str(element.tag).rpartition("}")[2]
@@ -93,6 +94,7 @@ def _kind(element: Tree.Element) -> str:
 
 
 def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
+    """Points of an SVG shape, and whether it is closed."""
     if tag == "path":
         yield from _path(element.get("d", ""))
         return

@@ -41,6 +41,7 @@ def children(element: Element, *tags: str) -> Iterator[Element]:
 
 
 def _tree(content: bytes) -> Element:
+    """The tree of an XML document without types, entities and depths that could do harm."""
     builder, parser = TreeBuilder(), expat.ParserCreate()
     depth = 0
 

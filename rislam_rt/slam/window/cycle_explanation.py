@@ -87,7 +87,8 @@ def learn_cycle(
     raw[used] = _squares(left, log, len(log.cycle) - len(observed.seen) + pick[used])
     taken = np.zeros(len(observed.seen), dtype=np.bool_)
     taken[pick] = True
-    turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
+    if state.window.turns:
+        turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
     followed = _follow(state, view.mean, observed, (~taken).nonzero()[0], dt, turn, bend)
     state = state._replace(tracks=followed.tracks, log=followed.log)
     if len(expected.seen) and len(observed.seen):

@@ -16,7 +16,7 @@ from rislam_rt.pipeline.specification.read import Table, build_spec
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene import load_scene
-from rislam_rt.sweeps.work import one_line
+from rislam_rt.sweeps.cell_work import one_line
 from rislam_rt.toml import put_dotted
 
 FUNCTION = f"{__name__}:run_cell"

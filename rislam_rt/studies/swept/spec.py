@@ -1,5 +1,6 @@
 """Specification of a swept study: what its pipeline file may say."""
 
+from collections import Counter
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -196,6 +197,6 @@ SWEPT: dict[str, type[SweptSpec]] = {
 
 def check_names(variants: list[VariantSection]) -> None:
     """Refuse a study's specification with variants of one name."""
-    names = [variant.name for variant in variants]
-    if len(set(names)) < len(names):
-        raise ValueError("a name comes twice; give each once")
+    twice = [name for name, count in Counter(variant.name for variant in variants).items() if count > 1]
+    if twice:
+        raise ValueError(f"the name '{twice[0]}' comes twice, of a variant or of a level; give each once")

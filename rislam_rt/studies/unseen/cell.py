@@ -21,7 +21,7 @@ from rislam_rt.studies.unseen.file import Recording
 from rislam_rt.studies.unseen.save import save_room, save_run, save_signals
 from rislam_rt.studies.unseen.score import score_run
 from rislam_rt.studies.unseen.truth import build_truth
-from rislam_rt.sweeps.work import one_line
+from rislam_rt.sweeps.cell_work import one_line
 
 FUNCTION = f"{__name__}:run_cell"
 SEEN_BY_TRACER_NOT = ("name", "description", "scene", "seed", "schemes", "receiver", "design", "slam")

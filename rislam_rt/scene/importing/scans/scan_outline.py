@@ -54,6 +54,7 @@ def outline_planes(planes: list[ScanPlane], cloud: PointCloud, fill: float) -> l
 def _outline(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], cloud: PointCloud, fill: float
 ) -> Outline | None:
+    """Outline of one plane of a scan as a mesh: its cells, small holes filled, edges moved to where planes meet."""
     plane = planes[number]
     frame = np.stack(plane_tangents(plane.normal), axis=-1)
     flat = cloud.points[plane.members] @ frame

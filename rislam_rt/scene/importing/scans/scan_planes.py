@@ -62,6 +62,8 @@ def find_planes(cloud: PointCloud) -> list[ScanPlane]:
 
 
 def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | None:
+    """The plane of a scan that holds the most area among the free points, fitted anew as it narrows; None if too
+    small."""
     rows = np.flatnonzero(free)
     if cloud.area[rows].sum() < LEAST_AREA:
         return None

@@ -1,5 +1,7 @@
 """Prior and evidence of what tracks may be: kind, place, amplitude, what stands in the way, what others speak for."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
@@ -19,6 +21,7 @@ from rislam_rt.slam.window.births.hypotheses import (
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
+from rislam_rt.slam.window.births.path_feasibility import bounces
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
@@ -37,7 +40,7 @@ CLOSE = 0.8
 LOG_APART = np.log(1e-4)
 """Log probability that two that lie apart come out as one."""
 ASIDE = 10.0
-"""Log evidence behind a track's best from which on a hypothesis does not speak for others."""
+"""Log evidence behind a track's best from which on a hypothesis does not speak for others, nor is asked for more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
@@ -162,16 +165,22 @@ def log_amplitudes(
 
 
 def log_opacity(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known."""
+    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known.
+
+    With wall returns a new wall that is heard over a known one stands where its path meets it.
+    """
     middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
+    if use_vt:
+        rows, spot = bounces(table, fits.place, digest, known)
+        foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
-    total = np.zeros(len(foot))
+    total, small = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
     if len(walls):
@@ -181,11 +190,11 @@ def log_opacity(
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
         total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
         before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        small = (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     if len(landmarks.points):
         depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
-        total += np.where(wall, CONSTANTS.log_rare, 0.0) * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    return total
+        small = small + (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+    return total + np.where(wall, CONSTANTS.log_rare, 0.0) * small
 
 
 def direction_beliefs(
@@ -220,12 +229,31 @@ def direction_beliefs(
     )  # fmt: skip
 
 
+class HeldWalls(NamedTuple):
+    """H hypotheses by what walls are beforehand."""
+
+    gain: Floats
+    """(H,) in log evidence."""
+    place: Floats
+    """(H, 3) of new walls that are upright or level, as they are held to be..."""
+    covariance: Floats
+    """(H, 3, 3) ...and theirs."""
+    log_odds: Floats
+    """(H,) of that."""
+
+
 def log_upright(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
-) -> Floats:
-    """Gain (H,) in log evidence by what walls are beforehand: each direction held, or anywhere in its width."""
-    gain = np.zeros(len(fits.cost))
+    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
+) -> HeldWalls:
+    """What walls are beforehand: upright, level, at right angles to another, or in any direction alike.
+
+    Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
+    along each axis: rivals that are rarer let ghosts of points through.
+    """
     trials, tx = table.trials, digest.mean[1]
+    held = HeldWalls(
+        np.zeros(len(fits.cost)), fits.place.copy(), fits.covariance.copy(), np.full(len(fits.cost), -np.inf)
+    )
     for row in ((trials.is_wall | trials.is_pair) & np.isfinite(fits.cost)).nonzero()[0]:
         place, turn = fits.place[row], trials.turn[row, 0]
         if trials.is_pair[row]:  # what two walls do together goes across them both
@@ -233,11 +261,26 @@ def log_upright(
                 continue  # an edge under the ceiling: any elevation
             at = tx[trials.track[row]]
             place = digest.middle + turn @ at + place - at
-        holds = direction_beliefs(place, digest, known, landmarks)
-        span = place - digest.middle
-        variance = np.vecdot(holds.axis, holds.axis @ fits.covariance[row]) + holds.std**2
-        log_right = -0.5 * (holds.axis @ span) ** 2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+        beliefs, span = direction_beliefs(place, digest, known, landmarks), place - digest.middle
+        if not len(beliefs.axis):  # it slants
+            held.gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright) if use_vt else 0.0
+            continue
+        level, spread = beliefs.axis[0, 2] == 0.0, fits.covariance[row]
+        across = not level and trials.is_pair[row] and turn[0, 0] < 0.0
+        axis, share = (beliefs.axis[:1], beliefs.log_odds[:1]) if across else (beliefs.axis, beliefs.log_odds)
+        off, inside = axis @ span, axis @ spread @ axis.T + beliefs.std[0] ** 2 * AXES[: len(axis), : len(axis)]
         # odds hold the width: right against a density of one over it
-        each = np.logaddexp(0.0, holds.log_odds + log_right) - np.logaddexp(0.0, CONSTANTS.log_upright)
-        gain[row] = (each[:1] if trials.is_pair[row] and turn[0, 0] < 0.0 else each).sum()
-    return gain
+        if level and use_vt:  # along both axes at once
+            log_right = -0.5 * off @ np.linalg.solve(inside, off) - 0.5 * np.linalg.slogdet(2.0 * np.pi * inside)[1]
+            each = np.array([CONSTANTS.log_upright + 2.0 * np.log(np.linalg.norm(span)) + log_right])
+        else:
+            variance = np.diag(inside)
+            each = share - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+        held.gain[row] = (np.logaddexp(0.0, each) - np.logaddexp(0.0, CONSTANTS.log_upright)).sum()
+        if not trials.is_pair[row]:
+            told = slice(None) if level else slice(1)
+            pull = np.linalg.solve(inside[told, told], axis[told] @ spread).T
+            held.place[row] -= pull @ off[told]
+            held.covariance[row] -= pull @ axis[told] @ spread
+            held.log_odds[row] = each[0]
+    return held

@@ -29,8 +29,10 @@ from rislam_rt.slam.window.births.hypothesis_evidence import (
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, with_images
+from rislam_rt.slam.window.births.path_feasibility import log_possible
 from rislam_rt.slam.window.births.point_identification import identify
 from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.births.unheard_returns import log_unheard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.solver_limits import HOPELESS
@@ -98,7 +100,7 @@ _TEMPLATES = (
 
 
 def _weigh(
-    context: WindowState, digest: TrackSummary, known: KnownFeatures, lonely: Floats
+    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures, lonely: Floats
 ) -> tuple[Hypotheses, Fits, Floats, Floats]:
     """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard,
     or whole periods of the sounding more."""
@@ -118,15 +120,23 @@ def _weigh(
     # of what is heard too early, single returns may lie beyond the window
     evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track]], 0.0)
     evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
-        table, fits, digest, known, landmarks
+        table, fits, digest, known, landmarks, scene.use_vt
     )
     evidence += log_beside(table, digest, known, context)
     best = np.full(near, -np.inf)
     np.maximum.at(best, owner[track], np.where(np.isfinite(fits.cost), evidence, -np.inf))
     # so far behind nothing counts any more, whatever else speaks for it
     fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * HOPELESS, np.inf, fits.cost))
-    gain = log_upright(table, fits, digest, known, landmarks)
-    evidence = np.where(np.isfinite(fits.cost), evidence + gain, -np.inf)
+    held = log_upright(table, fits, digest, known, landmarks, scene.use_vt)
+    evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
+    if scene.use_vt:
+        right = held.log_odds + log_possible(table, held.place, held.covariance, digest, known)
+        free = log_possible(table, fits.place, fits.covariance, digest, known)
+        evidence += np.logaddexp(right, free) - np.logaddexp(held.log_odds, 0.0)
+        upright = held.log_odds > 0.0
+        place = np.where(upright[:, None], held.place, fits.place)
+        spread = np.where(upright[:, None, None], held.covariance, fits.covariance)
+        evidence += log_unheard(context, table, ats, owner, evidence, place, spread, digest)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     own = table._replace(trials=table.trials._replace(track=owner[track]))
     return own, fits, evidence, digest.mean[0][track, 0]
@@ -145,7 +155,7 @@ def judge(
     returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table, fits, evidence, length = _weigh(context, digest, known, lonely)
+    table, fits, evidence, length = _weigh(context, ats, digest, known, lonely)
     track = table.trials.track
     over = identify(context, ats, table, fits, evidence)
     evidence += over.gain

@@ -68,8 +68,8 @@ def predict_returns(
     covariance: Floats,
 ) -> ExpectedComponents:
     """All forms that are possible, arrive from above, and may be detected; `covariance` (3F, 3F) of the features."""
-    legs = enumerate_forms(tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist()), scene.max_bounces, True)
-    returns, bounces = legs.returns, legs.bounces
+    points, walls = tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist())
+    returns, bounces = enumerate_forms(points, walls, scene.max_bounces)
     fine = possible_legs(returns.legs, features, covariance, landmarks.anchor, poses)
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]

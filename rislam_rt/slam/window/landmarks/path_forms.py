@@ -7,7 +7,6 @@ how that moves with pose and features, is `slam.returns`.
 
 from functools import lru_cache
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +17,6 @@ from rislam_rt.slam.window.solver_limits import STEP
 
 UNKNOWN = -9
 """In a form's base: it is not known."""
-
-
-class FormLegs(NamedTuple):
-    """Forms, joined from legs that many of them share."""
-
-    returns: Returns
-    bounces: Integers
-    """(R,) on both legs together."""
 
 
 def compile_forms(forms: Integers, slot: Integers | int = 0) -> Returns:
@@ -44,8 +35,9 @@ def forms_of(returns: Returns) -> Integers:
 
 
 @lru_cache(maxsize=64)
-def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int, use_vt: bool) -> FormLegs:
-    """Every point over every pair of legs, and with `use_vt` the images of the Tx."""
+def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int) -> tuple[Returns, Integers]:
+    """Every point over every pair of legs, and the images of the Tx, over legs that many of them share; and the walls
+    (R,) on both legs of each together."""
     single = [(w, NONE) for w in walls] if max_bounces >= 1 else []
     double = [(a, b) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
     ways = [(NONE, NONE), *single, *double]
@@ -57,10 +49,9 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
         for way, spent in zip(ways, bounces, strict=True)
         for other in ways[: upto[max_bounces - spent]]
     ]
-    if use_vt:
-        found += [(TX, NONE, NONE, *way) for way in ways[1:]]
+    found += [(TX, NONE, NONE, *way) for way in ways[1:]]
     forms = np.array(found, dtype=np.int64).reshape(-1, 5)
-    return FormLegs(compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1))
+    return compile_forms(forms), (forms[:, 1:] != NONE).sum(axis=1)
 
 
 def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: Floats, poses: Poses) -> Booleans:

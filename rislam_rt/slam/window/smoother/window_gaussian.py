@@ -15,6 +15,7 @@ is made again at the present estimate whenever that is worth it. The first pose 
 tells where the start was, whose error stands beside the Gaussian.
 """
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -286,8 +287,10 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
     along, start, edge = _basis(window), starts(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
-    inner = back[:, None] @ (np.ascontiguousarray(np.moveaxis(slots[:, :free, :free], 0, 2))[..., None] * along)
-    inner = inner.transpose(2, 0, 3, 1).reshape(edge + steps * free, -1)
+    inner = np.empty((steps + 2, free, steps + 2, free))
+    for one, two in product(range(free), repeat=2):
+        inner[:, one, :, two] = back[one] @ (slots[:, one, two, None] * along[two])
+    inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
     hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]

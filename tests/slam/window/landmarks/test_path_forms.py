@@ -19,7 +19,7 @@ def ways_over_both(lean, std, tx):
     features = reach[:, None] * normal
     covariance = np.zeros((6, 6))
     covariance[5, 5] = (reach[1] * std) ** 2  # a mirror image turns with its wall
-    legs = enumerate_forms((), (0, 1), 2, True).returns.legs
+    legs = enumerate_forms((), (0, 1), 2)[0].legs
     fine = possible_legs(legs, features, covariance, anchor, Poses(tx, RX, np.zeros(())))
     return [int(wall) for base, wall, other in legs[fine] if base == TX and other >= 0], features, anchor
 

@@ -1,4 +1,4 @@
-"""The record of a cell: its result as plain data, the same on every machine, at every time."""
+"""Plain data: a cell's result as JSON has it, the same on every machine, at every time."""
 
 import math
 from collections.abc import Iterator, Mapping

@@ -7,7 +7,7 @@ from time import perf_counter, process_time
 from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.sweeps.record import plain_result
+from rislam_rt.sweeps.plain_data import plain_result
 
 RAISED, DIED, HUNG, LOST = "raised", "died", "hung", "lost"
 """Causes of a failure: an exception; the end of the process; the time limit; a blow from outside, which the cell may

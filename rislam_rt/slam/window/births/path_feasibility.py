@@ -1,0 +1,84 @@
+"""Whether a new wall's path over a known one can be: bounces in its order, on one side of each wall, heard from above.
+
+A return over a known and a new wall has a twin: the known wall's mirror image of the new one, met in the other order,
+throws the same path. Which of the two it is nothing that is measured tells, but only one of them can throw it.
+"""
+
+import numpy as np
+import scipy
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
+from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.solver_limits import LEVEL, STEP
+
+
+def over_known(table: Hypotheses) -> Booleans:
+    """(H,) which are wall returns over a known wall and a new one."""
+    return np.isin(table.kind, (KNOWN_WALL, WALL_KNOWN))
+
+
+def log_possible(
+    table: Hypotheses, place: Floats, spread: Floats, digest: TrackSummary, known: KnownFeatures
+) -> Floats:
+    """(H,) log probability that the path can be, over that beforehand, with new walls at `place` (H, 3) [m] within
+    covariances `spread` (H, 3, 3) [m^2], known ones as uncertain as they are; 0 where it is not over a known and a new
+    wall. Beforehand it is one half: of twins one can."""
+    found, rows = np.zeros(len(table.kind)), over_known(table).nonzero()[0]
+    if not len(rows):
+        return found
+    track, wall = table.trials.track[rows], table.known[rows]
+    _, tx, rx = (field[track] for field in digest.mean)
+    first = (table.kind[rows] == WALL_KNOWN)[:, None]
+    value, vector = np.linalg.eigh(spread[rows])
+    roots = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :]
+    none = np.zeros((len(rows), 3))
+    moves = [(none, none)]
+    moves += [(roots[..., axis], none) for axis in range(3)] + [(none, known.root[wall, :, axis]) for axis in range(3)]
+    each = []
+    for by_new, by_known in moves:
+        new, old = place[rows] + by_new, known.place[wall] + by_known
+        each.append(_margins(tx, rx, np.where(first, new, old), np.where(first, old, new), digest.middle))
+    margin = each[0]
+    std = np.sqrt(sum((other - margin) ** 2 for other in each[1:]) + STEP**2)
+    found[rows] = np.log(2.0) + scipy.special.log_ndtr(margin / std).sum(axis=1)
+    return found
+
+
+def bounces(table: Hypotheses, place: Floats, digest: TrackSummary, known: KnownFeatures) -> tuple[Integers, Floats]:
+    """Hypotheses (N,) over a known and a new wall, and where (N, 3) [m] their paths meet the new one at `place`."""
+    rows = over_known(table).nonzero()[0]
+    track, wall, middle = table.trials.track[rows], table.known[rows], digest.middle
+    _, tx, rx = (field[track] for field in digest.mean)
+    first = (table.kind[rows] == WALL_KNOWN)[:, None]
+    inner, outer = np.where(first, place[rows], known.place[wall]), np.where(first, known.place[wall], place[rows])
+    image = reflect(tx, inner, middle)
+    last = _crossing(rx, reflect(image, outer, middle), outer, middle)
+    return rows, np.where(first, _crossing(last, image, inner, middle), last)
+
+
+def _crossing(start: Floats, stop: Floats, wall: Floats, middle: Floats) -> Floats:
+    """(N, 3) where the ways between places (N, 3) meet walls (N, 3), images of `middle`; one of the two if nowhere."""
+    own, far = _depth(start, wall, middle), _depth(stop, wall, middle)
+    share = np.clip(own / np.where(np.abs(own - far) > STEP, own - far, STEP), 0.0, 1.0)
+    return start + share[:, None] * (stop - start)
+
+
+def _margins(tx: Floats, rx: Floats, inner: Floats, outer: Floats, middle: Floats) -> Floats:
+    """(N, 3) [m] by how much a path from `tx` over walls `inner` and then `outer` (N, 3), images of `middle`, to `rx`
+    can be: its image before the last wall on the Rx's side of that, the last bounce on the Tx's side of the first wall,
+    and how far above the horizon it arrives."""
+    image = reflect(tx, inner, middle)
+    mirrored = reflect(image, outer, middle)
+    bounce, ray = _crossing(rx, mirrored, outer, middle), mirrored - rx
+    return np.stack([
+        np.sign(_depth(rx, outer, middle)) * _depth(image, outer, middle),
+        np.sign(_depth(tx, inner, middle)) * _depth(bounce, inner, middle),
+        ray[:, 2] + LEVEL * np.linalg.norm(ray, axis=1),
+    ], axis=1)  # fmt: skip
+
+
+def _depth(point: Floats, wall: Floats, middle: Floats) -> Floats:
+    span = wall - middle
+    return np.asarray(np.vecdot(point - 0.5 * (wall + middle), span) / np.linalg.norm(span, axis=-1))

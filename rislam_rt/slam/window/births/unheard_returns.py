@@ -1,0 +1,88 @@
+"""What it tells of a new wall that is heard over a known one that its own return is not heard."""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.slam.arrival_rays import rays
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.observations import free_space
+from rislam_rt.slam.returns import poses_of, reflect
+from rislam_rt.slam.window.births.hypotheses import Hypotheses
+from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
+from rislam_rt.slam.window.births.path_feasibility import over_known
+from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
+from rislam_rt.slam.window.smoother.window_gaussian import poses
+from rislam_rt.slam.window.solver_limits import LEVEL
+from rislam_rt.slam.window.state import WindowState
+
+
+def log_unheard(
+    context: WindowState, table: Hypotheses, ats: list[Integers], owner: Integers, evidence: Floats, place: Floats,
+    spread: Floats, digest: TrackSummary,
+) -> Floats:  # fmt: skip
+    """(H,) log probability that the own returns of new walls at `place` (H, 3) [m], within covariances `spread`
+    (H, 3, 3) [m^2], are heard no oftener than they are; 0 where the track is that return itself.
+
+    `ats` are the tracks' rows of the log, `owner` the track of each row of the digest, `evidence` (H,) without this.
+    """
+    found, track = np.zeros(len(table.kind)), owner[table.trials.track]
+    best = np.full(len(ats), -np.inf)
+    np.maximum.at(best, track, evidence)
+    rows = (over_known(table) & (evidence > best[track] - ASIDE)).nonzero()[0]
+    if not len(rows):
+        return found
+    log, scene, where = context.log, context.scene, poses(context.window)
+    ends = poses_of(where[:, :3], context.heading + where[:, 3], scene.body)
+    slot = log.cycle - (context.cycle - len(where) + 1)
+    seen = log.seen.copy()
+    seen[:, 1:] = (rotation_z(ends.heading[slot]) @ rays(log.seen, 0.0)[..., None])[:, :2, 0]
+    for row in rows.tolist():
+        out = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), digest.middle) - ends.rx
+        length = np.linalg.norm(out, axis=1)
+        due = np.concatenate([length[:, None], out[:, :2] / length[:, None]], axis=1)
+        off = seen - due[slot]
+        off[:, 0] = scene.sensor.nearest(off[:, 0])
+        doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[row])[-1])
+        near = scene.sensor.cell_length + doubt * np.array([1.0, 1.0 / length[-1], 1.0 / length[-1]])
+        present = np.zeros(len(where), dtype=np.bool_)
+        present[slot[(np.abs(off) < near).all(axis=1)]] = True
+        shows = _shows(context, table, row, length, digest) * (out[:, 2] > -LEVEL * length)
+        mine = slot[ats[track[row]]]
+        span = slice(mine.min(), mine.max() + 1)
+        found[row] = log_silence(shows[span], present[span])
+    return found
+
+
+def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, digest: TrackSummary) -> Floats:
+    """(K,) probability that the own returns of these lengths (K,) [m] of hypothesis `row`'s wall are in the
+    window and above the threshold: as loud as what the wall leaves of the path over the known one as well tells."""
+    radio, track, wall = context.scene.radio, table.trials.track[row], table.known[row]
+    told = digest.log_amplitude[track] - free_space(radio) + np.log(digest.mean[0][track, 0])
+    noise = context.landmarks.ratio_variance[wall] + CONSTANTS.fading**2
+    gain = CONSTANTS.wall_ratio_std**2 / (CONSTANTS.wall_ratio_std**2 + noise)
+    ratio = CONSTANTS.wall_ratio + gain * (told - context.landmarks.ratio[wall] - CONSTANTS.wall_ratio)
+    std = np.full(len(length), np.sqrt(gain * noise + CONSTANTS.fading**2))
+    sensor, level = context.scene.sensor, free_space(radio) - np.log(length) + ratio
+    delay = sensor.heard_as(length) / SPEED_OF_LIGHT
+    reported = (delay >= sensor.window[0]) & (delay <= sensor.window[1])
+    return np.asarray(CONSTANTS.shown * detection_probability(level, std, sensor) * reported)
+
+
+def log_silence(shows: Floats, present: Booleans) -> float:
+    """Log probability that a return that shows with probabilities (K,), were nothing in its way, is silent in the
+    cycles in which nothing is `present` (K,) where it would be; what is there may be it, and tells nothing.
+
+    What stands in its way comes and goes as it does for every return (`landmark_update.recall_forms`).
+    """
+    found, clear = 0.0, CONSTANTS.steady**2
+    for show, heard in zip(shows, present, strict=True):
+        if heard:
+            clear = 1.0
+        else:
+            found += float(np.log1p(-clear * show))
+            clear *= (1.0 - show) / (1.0 - clear * show)
+        clear = clear * (1.0 - CONSTANTS.rare) + (1.0 - clear) * CONSTANTS.cleared
+    return found

@@ -1,0 +1,99 @@
+"""New walls that are heard over a known one: which of a pair of mirror images can be, and what silence tells."""
+
+from itertools import pairwise, product
+from types import SimpleNamespace
+
+import numpy as np
+
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL, WALL_KNOWN
+from rislam_rt.slam.window.births.hypothesis_evidence import log_upright
+from rislam_rt.slam.window.births.hypothesis_fits import Fits
+from rislam_rt.slam.window.births.path_feasibility import bounces, log_possible
+from rislam_rt.slam.window.births.unheard_returns import log_silence
+from rislam_rt.slam.window.landmarks.landmark_table import empty_table
+
+MIDDLE = np.array([1.0, -0.5, 0.8])
+BASELINE = np.array([0.05, 0.01, 0.0])
+TX, RX = MIDDLE + BASELINE, MIDDLE - BASELINE
+
+
+def _image(normal, distance):
+    """Image of the agent's place in the wall that far from it in that direction."""
+    return MIDDLE + 2.0 * distance * np.asarray(normal) / np.linalg.norm(normal)
+
+
+def _case(kind, known):
+    count = len(kind)
+    table = SimpleNamespace(
+        kind=np.array(kind),
+        known=np.zeros(count, dtype=np.int64),
+        trials=SimpleNamespace(track=np.zeros(count, dtype=np.int64)),
+    )
+    digest = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
+    return table, digest, SimpleNamespace(place=known[None], root=np.zeros((1, 3, 3)))
+
+
+def test_of_a_wall_and_its_mirror_image_in_the_known_one_only_one_can_throw_the_path():
+    rng, decided = np.random.default_rng(3), 0
+    for _ in range(200):
+        known, new = (_image([*rng.standard_normal(2), rng.uniform(0.0, 0.3)], rng.uniform(1.0, 6.0)) for _ in "ab")
+        # the mirror image of a plane: of two of the points that it mirrors into each other
+        agent, image = reflect(np.stack([MIDDLE, new]), known, MIDDLE)
+        twin = reflect(MIDDLE, image, agent)
+        table, digest, walls = _case([KNOWN_WALL, WALL_KNOWN], known)
+        place = np.stack([new, twin])
+        heard = [reflect(reflect(TX, first, MIDDLE), then, MIDDLE) for first, then in ((known, new), (twin, known))]
+        assert np.allclose(*heard)
+        found = np.exp(log_possible(table, place, np.zeros((2, 3, 3)), digest, walls))
+        # twice its probability, as beforehand either can be
+        assert found.sum() < 2.0 + 1e-6
+        decided += found.max() > 1.98
+    assert decided > 50
+
+
+def test_a_path_over_the_floor_arrives_from_below_and_is_not_heard():
+    upright, spread = np.stack(2 * [_image([1.0, 0.3, 0.0], 4.0)]), np.tile(1e-6 * np.eye(3), (2, 1, 1))
+    for rise, heard in ((-0.8, False), (2.2, True)):
+        table, digest, walls = _case([KNOWN_WALL, WALL_KNOWN], MIDDLE + 2.0 * rise * np.eye(3)[2])
+        assert (np.exp(log_possible(table, upright, spread, digest, walls)).max() > 1.98) == heard
+
+
+def test_the_path_meets_the_new_wall_in_that_wall():
+    known, new = _image([1.0, 0.0, 0.0], 3.0), _image([0.2, 1.0, 0.0], 2.0)
+    table, digest, walls = _case([KNOWN_WALL, WALL], known)
+    rows, spot = bounces(table, np.stack([new, new]), digest, walls)
+    assert rows.tolist() == [0]
+    assert np.isclose((spot[0] - 0.5 * (new + MIDDLE)) @ (new - MIDDLE), 0.0, atol=1e-12)
+    # of one length in and out: straight on to the image of the Tx
+    image = reflect(reflect(TX, known, MIDDLE), new, MIDDLE)
+    assert np.allclose(np.cross(spot[0] - RX, image - RX), 0.0, atol=1e-12)
+
+
+def test_silence_has_the_probability_of_all_ways_in_which_something_may_hide_the_return():
+    shows, total = np.array([0.9, 0.4, 0.95, 0.7]), 0.0
+    move = np.array([[1.0 - CONSTANTS.cleared, CONSTANTS.cleared], [CONSTANTS.rare, 1.0 - CONSTANTS.rare]])
+    for clear in product((0, 1), repeat=len(shows)):
+        chance = CONSTANTS.steady**2 if clear[0] else 1.0 - CONSTANTS.steady**2
+        chance *= np.prod([move[a, b] for a, b in pairwise(clear)])
+        total += chance * np.prod(1.0 - shows * np.array(clear))
+    assert np.isclose(log_silence(shows, np.zeros(4, dtype=bool)), np.log(total), rtol=1e-12)
+    assert log_silence(shows, np.ones(4, dtype=bool)) == 0.0
+
+
+def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other():
+    slanting, sloping, level = ([np.sin(angle), 0.3 * np.sin(angle), np.cos(angle)] for angle in (0.9, 0.35, 0.0))
+    place = np.stack([_image(normal, 2.5) for normal in (slanting, sloping, level)])
+    spread, cost = np.tile(1e-6 * np.eye(3), (3, 1, 1)), np.ones(3)
+    flag, turn = np.zeros(3, dtype=bool), np.tile(np.eye(3), (3, 2, 1, 1))
+    trials = SimpleNamespace(is_wall=~flag, is_pair=flag, turn=turn, track=np.zeros(3, dtype=np.int64))
+    fits = Fits(place, spread, spread, cost, np.zeros(3), np.zeros(3))
+    digest = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
+    known = SimpleNamespace(place=np.zeros((0, 3)))
+    held = log_upright(SimpleNamespace(trials=trials), fits, digest, known, empty_table(), True)
+    assert np.allclose(held.gain[:2], np.log(1.0 - CONSTANTS.upright), atol=1e-6)
+    assert held.gain[2] > 0.0
+    assert held.log_odds[2] > CONSTANTS.log_born > held.log_odds[1]
+    alone = log_upright(SimpleNamespace(trials=trials), fits, digest, known, empty_table(), False)
+    assert alone.gain[0] == 0.0
