@@ -39,8 +39,8 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     histories = summarise_tracks(context, ats)
     told = explanations(context, rows, histories, view, mean, covariance)
     panels = context.landmarks.panels
-    lonely = _missing_legs(context, histories, mean)
-    beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, ats, histories, mean)
+    lonely = _missing_legs(context, rows, mean)
+    beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, rows, ats, histories, mean)
     over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
             for row, value, forms, _ in told]  # fmt: skip
     verdicts, shares = judge(context, ats, histories, known, over, lonely, beside)
@@ -74,14 +74,15 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
 
 
-def _missing_legs(context: WindowState, histories: TrackSummary, mean: Floats) -> Floats:
+def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     """(T,) log probability that of two walls that throw a track together so many single returns are not heard.
 
     Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
-    walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard.
+    walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard. All of them are
+    compared as they are now: near a corner they change fast.
     """
-    every, ray = context.tracks, histories.direction
-    length, shine = histories.mean[0][:, 0], histories.log_amplitude + np.log(histories.mean[0][:, 0])
+    every, (ray, length) = context.tracks, _bearings(context, rows, mean)
+    shine = every.log_amplitude[rows] + np.log(length)
     old = every.hits >= 3
     away, reach = _bearings(context, old, mean)
     bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
@@ -101,13 +102,15 @@ def _missing_legs(context: WindowState, histories: TrackSummary, mean: Floats) -
     return missing[np.minimum(found, 2)]
 
 
-def _bearings(context: WindowState, rows: Booleans, mean: Floats) -> tuple[Floats, Floats]:
+def _bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> tuple[Floats, Floats]:
     """Directions (N, 3) in the room's axes and lengths (N,) of those of the tracks that births are asked about."""
     seen = context.tracks.mean[rows, :, 0]
     return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
 
 
-def _company(context: WindowState, ats: list[Integers], histories: TrackSummary, mean: Floats) -> Floats:
+def _company(
+    context: WindowState, rows: Integers, ats: list[Integers], histories: TrackSummary, mean: Floats
+) -> Floats:
     """(T,) log odds by which a direction speaks for a path over unknown walls, and against all else: a shorter one
     comes from there.
 
@@ -120,7 +123,7 @@ def _company(context: WindowState, ats: list[Integers], histories: TrackSummary,
     far = np.linalg.norm(span, axis=1)
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
     panel = np.append(context.tracks.side[old] >= PANEL, np.isin(points, panels[panels >= 0]))
-    ray, length = histories.direction, histories.mean[0][:, 0]
+    ray, length = _bearings(context, rows, mean)
     variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]

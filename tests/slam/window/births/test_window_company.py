@@ -20,23 +20,18 @@ NOWHERE, ALL = np.zeros((0, 3)), slice(None)
 
 def _odds(points=NOWHERE, rows=ALL, panel=-1):
     """Of four tracks, the first two and the last from one direction; with points of the map (P, 3), one the panel."""
-    rays = np.concatenate([RAYS, np.sqrt(1.0 - (RAYS**2).sum(axis=1))[:, None]], axis=1)
     cos, sin = np.cos(HEADING), np.sin(HEADING)
     body = RAYS @ np.array([[cos, -sin], [sin, cos]])  # from the room's axes into the agent's
     state = np.concatenate([LENGTHS[:, None], body], axis=1)
-    tracks = SimpleNamespace(
-        hits=np.full(4, 9)[rows], mean=np.stack([state, 0.0 * state], axis=-1)[rows], side=SIDES[rows]
-    )  # fmt: skip
+    old = np.isin(np.arange(4), np.arange(4)[rows])  # of two cycles, the others are company to nobody
+    tracks = SimpleNamespace(hits=np.where(old, 9, 2), mean=np.stack([state, 0.0 * state], axis=-1), side=SIDES)
     context = SimpleNamespace(
         tracks=tracks, heading=np.array([HEADING]), log=SimpleNamespace(side=SIDES),
         landmarks=SimpleNamespace(points=np.arange(len(points)), panels=(panel,)),
     )  # fmt: skip
-    histories = SimpleNamespace(
-        mean=(np.concatenate([LENGTHS[:, None], rays[:, :2]], axis=1), None, None), direction=rays,
-        weight=np.full((4, 2, 3), 100.0),
-    )  # fmt: skip
+    histories = SimpleNamespace(weight=np.full((4, 2, 3), 100.0))
     mean = np.concatenate([np.zeros(HEAD), np.ravel(points)])
-    return _company(context, [np.array([row]) for row in range(4)], histories, mean)
+    return _company(context, np.arange(4), [np.array([row]) for row in range(4)], histories, mean)
 
 
 def test_a_longer_way_from_the_same_direction_goes_over_a_wall():
