@@ -94,6 +94,12 @@ class ModelConstants(NamedTuple):
         return float(np.log(self.rare))
 
     @property
+    def dip(self) -> float:
+        """Sine of the depth below the horizon from which a return still arrives, for every wall on its way: each
+        leans, and turns the ray by twice that."""
+        return 2.0 * self.lean
+
+    @property
     def weaker(self) -> float:
         """Share of the weaker of two paths that are a wall's loss apart in the place of both, and its spread."""
         return float(1.0 / (1.0 + np.exp(-self.wall_ratio)))

@@ -1,6 +1,6 @@
 """Numerics: steps of the solver and limits of what is worth a look.
 
-Some belong to the model and are not in its table: `EDGE`, `LEVEL`, `ALIGNED`, `LATELY`, `MISSED`.
+Some belong to the model and are not in its table: `EDGE`, `ALIGNED`, `LATELY`, `MISSED`.
 """
 
 import numpy as np
@@ -41,8 +41,6 @@ RECENT = 5
 """Cycles within which a form must have been seen for its measurements to go on as a track."""
 FAINT = 0.5
 """SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
-LEVEL = 0.02
-"""Third direction cosine down to which returns are heard: those of upright walls arrive level."""
 EDGE = 1.15
 """Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
 LOUDEST = 1e3

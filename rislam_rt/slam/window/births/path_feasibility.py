@@ -8,10 +8,11 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.solver_limits import LEVEL, STEP
+from rislam_rt.slam.window.solver_limits import STEP
 
 
 def over_known(table: Hypotheses) -> Booleans:
@@ -75,7 +76,7 @@ def _margins(tx: Floats, rx: Floats, inner: Floats, outer: Floats, middle: Float
     return np.stack([
         np.sign(_depth(rx, outer, middle)) * _depth(image, outer, middle),
         np.sign(_depth(tx, inner, middle)) * _depth(bounce, inner, middle),
-        ray[:, 2] + LEVEL * np.linalg.norm(ray, axis=1),
+        ray[:, 2] + 2.0 * CONSTANTS.dip * np.linalg.norm(ray, axis=1),
     ], axis=1)  # fmt: skip
 
 

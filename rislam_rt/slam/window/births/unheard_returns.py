@@ -15,7 +15,6 @@ from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.window_gaussian import poses
-from rislam_rt.slam.window.solver_limits import LEVEL
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -49,7 +48,7 @@ def log_unheard(
         near = scene.sensor.cell_length + doubt * np.array([1.0, 1.0 / length[-1], 1.0 / length[-1]])
         present = np.zeros(len(where), dtype=np.bool_)
         present[slot[(np.abs(off) < near).all(axis=1)]] = True
-        shows = _shows(context, table, row, length, digest) * (out[:, 2] > -LEVEL * length)
+        shows = _shows(context, table, row, length, digest) * (out[:, 2] > -CONSTANTS.dip * length)
         mine = slot[ats[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
         found[row] = log_silence(shows[span], present[span])

@@ -17,7 +17,7 @@ from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise,
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.smoother.steps import HEAD
-from rislam_rt.slam.window.solver_limits import EDGE, FAINT, LEVEL
+from rislam_rt.slam.window.solver_limits import EDGE, FAINT
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))
 """Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
@@ -76,7 +76,7 @@ def predict_returns(
     sight = observe(returns, features, landmarks.anchor, poses)
     heard = scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT
     reported = (heard >= scene.sensor.window[0]) & (heard <= scene.sensor.window[1])
-    rows = ((sight.up > -LEVEL) & reported).nonzero()[0]
+    rows = ((sight.up > -CONSTANTS.dip * np.maximum(bounces, 1)) & reported).nonzero()[0]
     returns, bounces, ways = compact(returns, rows), bounces[rows], (sight.tx_length[rows], sight.rx_length[rows])
     level, spread = amplitudes(returns, features, landmarks, *ways, poses, scene, code)
     rows = (scene.radio.integrated_snr(np.exp(level + spread)) > FAINT).nonzero()[0]
