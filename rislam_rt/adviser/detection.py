@@ -38,7 +38,7 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
         snr, owner = radio.integrated_snr(capture.gain), paths.landmark[capture.path]
         loud = select_paths(capture, snr > NEGLIGIBLE * sensor.threshold)
         parts = merge(loud, sensor) if settings.receiver.merge else single(loud)
-        inside = (parts.tau >= sensor.window[0]) & (parts.tau <= sensor.window[1])
+        inside = sensor.in_window(parts.tau)
         chance = sensor.detection_probability(radio.integrated_snr(parts.gain)) * inside
         of_part = paths.landmark[parts.path]
         np.multiply.at(missed, of_part[of_part >= 0], 1.0 - chance[of_part >= 0])

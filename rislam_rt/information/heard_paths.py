@@ -19,7 +19,7 @@ def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
     snr = sensor.radio.integrated_snr(paths.gain)
     detected = _detected(snr, sensor.threshold)
     heard = paths.valid & (snr * detected >= SILENT * sensor.threshold)
-    heard &= (paths.tau >= sensor.window[0]) & (paths.tau <= sensor.window[1])
+    heard &= sensor.in_window(paths.tau)
     if sensor.radio.array.pattern == "upper":
         heard &= paths.arrival[..., 2] >= 0.0
     wanted = paths.landmark >= 0

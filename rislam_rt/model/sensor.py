@@ -66,6 +66,10 @@ class SensorModel:
         """(3,) the same with the delay as a length [m]."""
         return self.cell * np.array([SPEED_OF_LIGHT, 1.0, 1.0])
 
+    def in_window(self, delay: Floats) -> Booleans:
+        """(...,) whether components of such delays [s] are reported at all."""
+        return np.asarray((delay >= self.window[0]) & (delay <= self.window[1]))
+
     def heard_as(self, length: Floats) -> Floats:
         """Lengths [m] as which paths of lengths (...,) [m] are heard, less than a period."""
         return np.asarray(np.mod(length, SPEED_OF_LIGHT * self.period))
@@ -85,7 +89,7 @@ class SensorModel:
         Noise is stationary in delay and cosines, so that its peaks lie evenly over the window and the unit disc.
         """
         delay = np.asarray(tau, dtype=np.float64)
-        inside = (delay >= self.window[0]) & (delay <= self.window[1]) & (np.sum(cosines**2, axis=-1) <= 1.0)
+        inside = self.in_window(delay) & (np.sum(cosines**2, axis=-1) <= 1.0)
         return np.where(inside, self.false_alarms / (np.pi * (self.window[1] - self.window[0])), 0.0)
 
     def false_alarm_snr_density(self, snr: ArrayLike) -> Floats:

@@ -107,7 +107,7 @@ def audible_paths(paths: Paths, settings: Settings) -> Booleans:
     """
     sensor = settings.sensor
     heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
-    heard &= (paths.tau >= sensor.window[0]) & (paths.tau <= sensor.window[1])
+    heard &= sensor.in_window(paths.tau)
     if settings.radio.array.pattern == "upper":
         heard &= paths.arrival[..., 2] >= 0.0
     wanted = paths.landmark >= 0

@@ -12,6 +12,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
 from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.landmarks.path_forms import crossing, margins, planes
 from rislam_rt.slam.window.solver_limits import STEP
 
 
@@ -55,31 +56,21 @@ def bounces(table: Hypotheses, place: Floats, digest: TrackSummary, known: Known
     first = (table.kind[rows] == WALL_KNOWN)[:, None]
     inner, outer = np.where(first, place[rows], known.place[wall]), np.where(first, known.place[wall], place[rows])
     image = reflect(tx, inner, middle)
-    last = _crossing(rx, reflect(image, outer, middle), outer, middle)
-    return rows, np.where(first, _crossing(last, image, inner, middle), last)
+    last = _met(rx, reflect(image, outer, middle), outer, middle)
+    return rows, np.where(first, _met(last, image, inner, middle), last)
 
 
-def _crossing(start: Floats, stop: Floats, wall: Floats, middle: Floats) -> Floats:
-    """(N, 3) where the ways between places (N, 3) meet walls (N, 3), images of `middle`; one of the two if nowhere."""
-    own, far = _depth(start, wall, middle), _depth(stop, wall, middle)
-    share = np.clip(own / np.where(np.abs(own - far) > STEP, own - far, STEP), 0.0, 1.0)
-    return start + share[:, None] * (stop - start)
+def _met(start: Floats, stop: Floats, wall: Floats, middle: Floats) -> Floats:
+    """(N, 3) where the ways between places (N, 3) meet walls (N, 3), images of `middle`."""
+    normal, offset = planes(wall, middle)
+    return crossing(start, stop, *(np.vecdot(spot, normal) - offset for spot in (start, stop)))
 
 
 def _margins(tx: Floats, rx: Floats, inner: Floats, outer: Floats, middle: Floats) -> Floats:
     """(N, 3) [m] by how much a path from `tx` over walls `inner` and then `outer` (N, 3), images of `middle`, to `rx`
     can be: its image before the last wall on the Rx's side of that, the last bounce on the Tx's side of the first wall,
     and how far above the horizon it arrives."""
-    image = reflect(tx, inner, middle)
-    mirrored = reflect(image, outer, middle)
-    bounce, ray = _crossing(rx, mirrored, outer, middle), mirrored - rx
-    return np.stack([
-        np.sign(_depth(rx, outer, middle)) * _depth(image, outer, middle),
-        np.sign(_depth(tx, inner, middle)) * _depth(bounce, inner, middle),
-        ray[:, 2] + 2.0 * CONSTANTS.dip * np.linalg.norm(ray, axis=1),
-    ], axis=1)  # fmt: skip
-
-
-def _depth(point: Floats, wall: Floats, middle: Floats) -> Floats:
-    span = wall - middle
-    return np.asarray(np.vecdot(point - 0.5 * (wall + middle), span) / np.linalg.norm(span, axis=-1))
+    ahead, _, deep, own = margins(tx, rx, middle, np.stack([inner, outer], axis=1))
+    ray = reflect(reflect(tx, inner, middle), outer, middle) - rx
+    rise = ray[:, 2] + 2.0 * CONSTANTS.dip * np.linalg.norm(ray, axis=1)
+    return np.stack([np.sign(own) * deep, ahead, rise], axis=1)

@@ -65,8 +65,7 @@ def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, di
     ratio = CONSTANTS.wall_ratio + gain * (told - context.landmarks.ratio[wall] - CONSTANTS.wall_ratio)
     std = np.full(len(length), np.sqrt(gain * noise + CONSTANTS.fading**2))
     sensor, level = context.scene.sensor, free_space(radio) - np.log(length) + ratio
-    delay = sensor.heard_as(length) / SPEED_OF_LIGHT
-    reported = (delay >= sensor.window[0]) & (delay <= sensor.window[1])
+    reported = sensor.in_window(sensor.heard_as(length) / SPEED_OF_LIGHT)
     return np.asarray(CONSTANTS.shown * detection_probability(level, std, sensor) * reported)
 
 

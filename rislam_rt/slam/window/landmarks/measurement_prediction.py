@@ -74,8 +74,7 @@ def predict_returns(
     rows = (fine[returns.tx] & fine[returns.rx]).nonzero()[0]
     returns, bounces = compact(returns, rows), bounces[rows]
     sight = observe(returns, features, landmarks.anchor, poses)
-    heard = scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT
-    reported = (heard >= scene.sensor.window[0]) & (heard <= scene.sensor.window[1])
+    reported = scene.sensor.in_window(scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT)
     rows = ((sight.up > -CONSTANTS.dip * np.maximum(bounces, 1)) & reported).nonzero()[0]
     returns, bounces, ways = compact(returns, rows), bounces[rows], (sight.tx_length[rows], sight.rx_length[rows])
     level, spread = amplitudes(returns, features, landmarks, *ways, poses, scene, code)

@@ -69,11 +69,11 @@ def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: 
     base = np.where((legs[:, 0] == TX)[:, None], poses.tx, features[legs[:, 0]] if len(features) else 0.0)
     sound, ahead = np.ones(count, dtype=np.bool_), np.full(count, np.inf)
     one, two = ((legs[:, 1] != NONE) & (legs[:, 2] == NONE)).nonzero()[0], (legs[:, 2] != NONE).nonzero()[0]
-    normal, offset = _planes(features[legs[one, 1]], anchor[legs[one, 1]])
+    normal, offset = planes(features[legs[one, 1]], anchor[legs[one, 1]])
     near = np.vecdot(base[one], normal) - offset
     sound[one], ahead[one] = np.abs(near) > CONSTANTS.depth, np.sign(near) * (normal @ poses.rx - offset)
-    ahead[two], near, outer, opposite = _margin(base[two], poses.rx, anchor[legs[two, 1:]], features[legs[two, 1:]])
-    sound[two] = opposite & (np.minimum(np.abs(near), np.abs(outer)) > CONSTANTS.depth)
+    ahead[two], near, outer, own = margins(base[two], poses.rx, anchor[legs[two, 1:]], features[legs[two, 1:]])
+    sound[two] = (outer * own > 0.0) & (np.minimum(np.abs(near), np.abs(outer)) > CONSTANTS.depth)
     fine = sound & (ahead > 0.0)
     mate = _swapped(legs, two)
     edge = two[sound[two] & ~fine[two] & ~fine[mate]]
@@ -85,19 +85,25 @@ def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: 
     return fine
 
 
-def _margin(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tuple[Floats, Floats, Floats, Booleans]:
-    """By how much (N,) the ray that leaves `device` (3,) for the wall `walls[:, 1]` and `walls[:, 0]` (N, 2, 3), to
-    `base` (N, 3), meets the one before the other; the depths of the base before the one, and of its image before the
-    other (N,); whether that image and the device are on one side."""
-    normal, offset = _planes(walls, anchor)
+def margins(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """By how much (N,) the ray that leaves `device` (3,) or (N, 3) for the wall `walls[:, 1]` and `walls[:, 0]`
+    (N, 2, 3), to `base` (N, 3), meets the one before the other; the depths (N,) of the base before `walls[:, 0]`, and
+    of its image and of the device before `walls[:, 1]`: on one side, if the path can be."""
+    normal, offset = planes(walls, anchor)
     near = np.vecdot(base, normal[:, 0]) - offset[:, 0]
     image = base - 2.0 * near[:, None] * normal[:, 0]
     outer, own = np.vecdot(image, normal[:, 1]) - offset[:, 1], np.vecdot(device, normal[:, 1]) - offset[:, 1]
     # where the ray from the device meets the outer wall: the next end for the inner one
     mirrored = image - 2.0 * outer[:, None] * normal[:, 1]
-    share = own / np.where(np.abs(own + outer) > 1e-9, own + outer, 1e-9)
-    edge = device + np.clip(share, 0.0, 1.0)[:, None] * (mirrored - device)
-    return np.sign(near) * (np.vecdot(edge, normal[:, 0]) - offset[:, 0]), near, outer, outer * own > 0.0
+    edge = crossing(device, mirrored, own, -outer)
+    return np.sign(near) * (np.vecdot(edge, normal[:, 0]) - offset[:, 0]), near, outer, own
+
+
+def crossing(start: Floats, stop: Floats, own: Floats, far: Floats) -> Floats:
+    """(N, 3) where the ways between places (N, 3) meet a wall before which these are so deep (N,); one of the two if
+    nowhere."""
+    share = np.clip(own / np.where(np.abs(own - far) > 1e-9, own - far, 1e-9), 0.0, 1.0)
+    return np.asarray(start + share[:, None] * (stop - start))
 
 
 def _margin_std(
@@ -106,7 +112,7 @@ def _margin_std(
     """Standard deviations (N,) [m] of the margins over walls (N, 2), by what these are uncertain by."""
     moves = STEP * np.concatenate([np.zeros((1, 6)), np.eye(6)]).reshape(7, 1, 2, 3)
     places = (features[walls] + moves).reshape(-1, 2, 3)
-    every = _margin(np.tile(base, (7, 1)), device, np.tile(anchor[walls], (7, 1, 1)), places)[0].reshape(7, -1)
+    every = margins(np.tile(base, (7, 1)), device, np.tile(anchor[walls], (7, 1, 1)), places)[0].reshape(7, -1)
     along = ((every[1:] - every[0]) / STEP).T
     rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
     block = covariance[rows[:, :, None], rows[:, None, :]]
@@ -122,7 +128,7 @@ def _swapped(legs: Integers, two: Integers) -> Integers:
     return np.searchsorted(code, other)
 
 
-def _planes(wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
+def planes(wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
     """Unit normals (..., 3) of walls (..., 3), images of anchors alike, and their offsets (...,): `n . x = offset`."""
     span = wall - anchor
     normal = np.asarray(span / np.sqrt(np.vecdot(span, span))[..., None])
