@@ -3,6 +3,7 @@
 import shutil
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,3 +85,20 @@ def test_cell(what: str, tmp_path: Path) -> None:
     assert CELLS[what](data) != data
     file.write_bytes(CELLS[what](data))
     assert read_row(tmp_path, cell).state == MISSING
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"base": {"cycles": 4}}, {"repetitions": 2}, {"seed": 1}, {"function": "math:dist"}],
+    ids=["settings", "repetition", "seed", "function"],
+)
+def test_a_sound_cell_under_the_name_of_another(other: dict[str, Any], tmp_path: Path) -> None:
+    """Files that were copied about, each as it was written: what stands in one decides which cell it is."""
+    asked = {"function": "math:hypot", "base": {"cycles": 3}, **other}
+    mine, there = build_cells(Sweep("math:hypot", base={"cycles": 3}))[0], build_cells(Sweep(**asked))[-1]
+    for cell, value in ((mine, 0.125), (there, 0.25)):
+        write_cell(tmp_path, cell, "math:hypot", CellOutcome({"rmse_m": value}))
+    files = [tmp_path / "cells" / f"{cell.ident}.json" for cell in (mine, there)]
+    shutil.copy(files[1], files[0])
+    assert read_row(tmp_path, mine).state == MISSING
+    assert read_row(tmp_path, there).result == {"rmse_m": 0.25}

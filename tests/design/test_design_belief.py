@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.design import DESIGNERS, design_code, problem_from_belief
+from rislam_rt.design import DESIGNERS, build_objective, design_code, exact_code, problem_from_belief
 from rislam_rt.information import Outcome, vertex_gradient
 from rislam_rt.model import empty_map
 
@@ -131,3 +131,14 @@ def _bounce(end, point, image):
     normal, middle = image - point, 0.5 * (image + point)
     share = ((middle - end) @ normal) / ((image - end) @ normal)
     return end + share * (image - end)
+
+
+@pytest.mark.parametrize("position", [(1.8, 2.4, 0.6), (2.6, 2.4, 0.6), (0.7, 0.7, 0.5), (4.2, 1.2, 0.5)])
+def test_a_code_for_all_paths_tells_more_than_the_optimum_of_any_one(position, make_belief, make_spec, radio, rng):
+    """Descent against the optima of the panel's path and its ten images, each for itself, at the position believed."""
+    belief, spec = make_belief(np.array(position), rng), make_spec()
+    problem = problem_from_belief(belief, spec, radio, samples=1)
+    single, _ = exact_code(problem.response[0].reshape(11, -1), spec.levels)
+    design = design_code(belief, spec, radio, method="coordinate", rng=rng, samples=1)
+    # 1.6 to 3 % of the variance are gained at these places
+    assert design.crlb < 0.99 * build_objective(problem).of_index(single).min()

@@ -107,3 +107,20 @@ def test_large_panels_focus_on_near_targets(side, levels, radio, rng):
     assert loss == pytest.approx(20 * np.log10(np.sinc(1 / levels)), abs=0.3)
     coordinate = DESIGNERS["coordinate"](problem, rng=rng, config=DesignConfig(max_steps=5))
     assert coordinate.gap_db == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_code_for_true_paths_says_more_of_the_place_than_any_code_for_one_of_them(scene, radio, rng):
+    """Position bound of the channel itself, of the code that descent finds and of each path's own optimum."""
+    motion = at([[x, 1.2, 0.5] for x in (0.7, 2.6, 4.2)])
+    paths = ImageSourceChannel(scene, radio, 1).paths(motion)
+    code = design_along(paths, motion.tx, motion.rx, radio, scene.ris.spec, method="coordinate", rng=rng)
+    found = position_error_map(rephase(paths, code), motion.tx, motion.rx, radio).variance
+    for cycle in range(3):
+        problem = problem_from_paths(paths, motion.tx[cycle], motion.rx[cycle], radio, 4, cycle=cycle)
+        single, _ = exact_code(problem.response[0].reshape(problem.response.shape[1], -1), 4)
+        for own in single.reshape(-1, *code.index.shape[1:]):
+            index = code.index.copy()
+            index[cycle] = own
+            sent = rephase(paths, RisCode(index, 4))
+            other = position_error_map(sent, motion.tx, motion.rx, radio).variance[cycle]
+            assert found[cycle] < other * (1.0 - 1e-3)

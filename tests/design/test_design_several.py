@@ -103,3 +103,14 @@ def test_a_panel_not_yet_found_looks_for_itself(both, radio, rng):
     np.testing.assert_array_equal(second.index, aimed.index)
     assert not np.array_equal(second.index, search_code(partly, sheets.panels[1], radio, 3, None, 0).index)
     assert found.code.index.shape == (1, 48)
+
+
+def test_no_element_of_either_panel_could_be_set_better(both, radio, rng):
+    belief, sheets = both
+    joint = design_code(belief, sheets, radio, method="coordinate", rng=rng, samples=1)
+    objective = build_objective(problem_from_belief(belief, sheets, radio, samples=1))
+    index = joint.code.index.ravel()
+    assert float(objective.of_index(index)) == pytest.approx(joint.crlb, rel=1e-9)
+    changed = np.repeat(index[None], 3 * len(index), axis=0)
+    changed[np.arange(len(changed)), np.arange(len(changed)) // 3] += 1 + np.arange(len(changed)) % 3
+    assert (objective.of_index(changed % 4) > joint.crlb * (1.0 - 1e-6)).all()

@@ -207,6 +207,10 @@ def test_any_array_and_bandwidth(make_paths, make_gain, radio):
         np.abs(measurement.cosines[row] - paths.arrival[0, 0, :2])[wide] < 5.0 * measurement.cosines_std[row][wide]
     )
     np.testing.assert_allclose(measurement.cosines_std[row][~wide], 0.5)
+    # at 30 dB one draw of noise moves an amplitude, and the deviations that follow from it, by less than a tenth
+    bound = measurement_std(np.array(1e3), radio)
+    assert measurement.tau_std[row] == pytest.approx(float(bound.tau), rel=0.1)
+    np.testing.assert_allclose(measurement.cosines_std[row][wide], bound.cosines[wide], rtol=0.1)
 
 
 def test_components_are_limited_to_what_is_asked_for(make_paths, make_gain):

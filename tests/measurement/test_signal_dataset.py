@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.errors import StoreError
+from rislam_rt.information import measurement_std
 from rislam_rt.measurement import ReceiverConfig, load_signals, signals_dataset
 from rislam_rt.model import PathKind, RadioConfig, Trajectory
 
@@ -31,6 +32,9 @@ def test_round_trip(tmp_path, make_paths, make_gain, alternation):
     np.testing.assert_allclose(loaded["found_from_panel"].values, [[0, int(alternation)]], atol=1e-3)
     # samples are stored in single precision; at 30 dB the gain is within a few percent of the truth
     np.testing.assert_allclose(loaded["found_gain"].values[0, 1], paths.gain[0, 1], rtol=0.2)
+    bound = measurement_std(np.array([1e5, 1e3]), RADIO)  # each path alone in its cell, its amplitude to a tenth
+    np.testing.assert_allclose(loaded["found_tau_std"].values[0], bound.tau, rtol=0.1)
+    np.testing.assert_allclose(loaded["found_cosines_std"].values[0], bound.cosines, rtol=0.1)
     spectrum = loaded["samples"].values[0, 0]
     matched = np.exp(2j * np.pi * loaded["frequency"].values * paths.tau[0, 0])
     antennas = np.exp(-2j * np.pi / RADIO.wavelength * loaded["antenna_position"].values @ paths.arrival[0, 0])

@@ -61,3 +61,11 @@ def test_the_panel_is_found_from_when_it_stays(result):
 )
 def test_why_something_is_missing(snr, valid, said):
     assert said in why_not(snr, valid, 10.0)
+
+
+def test_a_scheme_that_ends_a_metre_away_is_called_lost(result):
+    scheme = result.schemes["random"]
+    astray = replace(scheme, position=scheme.position + np.linspace(0.0, 1.0, 6)[:, None] * [0.0, 1.0, 0.0])
+    both = replace(result, schemes={**result.schemes, "random": astray})
+    assert judge_run(both, summarise(both)).headline.endswith("lost with random codes.")
+    assert "lost" not in judge_run(result, summarise(result)).headline

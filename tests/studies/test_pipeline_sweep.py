@@ -193,3 +193,10 @@ def test_a_sweep_counts_what_is_lost_and_keeps_what_was_said(capsys):
     print_sweep(scores)
     lines = [line.split("│") for line in capsys.readouterr().out.splitlines() if "no_ris" in line]
     assert [[cell.strip() for cell in line[-4:-1]] for line in lines] == [["2", "0", "0"], ["2", "2", "0"]]
+
+
+def test_more_repetitions_and_values_are_added_to_those_that_ran():
+    few = build_cells(slam_sweep(PIPELINE, TINY, ["slam.sigma_a=0.1,0.2", "cycles=3,4"], repeat=1))
+    many = build_cells(slam_sweep(PIPELINE, TINY, ["slam.sigma_a=0.05,0.1,0.2", "cycles=2,3,4"], repeat=2))
+    assert (len(few), len(many)) == (4, 18)
+    assert {cell.ident for cell in few} < {cell.ident for cell in many}

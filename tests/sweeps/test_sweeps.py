@@ -55,6 +55,15 @@ def test_seeds_come_from_parameters_and_not_from_the_order():
     assert not {c.seed for c in build_cells(Sweep(DRAW.function, AXES, seed=1))} & set(there.values())
 
 
+def test_a_sweep_that_grows_keeps_the_cells_that_it_has():
+    """More values, between and before those that were there, and more repetitions."""
+    there = {cell.ident: cell.seed for cell in build_cells(DRAW)}
+    axes = (Axis("x", (0, 1, 2, 2.5, 3)), Axis("word", ("none", "one", "two")))
+    grown = {cell.ident: cell.seed for cell in build_cells(Sweep(DRAW.function, axes, DRAW.base, 3, paired=("word",)))}
+    assert len(grown) == 45
+    assert there.items() <= grown.items()
+
+
 def test_a_cell_is_another_if_what_it_depends_on_is():
     cells = [
         build_cells(Sweep(DRAW.function, AXES, DRAW.base, depends=lambda settings, d=d: {"room": d})) for d in "aab"

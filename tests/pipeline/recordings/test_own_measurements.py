@@ -89,6 +89,9 @@ def test_from_a_file_comes_the_answer_of_the_run(
     found = np.array([[float(row[name]) for name in ("x_m", "y_m", "z_m")] for row in rows])
     # nine digits in the file; the run's own deviations pass through the table unrounded
     np.testing.assert_allclose(found, position, rtol=1e-8)
+    # where it began is told to 0.01 m an axis, and nothing measured says it any better
+    std = np.array([[float(row[name]) for name in ("std_x_m", "std_y_m")] for row in rows])
+    assert std.min() > 0.01 * (1.0 - 1e-6)
     with pytest.raises(ConfigError, match="not empty; give a new folder"):
         command(file, pipeline, set_=CHANGES, start=start, out=tmp_path / "out")
 

@@ -65,6 +65,17 @@ def test_without_signals_it_is_the_start_carried_on(setup):
     np.testing.assert_allclose(found, np.sqrt(2.0) * 0.01 * np.hypot(1.0, time), rtol=1e-6)
 
 
+@pytest.mark.parametrize("sigma", [0.02, 0.5])
+def test_without_signals_it_grows_as_the_agent_may_accelerate(setup, sigma):
+    """White acceleration that is constant over a step moves the place by dt^2 / 2 then, and by dt a second later."""
+    found = bound(setup, "random", "radio.reference_snr_db=-200.0", f"slam.sigma_a={sigma}")
+    time = setup.scene.agent.time
+    step = np.diff(time)
+    moved = [np.sum((step[:k] ** 2 / 2.0 + step[:k] * (time[k] - time[1 : k + 1])) ** 2) for k in range(len(time))]
+    expected = np.sqrt(2.0 * (0.01**2 * (1.0 + time**2) + sigma**2 * np.array(moved)))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
 def test_less_noise_and_more_signals_lower_it(setup):
     loud, quiet = (bound(setup, "random", f"radio.reference_snr_db={snr}")[-1] for snr in (30.0, 0.0))
     assert loud < quiet

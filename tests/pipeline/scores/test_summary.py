@@ -143,3 +143,28 @@ def test_a_run_whose_start_is_told_wrong_is_lost_and_says_so(run_short):
     assert wrong["outcomes"].get("diverged", 0) >= 1  # by the filter's own word, which knows no truth
     assert "diverged" not in right["outcomes"]
     assert sum(wrong["outcomes"].values()) == 10
+
+
+def test_a_bound_is_wider_for_an_agent_that_may_be_livelier(short_result):
+    """The same run held against other settings: hardly heard, it is known as well as its motion is."""
+
+    def scores(sigma):
+        config = dict(short_result.config)
+        config["slam"] = {**config["slam"], "sigma_a": sigma}
+        config["radio"] = {**config["radio"], "reference_snr_db": -40.0}
+        return summarise(replace(short_result, config=config))["schemes"]["random"]
+
+    calm, lively, wild = (scores(sigma) for sigma in (0.01, 0.1, 1.0))
+    assert calm["bound_m"] < 0.95 * lively["bound_m"] < 0.5 * wild["bound_m"]
+    assert calm["over_bound"] > lively["over_bound"] > wild["over_bound"]
+
+
+@pytest.mark.parametrize("cycles", [slice(3, 4), slice(-1, None), slice(None)])
+def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles):
+    """Half a metre is the limit."""
+    scheme = short_result.schemes["random"]
+    for far, lost in ((0.4, False), (0.7, True)):
+        position = scheme.position.copy()
+        position[cycles, 0] = short_result.scene.agent.position[cycles, 0] + far
+        astray = replace(short_result, schemes={"random": replace(scheme, position=position)})
+        assert summarise(astray)["schemes"]["random"]["diverged"] is lost

@@ -32,6 +32,8 @@ from rislam_rt.storage.lock import hold
 from rislam_rt.storage.netcdf import read_dataset, write_dataset
 from rislam_rt.storage.seal import file_digest, seal
 
+ROOM = Path(__file__).parents[3] / "scenes" / "paper_room"
+
 
 @pytest.fixture(scope="module")
 def identity(short_spec, room):
@@ -250,6 +252,20 @@ def test_another_run_is_refused_with_what_differs(stored, short_spec, room, iden
     assert find_run(stored, identity)["state"] == "done"
     with pytest.raises(ConfigError, match=r"holds another run \(config\.seed is 7 there and 8 here\); give"):
         find_run(stored, run_identity(short_spec.model_copy(update={"seed": 8}), room))
+
+
+def test_a_run_in_a_room_that_was_changed_since_is_another(stored, short_spec, room, tmp_path):
+    """The same name and place, one radius less by a tenth: refused where the other is, and in a folder of its own."""
+    changed = Path(shutil.copytree(ROOM, tmp_path / "paper_room"))
+    text = (changed / "scene.toml").read_text()
+    assert "radius = 0.05" in text
+    (changed / "scene.toml").write_text(text.replace("radius = 0.05", "radius = 0.045"))
+    now = run_identity(short_spec, load_scene(changed))
+    with pytest.raises(ConfigError, match=r"holds another run \(scene\.sha256 is [0-9a-f]+ there and [0-9a-f]+ here\)"):
+        find_run(stored, now)
+    with pytest.raises(ConfigError, match="holds another run"), open_run(stored, now):
+        pass
+    assert now.folder != run_identity(short_spec, room).folder
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path, identity):

@@ -99,6 +99,20 @@ def test_cells_of_a_room_follow_each_other(tmp_path: Path) -> None:
     assert len({c.ident for c in cells}) == 6
 
 
+def test_more_rooms_and_levels_of_noise_are_added_to_those_that_ran(tmp_path: Path) -> None:
+    def idents(*lines: str) -> set[str]:
+        spec = load_any(pipeline(tmp_path, *lines))
+        assert isinstance(spec, UnseenSpec)
+        return {cell.ident for cell in build_cells(build_unseen(spec, tmp_path / "unseen.toml", tmp_path))}
+
+    few, many = (
+        idents("first = 3", "rooms = 2", "snr_db = [13.0]"),
+        idents("first = 2", "rooms = 3", "snr_db = [0.0, 13.0]"),
+    )
+    assert (len(few), len(many)) == (2, 6)
+    assert few < many
+
+
 def test_rooms_for_development_and_for_tests_do_not_mix(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="both sides of 10000"):
         load_any(pipeline(tmp_path, "first = 9_999", "rooms = 2"))
