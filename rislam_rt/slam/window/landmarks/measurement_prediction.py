@@ -259,8 +259,8 @@ def _taken_in(
     """
     count, level, weaker = len(strength), strength.tolist(), second.tolist()
     owner, partner = [-1] * count, np.full(count, -1)
-    begin = np.flatnonzero(np.diff(first, prepend=-1))
-    crowded, end = first[begin], np.append(begin[1:], len(first))
+    crowded = np.flatnonzero(np.bincount(first, minlength=count))
+    begin, end = (np.searchsorted(first, crowded, side) for side in ("left", "right"))
     order = np.argsort(-strength[crowded], kind="stable")
     for leader, low, high in zip(crowded[order].tolist(), begin[order].tolist(), end[order].tolist(), strict=True):
         members = [] if owner[leader] >= 0 else [member for member in weaker[low:high] if owner[member] < 0]
