@@ -136,7 +136,8 @@ def test_a_plane_at_right_angles_to_a_small_surface_is_a_ghost_and_one_degree_of
 
 def test_a_second_plane_for_a_wall_is_a_ghost() -> None:
     normal = np.array([NORMALS[0], NORMALS[1], NORMALS[1]])
-    offset = np.einsum("wi,wi->w", normal, (WALLS + TOLD)[[0, 1, 1]]) + [0.0, 0.0, 0.2]
+    offset = np.einsum("wi,wi->w", normal, (WALLS + TOLD)[[0, 1, 1]])
+    offset[2] += 0.2
     scores = score_run(truth(), inputs(), answers(found=_with_walls(whole_map(), normal, offset)))
     assert (scores["walls_found"], scores["walls_good"], scores["ghost_walls"]) == (2, 2, 1)
 
