@@ -11,8 +11,8 @@ NEAR_WALL = 0.5
 """RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
 NEAR_ANGLE = 10.0
 """Angle [deg] from a true wall beyond which it is not either. Distance alone says nothing of a small surface: a plane
-at right angles to it is near all of it. A plane of random direction is within this by chance in 1 - cos 10 degrees = 1.5 % of
-cases, and none is within it of two walls that stand more than 20 degrees apart."""
+at right angles to it is near all of it. A plane of random direction is within this by chance in 1 - cos 10 degrees =
+1.5 % of cases, and none is within it of two walls that stand more than 20 degrees apart."""
 
 
 class Surfaces(NamedTuple):
