@@ -67,9 +67,9 @@ def within_reach(
     reach = gate * (variance[:, :1] + observations.std[:, 0] ** 2)
     row, column = ((seen[:, :1] - observations.seen[:, 0]) ** 2 <= reach).nonzero()
     gap, loudness = seen[row] - observations.seen[column], candidates.log_amplitude[row]
-    near = (gap**2 <= gate * (variance[row] + observations.std[column] ** 2)).all(axis=1)
+    inside = gap**2 <= gate * (variance[row] + observations.std[column] ** 2)
     doubt = candidates.log_amplitude_std[row] ** 2 + observations.log_amplitude_std[column] ** 2
-    near &= (loudness - observations.log_amplitude[column]) ** 2 < gate * doubt
+    near = inside[:, 1] & inside[:, 2] & ((loudness - observations.log_amplitude[column]) ** 2 < gate * doubt)
     side, other = candidates.side[row], observations.sides[column]
     near &= (side == other) | (side == UNTOLD) | (other == UNTOLD)
     return row[near], column[near]

@@ -65,9 +65,11 @@ def echoes(observed: Observations, cell: Floats) -> Booleans:
     found = np.zeros(len(observed.log_amplitude), dtype=np.bool_)
     if observed.panel_odds is None:
         return found
-    inside = (np.abs(observed.seen[:, None] - observed.seen) < cell).all(axis=-1)
-    stronger = observed.log_amplitude > observed.log_amplitude[:, None] + FAR_STRONGER
-    return np.asarray((inside & stronger).any(axis=1) & (observed.odds < 0.0))
+    found = observed.odds < 0.0
+    row, other = (observed.log_amplitude > observed.log_amplitude[found, None] + FAR_STRONGER).nonzero()
+    inside = (np.abs(observed.seen[found][row] - observed.seen[other]) < cell).all(axis=1)
+    found[found] = np.bincount(row[inside], minlength=int(found.sum())) > 0
+    return found
 
 
 FAR_STRONGER = 1.0

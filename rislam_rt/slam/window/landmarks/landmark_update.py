@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
@@ -120,8 +120,8 @@ def _existence(
     landmarks: WindowTable,
     expected: ExpectedComponents,
     groups: UnresolvedClusters,
-    hit: Floats,
-    missed: Floats,
+    hit: Booleans,
+    missed: Booleans,
     shows: Floats,
 ) -> WindowTable:
     """Every feature by the returns that only it explains: those over the fewest other features."""
