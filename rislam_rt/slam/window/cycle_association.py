@@ -82,8 +82,8 @@ def associate_cycle(
     observed: Observations, strangers: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, held = window_gaussian.now(window)
-    covariance = _with_height(held, window, scene)
+    mean, held, excess = window_gaussian.now_with_excess(window)
+    covariance = _with_height(held, excess, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = predict_returns(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
@@ -114,7 +114,7 @@ def _median(values: Floats) -> Floats:
     return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 
 
-def _with_height(covariance: Floats, window: Window, scene: KnownEnvironment) -> Floats:
+def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) -> Floats:
     """Covariance of the present, the height's with what it may be off by beyond the window's own variance.
 
     Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
@@ -123,7 +123,7 @@ def _with_height(covariance: Floats, window: Window, scene: KnownEnvironment) ->
     if not scene.use_vt:
         return covariance
     wide = covariance.copy()
-    wide[2, 2] += window_gaussian.excess(window)[2, 2]
+    wide[2, 2] += excess[2, 2]
     return wide
 
 

@@ -9,7 +9,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses
-from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratio
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -146,10 +146,9 @@ def _strengths(
     lead, alone = groups.leader[row], groups.partner[row] < 0
     quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
     sure = (expected.forms[lead, 0] == TX) | (expected.log_amplitude_std[lead] < 0.5)
-    for place in (alone & quiet & sure & (expected.bounces[lead] == 1)).nonzero()[0]:
-        wall = int(expected.forms[lead[place], 1:].max())
-        surplus = observed.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
-        landmarks = learn_ratio(landmarks, wall, min(max(float(landmarks.ratio[wall] + surplus), -3.0), 0.1))
+    told = alone & quiet & sure & (expected.bounces[lead] == 1)
+    surplus = observed.log_amplitude[pick[told]] - expected.log_amplitude[lead[told]]
+    landmarks = learn_ratios(landmarks, expected.forms[lead[told], 1:].max(axis=1), surplus)
     return _identities(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
 
 

@@ -53,7 +53,7 @@ class Window(NamedTuple):
     solved: Floats
     """(K - 1, A) [s^4/m^2] ...and in that of the covariance."""
     surplus: Floats
-    """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `excess`)."""
+    """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `now_with_excess`)."""
     step: Floats
     """(K - 1,) [s]."""
     prior: Quadratic
@@ -133,11 +133,25 @@ def _carried(window: Window, rows: Floats) -> Floats:
 
 def now(window: Window) -> tuple[Floats, Floats]:
     """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
-    size, covariance = len(window.head), window.covariance[: len(window.head), : len(window.head)].copy()
-    rows = _carried(window, window.covariance)
+    return now_with_excess(window)[:2]
+
+
+def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
+    """`now`, and the covariance (6, 6) of position and velocity beyond what the window holds.
+
+    The estimate takes each acceleration by a precision p, that of the calmest motion mode that may be; its error hangs
+    on the variance q that the acceleration truly has. The slope `p a` of its prior then has the variance `p^2 q`, of
+    which the window's covariance C holds p: `C (p^2 q - p) C^T` over all steps is what is left out. That is the error
+    of an estimator with a wrong model (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
+    """
+    size, rows = len(window.head), _carried(window, window.covariance)
+    whole, late = rows[:6, :size], rows[:6, size:]
+    excess = whole @ window.noise @ whole.T + (late * window.surplus.ravel()) @ late.T
+    covariance = window.covariance[:size, :size].copy()
     covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
     covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
-    return np.append(_carried(window, np.append(window.head, window.accel)), window.head[HEAD:]), covariance
+    mean = np.append(_carried(window, np.append(window.head, window.accel)), window.head[HEAD:])
+    return mean, covariance, excess
 
 
 def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
@@ -172,19 +186,6 @@ def pose_covariance(window: Window, axis: int) -> Floats:
     rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
     used = along if rate else np.delete(along, 1, axis=1)
     return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
-
-
-def excess(window: Window) -> Floats:
-    """(6, 6) covariance of the present's position and velocity beyond what the window holds.
-
-    The estimate takes each acceleration by a precision p, that of the calmest motion mode that may be; its error hangs
-    on the variance q that the acceleration truly has. The slope `p a` of its prior then has the variance `p^2 q`, of
-    which the window's covariance C holds p: `C (p^2 q - p) C^T` over all steps is what is left out. That is the error
-    of an estimator with a wrong model (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
-    """
-    size, rows = len(window.head), _carried(window, window.covariance)[:6]
-    late = rows[:, size:]
-    return np.asarray(rows[:, :size] @ window.noise @ rows[:, :size].T + (late * window.surplus.ravel()) @ late.T)
 
 
 def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:
