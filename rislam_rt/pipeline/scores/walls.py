@@ -5,20 +5,25 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.evaluate import Surfaces, ghost_planes, match_planes, plane_angle, plane_distance
-from rislam_rt.model import MapEstimate, Scene
+from rislam_rt.model import MapEstimate, Paths, Scene
+from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes, audible_seconds
 from rislam_rt.pipeline.scores.bound import SchemeBound
+from rislam_rt.pipeline.specification.spec import Settings
 
 
-def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
+def wall_scores(
+    scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None, audible_s: Floats | None = None
+) -> dict[str, dict[str, Any]]:
     """Scores of each wall of the last map: RMS distance over its true surface, angle, offset; null if missing.
 
     With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
     offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it. Walls in one plane
-    are one: what stands for one of them stands for all that are heard.
+    are one: what stands for one of them stands for all that are heard. `audible_s` (W,) [s] is how long in all a path
+    over its plane was above the threshold.
     """
     walls = build_walls(scene)
     group, alone = coplanar(walls), wall_surfaces(walls, np.arange(len(walls)))
@@ -38,8 +43,16 @@ def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None =
             "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])) if row >= 0 else None,
             "bound_deg": float(np.degrees(bound.angle)) if bound else None,
             "bound_m": bound.distance if bound else None,
+            "audible_s": None if audible_s is None else float(audible_s[number]),
         }
     return scores
+
+
+def seconds_audible(scene: Scene, paths: Paths, settings: Settings, gain: Any) -> Floats:
+    """(W,) [s] for which a path over each wall's plane was audible under the gains (K, P), in all, for its score."""
+    group = coplanar(build_walls(scene))
+    audible = audible_planes(paths, audible_paths(paths.with_gain(gain), settings), group)
+    return audible_seconds(audible, scene.agent.time)[group]
 
 
 def count_ghosts(scene: Scene, estimate: MapEstimate) -> int:

@@ -17,14 +17,13 @@ from rislam_rt.evaluate import (
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
+from rislam_rt.pipeline.scores.audible import heard_long
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0
 """[s] after which the error is counted once more: time for births."""
 LOST, FAR_OVER, LASTING = 0.1, 5.0, 1.0
 """Lost is a relative error beyond `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] without a break."""
-HEARD = 2.0
-"""[s] in all for which something must be audible to count as heard."""
 NEAR_POINT = 1.0
 """Distance [m] from a true landmark within which an estimate stands for it. For it and for walls the truth is laid into
 the map's frame first, by the start's own error."""
@@ -166,12 +165,6 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
         if len(parts.get(ident, ())) >= MIN_PARTS
     ]
     return {"births": len(is_image), "births_judged": len(judged), "births_right": int(np.sum(judged))}
-
-
-def heard_long(audible: Booleans, time: Floats) -> Booleans:
-    """Which columns of (K, N) count in a score: audible for `HEARD` seconds in all."""
-    step = float(np.median(np.diff(time))) if len(time) > 1 else HEARD
-    return np.asarray(audible.sum(axis=0) * step >= HEARD - 1e-9)
 
 
 def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:

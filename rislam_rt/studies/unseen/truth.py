@@ -9,10 +9,11 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import Surfaces, root_mean_square
 from rislam_rt.information import posterior_bound
-from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
+from rislam_rt.model import Paths, Scene, SchemeResult
+from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes
 from rislam_rt.pipeline.scores.bound import bound_problem
 from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
-from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 
 class Truth(NamedTuple):
@@ -57,10 +58,6 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
     audible = audible_paths(paths.with_gain(result.gain), settings)
     group = coplanar(walls)
     surfaces = wall_surfaces(walls, group)
-    over = np.zeros((paths.num_paths, len(surfaces.middle)), dtype=np.bool_)
-    for path in range(paths.num_paths):
-        _, _, tx, rx = paths.identity(path)
-        over[path, group[[*tx, *rx]]] = True
     of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
     bound, relative = run_bounds(scene, paths, result, spec)
     return Truth(
@@ -70,7 +67,7 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
         scene.ris is not None,
         (audible[:, :, None] & of).any(axis=1),
         *surfaces,
-        (audible.astype(np.int64) @ over) > 0,
+        audible_planes(paths, audible, group),
         paths.kind,
         paths.landmark,
         result.component_path,
@@ -100,19 +97,3 @@ def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineS
         for law in (motion, replace(motion, start_position=0.0))
     ]
     return found[0], found[1]
-
-
-def audible_paths(paths: Paths, settings: Settings) -> Booleans:
-    """(K, P) which paths are above the detection threshold, on the side that the array hears.
-
-    Wall returns count where the estimator uses them.
-    """
-    sensor = settings.sensor
-    heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
-    heard &= sensor.in_window(paths.tau)
-    if settings.radio.array.pattern == "upper":
-        heard &= paths.arrival[..., 2] >= 0.0
-    wanted = paths.landmark >= 0
-    if settings.slam.use_vt:
-        wanted |= paths.kind == PathKind.VT
-    return np.asarray(heard & wanted)

@@ -13,6 +13,7 @@ from rislam_rt.pipeline.dataset import SCHEME
 from rislam_rt.pipeline.scores.bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import component_labels, landmark_track, over_budget, summarise
 from rislam_rt.pipeline.scores.walls import coplanar, count_ghosts, wall_scores, wall_surfaces
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 PER_CYCLE = [
     name
@@ -161,3 +162,21 @@ def test_a_run_whose_start_is_told_wrong_is_lost_and_says_so(run_short):
     assert wrong["outcomes"].get("diverged", 0) >= 1  # by the filter's own word, which knows no truth
     assert "diverged" not in right["outcomes"]
     assert sum(wrong["outcomes"].values()) == 10
+
+
+def test_a_wall_is_audible_as_long_as_a_path_over_it_is_above_the_threshold(room, short_result):
+    paths, scheme = short_result.paths, short_result.schemes["random"]
+    settings = build_settings(PipelineSpec.model_validate(dict(short_result.config)))
+    names, heard = build_walls(room).names, {}
+    for path in range(paths.num_paths):
+        loud = settings.radio.integrated_snr(scheme.gain[:, path]) >= settings.sensor.threshold
+        loud &= paths.valid[:, path] & (paths.arrival[:, path, 2] >= 0.0)
+        _, landmark, tx, rx = paths.identity(path)
+        if landmark >= 0 or settings.slam.use_vt:
+            for wall in {*tx, *rx}:
+                heard[names[wall]] = heard.get(names[wall], False) | loud
+    step = float(np.median(np.diff(short_result.scene.agent.time)))
+    walls = summarise(short_result)["schemes"]["random"]["walls"]
+    assert heard
+    for name in names:
+        assert walls[name]["audible_s"] == pytest.approx(step * np.sum(heard.get(name, False)))
