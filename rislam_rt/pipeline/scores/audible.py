@@ -1,4 +1,4 @@
-"""What of a run could be heard, for its scores: paths above the detection threshold, and the walls that they meet."""
+"""Audible paths of a run: those above the detection threshold, and the walls that they meet, for its scores."""
 
 import numpy as np
 
