@@ -12,24 +12,40 @@ from rislam_rt.evaluate.confidence_intervals import (
 )
 from rislam_rt.evaluate.consistency import normalised_squares
 from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
+from rislam_rt.evaluate.planes import (
+    NEAR_ANGLE,
+    NEAR_WALL,
+    Surfaces,
+    ghost_planes,
+    match_planes,
+    plane_angle,
+    plane_distance,
+)
 from rislam_rt.evaluate.set_distances import Gospa, gospa, match_nearest, match_points
 
 __all__ = [
+    "NEAR_ANGLE",
+    "NEAR_WALL",
     "AssociationScore",
     "Gospa",
     "Interval",
+    "Surfaces",
     "align",
     "association_fractions",
     "association_score",
     "bootstrap",
     "bootstrap_ratio",
+    "ghost_planes",
     "gospa",
     "label_switches",
     "match_nearest",
+    "match_planes",
     "match_points",
     "mean_over_runs",
     "median_over_runs",
     "normalised_squares",
+    "plane_angle",
+    "plane_distance",
     "position_errors",
     "rms_over_runs",
     "rmse",

@@ -9,10 +9,11 @@ from matplotlib.lines import Line2D
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import COPLANAR_OFFSET
+from rislam_rt.evaluate import match_planes
 from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
-from rislam_rt.pipeline.scores.walls import match_walls
+from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
 from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
 from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 
@@ -112,7 +113,8 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
     low, high = scene.bounds
     margin = 0.06 * (high - low)
     box = np.stack([low - margin, high + margin])
-    matched = match_walls(walls, scheme.map)
+    surfaces = wall_surfaces(walls, coplanar(walls))
+    matched = match_planes(surfaces, scheme.map.wall_normal, scheme.map.wall_offset)
     height = float(scene.agent.position[-1, 2])
     for row in matched[matched >= 0]:
         segment = plane_trace(scheme.map.wall_normal[row], scheme.map.wall_offset[row], height, box)

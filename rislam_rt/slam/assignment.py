@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.observations import Observations, same_side
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.observations import UNTOLD, Observations
 
 DIAGONAL = np.arange(3)
 
@@ -35,61 +35,44 @@ def cheapest(cost: Floats) -> tuple[Integers, Integers]:
     return rows[good], columns[good]
 
 
-def pair_costs(candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float) -> Floats:
+def pair_costs(
+    candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float,
+    pairs: tuple[Integers, Integers] | None = None,
+) -> Floats:  # fmt: skip
     """(C, M): -2 log of the likelihood ratio of each pair against a stranger, 0 where it cannot be.
 
     A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
     to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
-    delay and cosines) do not compete at all.
+    delay and cosines) do not compete at all. `pairs` (P,), (P,) are those that may, where that is known.
     """
-    noise = np.zeros((len(observations.seen), 3, 3))
-    noise[:, DIAGONAL, DIAGONAL] = observations.std**2
-    variance = candidates.log_amplitude_std[:, None] ** 2 + observations.log_amplitude_std**2
-    fade = (observations.log_amplitude - candidates.log_amplitude[:, None]) ** 2 / variance
-    allowed = (fade < gate) & same_side(candidates.side, observations.sides)
-    pairs = near_pairs(candidates.seen, candidates.covariance, observations.seen, noise, allowed, gate)
-    at = pairs.row, pairs.column
-    cost = pairs.distance + fade[at] + pairs.log_det + np.log(variance[at]) + 4.0 * np.log(2.0 * np.pi)
-    cost += (
-        2.0 * np.log(np.broadcast_to(strangers, fade.shape[1:])[pairs.column]) - 2.0 * candidates.log_odds[pairs.row]
-    )
-    costs = np.zeros(fade.shape)
-    costs[at] = np.minimum(cost, 0.0)
+    wide = np.diagonal(candidates.covariance, axis1=1, axis2=2)
+    row, column = pairs or within_reach(candidates.seen, wide, candidates, observations, gate)
+    spread = candidates.covariance[row]
+    spread[:, DIAGONAL, DIAGONAL] += observations.std[column] ** 2
+    distance, log_det = squared_distance(candidates.seen[row] - observations.seen[column], spread)
+    variance = candidates.log_amplitude_std[row] ** 2 + observations.log_amplitude_std[column] ** 2
+    fade = (observations.log_amplitude[column] - candidates.log_amplitude[row]) ** 2 / variance
+    cost = distance + fade + log_det + np.log(variance) + 4.0 * np.log(2.0 * np.pi)
+    costs = np.zeros((len(candidates.seen), len(observations.seen)))
+    cost += 2.0 * np.log(np.broadcast_to(strangers, costs.shape[1])[column]) - 2.0 * candidates.log_odds[row]
+    costs[row, column] = np.where(distance < gate, np.minimum(cost, 0.0), 0.0)
     return costs
 
 
-class Pairs(NamedTuple):
-    """P pairs of predictions whose gap lies within the gate."""
-
-    row: Integers
-    """(P,) among the first."""
-    column: Integers
-    """(P,) among the second."""
-    distance: Floats
-    """(P,) squared Mahalanobis distance."""
-    log_det: Floats
-    """(P,) of the gap's covariance."""
-
-
-def near_pairs(
-    first: Floats, first_spread: Floats, second: Floats, second_spread: Floats, allowed: Booleans, gate: float
-) -> Pairs:
-    """Pairs of (A, 3) and (B, 3), with covariances (A, 3, 3) and (B, 3, 3), that are `allowed` (A, B) and in the gate.
-
-    No distance is less than that along one axis alone, so that few pairs need a matrix.
-    """
-    own, other = (np.diagonal(spread, axis1=1, axis2=2) for spread in (first_spread, second_spread))
-    row, column = (allowed & within(first[:, 0], own[:, 0], second[:, 0], other[:, 0], gate)).nonzero()
-    close = ((first[row] - second[column]) ** 2 <= gate * (own[row] + other[column])).all(axis=1)
-    row, column = row[close], column[close]
-    distance, log_det = squared_distance(first[row] - second[column], first_spread[row] + second_spread[column])
-    inside = distance < gate
-    return Pairs(row[inside], column[inside], distance[inside], log_det[inside])
-
-
-def within(first: Floats, variance: Floats, second: Floats, other: Floats, gate: float) -> Booleans:
-    """(A, B) whether the gaps between (A,) and (B,), with these variances, lie in the gate."""
-    return np.asarray((first[:, None] - second) ** 2 <= gate * (variance[:, None] + other))
+def within_reach(
+    seen: Floats, variance: Floats, candidates: Candidates, observations: Observations, gate: float
+) -> tuple[Integers, Integers]:
+    """Pairs (P,), (P,) of candidates at (C, 3), each axis with at most that variance, and observations, each axis and
+    the amplitude in the gate, on one side: no distance is less than that along one axis alone."""
+    reach = gate * (variance[:, :1] + observations.std[:, 0] ** 2)
+    row, column = ((seen[:, :1] - observations.seen[:, 0]) ** 2 <= reach).nonzero()
+    gap, loudness = seen[row] - observations.seen[column], candidates.log_amplitude[row]
+    inside = gap**2 <= gate * (variance[row] + observations.std[column] ** 2)
+    doubt = candidates.log_amplitude_std[row] ** 2 + observations.log_amplitude_std[column] ** 2
+    near = inside[:, 1] & inside[:, 2] & ((loudness - observations.log_amplitude[column]) ** 2 < gate * doubt)
+    side, other = candidates.side[row], observations.sides[column]
+    near &= (side == other) | (side == UNTOLD) | (other == UNTOLD)
+    return row[near], column[near]
 
 
 def squared_distance(gap: Floats, covariance: Floats) -> tuple[Floats, Floats]:

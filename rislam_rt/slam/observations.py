@@ -51,11 +51,6 @@ class Observations(NamedTuple):
         return Observations._make(None if field is None else field[rows] for field in self)
 
 
-def same_side(first: Integers, second: Integers) -> Booleans:
-    """(A, B) whether observations or tracks of two sides (A,), (B,) may be one."""
-    return np.asarray((first[:, None] == second) | (first[:, None] == UNTOLD) | (second == UNTOLD))
-
-
 def observations_of(measurement: Measurement, radio: RadioConfig) -> Observations:
     """A measurement in the filter's units; nothing stays infinite, no standard deviation zero."""
     length = np.clip(SPEED_OF_LIGHT * measurement.tau, 0.0, FAR)

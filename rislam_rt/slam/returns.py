@@ -220,11 +220,11 @@ def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) 
         scaled = span / np.vecdot(span, span)[..., None]
         depth = np.vecdot(scaled, start - 0.5 * (wall + anchor[walls]))[..., None]
         mirrored = start - 2.0 * depth * span
-        passed = (AXES - 2.0 * span[..., :, None] * scaled[..., None, :]) @ slopes[..., rows, :, :]
-        passed[..., 3 * column : 3 * column + 3] = -2.0 * (
+        image[..., rows, :], flip = mirrored, AXES - 2.0 * span[..., :, None] * scaled[..., None, :]
+        slopes[..., rows, :, : 3 * column] = flip if column == 1 else flip @ slopes[..., rows, :, :6]
+        slopes[..., rows, :, 3 * column : 3 * column + 3] = -2.0 * (
             depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]
         )
-        slopes[..., rows, :, :], image[..., rows, :] = passed, mirrored
     return image, slopes
 
 

@@ -23,6 +23,9 @@ RECORD = {
 SCHEMES = {"optimized": 1.0, "random": 1.6, "no_ris": 2.5, "bp_slam": 6.0, "channel_slam": 5.0}
 
 
+WALL_SCORES = ("angle_deg", "offset_m", "std_deg", "bound_deg", "bound_m", "audible_s")
+
+
 def scores(rmse, bound, *, diverged=False, panel=0.05):
     return {
         "rmse_m": rmse, "rmse_aligned_m": 0.25 * rmse, "bound_m": bound, "over_bound": rmse / bound,
@@ -32,9 +35,12 @@ def scores(rmse, bound, *, diverged=False, panel=0.05):
             "ris": {"final_m": panel, "rmse_m": panel, "cycles_held": 9, "cycles_identified": 8, "bound_m": 0.01},
         },
         "walls": {
-            "floor": {"angle_deg": 1.0, "offset_m": 0.02, "std_deg": 0.6, "bound_deg": 0.5, "bound_m": 0.01},
-            "ceiling": {"angle_deg": None, "offset_m": None, "std_deg": None, "bound_deg": 7.0, "bound_m": 3.0},
-            "table": {"angle_deg": None, "offset_m": None, "std_deg": None, "bound_deg": None, "bound_m": None},
+            name: dict(zip(WALL_SCORES, values, strict=True))
+            for name, values in (
+                ("floor", (1.0, 0.02, 0.6, 0.5, 0.01, 9.0)),
+                ("ceiling", (None, None, None, 7.0, 3.0, 2.0)),
+                ("table", (None, None, None, 9.0, 9.0, 1.9)),
+            )
         },
         "ghost_walls": 2,
     }  # fmt: skip
@@ -162,7 +168,7 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     assert missed_aims(entry) == []
     assert missed_aims({**entry, "ris_m": None, "wall_deg": 2.1, "diverged": 1}) == ["ris_m", "wall_deg", "diverged"]
     assert missed_aims({**entry, "ris_m": None, "ris_found": None}) == []
-    assert entry["wall_found"] == 0.5  # nothing is heard of the table
+    assert entry["wall_found"] == 0.5  # of the table too little is heard
     assert entry["ghost_walls"] == 2.0
 
 

@@ -20,7 +20,7 @@ from rislam_rt.pipeline.scores.summary import (
     over_budget,
     path_sources,
 )
-from rislam_rt.pipeline.scores.walls import wall_scores
+from rislam_rt.pipeline.scores.walls import count_ghosts, wall_scores
 
 CLUTTER = None
 
@@ -81,7 +81,7 @@ class Tally:
             "outcomes": dict(sorted(self.outcomes.items())),
             "landmarks": self._landmarks(),
             "walls": walls,
-            "ghost_walls": len(self.map.wall_offset) - sum(w["angle_deg"] is not None for w in walls.values()),
+            "ghost_walls": count_ghosts(self.scene, self.map),
             "map": map_score(self.scene, self.map, panel=self.panel),
             "association": dict(zip(names, self._association(), strict=True)),
             "step_seconds": seconds,

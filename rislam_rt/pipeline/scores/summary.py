@@ -20,7 +20,8 @@ from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene,
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound
-from rislam_rt.pipeline.scores.walls import wall_scores
+from rislam_rt.pipeline.scores.walls import count_ghosts, seconds_audible, wall_scores
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 DIVERGED = 0.5
 """Position error [m] that no run may reach unless the bound is of that size: a fraction of the room."""
@@ -68,7 +69,9 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     nees = None if squares is None else float(np.mean(squares))
     score = association_score(*component_labels(result.paths, scheme))
     largest = float(errors.max())
-    walls = wall_scores(scene, scheme.map, least)
+    settings = build_settings(PipelineSpec.model_validate(dict(result.config)))
+    audible = seconds_audible(scene, result.paths, settings, scheme.gain)
+    walls = wall_scores(scene, scheme.map, least, audible)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {
         "rmse_m": error,
@@ -82,7 +85,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
         "landmarks": landmark_scores(scene, scheme, least),
         "walls": walls,
-        "ghost_walls": len(scheme.map.wall_offset) - sum(wall["angle_deg"] is not None for wall in walls.values()),
+        "ghost_walls": count_ghosts(scene, scheme.map),
         "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
         "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
         "step_seconds": seconds,

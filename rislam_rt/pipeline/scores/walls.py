@@ -1,70 +1,96 @@
 """Scores of walls: which estimated plane stands for which, and how far off it is."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
-from rislam_rt.evaluate import match_nearest
-from rislam_rt.model import MapEstimate, Scene
+from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
+from rislam_rt.evaluate import Surfaces, ghost_planes, match_planes, plane_angle, plane_distance
+from rislam_rt.model import MapEstimate, Paths, Scene
+from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes, audible_seconds
 from rislam_rt.pipeline.scores.bound import SchemeBound
-
-NEAR_WALL = 0.5
-"""RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
+from rislam_rt.pipeline.specification.spec import Settings
 
 
-def wall_scores(scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
+def wall_scores(
+    scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None, audible_s: Floats | None = None
+) -> dict[str, dict[str, Any]]:
     """Scores of each wall of the last map: RMS distance over its true surface, angle, offset; null if missing.
 
     With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
-    offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it.
+    offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it. Walls in one plane
+    are one: what stands for one of them stands for all that are heard. `audible_s` (W,) [s] is how long in all a path
+    over its plane was above the threshold.
     """
     walls = build_walls(scene)
-    heard = None if least is None else np.array([name in least.walls for name in walls.names], dtype=np.bool_)
-    match = match_walls(walls, estimate, heard)
+    group, alone = coplanar(walls), wall_surfaces(walls, np.arange(len(walls)))
+    heard = np.array([least is None or name in least.walls for name in walls.names], dtype=np.bool_)
+    asked = np.bincount(group, weights=heard) > 0
+    match = match_planes(wall_surfaces(walls, group), estimate.wall_normal, estimate.wall_offset, asked)[group]
+    distance = plane_distance(alone, estimate.wall_normal, estimate.wall_offset)
+    angle = plane_angle(alone, estimate.wall_normal)
+    offset = np.abs(alone.middle @ estimate.wall_normal.T - estimate.wall_offset)
     scores: dict[str, dict[str, Any]] = {}
     for number, name in enumerate(walls.names):
-        row, bound = match[number], least.walls.get(name) if least else None
-        bounds = {
+        row, bound = match[number] if heard[number] else -1, least.walls.get(name) if least else None
+        scores[name] = {
+            "rmse_m": float(distance[number, row]) if row >= 0 else None,
+            "angle_deg": float(angle[number, row]) if row >= 0 else None,
+            "offset_m": float(offset[number, row]) if row >= 0 else None,
+            "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])) if row >= 0 else None,
             "bound_deg": float(np.degrees(bound.angle)) if bound else None,
             "bound_m": bound.distance if bound else None,
-        }
-        if row < 0:
-            scores[name] = {"rmse_m": None, "angle_deg": None, "offset_m": None, "std_deg": None, **bounds}
-            continue
-        normal, offset = estimate.wall_normal[row], estimate.wall_offset[row]
-        cosine = abs(float(normal @ walls.normal[number]))
-        sine = float(np.linalg.norm(np.cross(normal, walls.normal[number])))
-        middle, _ = walls.surface(number)
-        scores[name] = {
-            "rmse_m": surface_rms(walls, number, normal, offset),
-            "angle_deg": float(np.degrees(np.arctan2(sine, cosine))),
-            "offset_m": abs(float(normal @ middle - offset)),
-            "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])),
-            **bounds,
+            "audible_s": None if audible_s is None else float(audible_s[number]),
         }
     return scores
 
 
-def match_walls(walls: Walls, estimate: MapEstimate, heard: Booleans | None = None) -> Integers:
-    """Row (W,) of the estimated plane that stands for each true wall that is `heard` (W,), -1 for none; one to one."""
-    match = np.full(len(walls), -1)
-    asked = np.arange(len(walls)) if heard is None else np.flatnonzero(heard)
-    planes = list(zip(estimate.wall_normal, estimate.wall_offset, strict=True))
-    if not planes or not len(asked):
-        return match
-    cost = np.array([[surface_rms(walls, int(w), n, float(d)) for n, d in planes] for w in asked])
-    match[asked] = match_nearest(cost, NEAR_WALL)
-    return match
+def seconds_audible(scene: Scene, paths: Paths, settings: Settings, gain: Any) -> Floats:
+    """(W,) [s] for which a path over each wall's plane was audible under the gains (K, P), in all, for its score."""
+    group = coplanar(build_walls(scene))
+    audible = audible_planes(paths, audible_paths(paths.with_gain(gain), settings), group)
+    return audible_seconds(audible, scene.agent.time)[group]
 
 
-def surface_rms(walls: Walls, number: int, normal: Floats, offset: float) -> float:
-    """Score of a wall: RMS distance [m] of a plane from it, over its surface.
+def count_ghosts(scene: Scene, estimate: MapEstimate) -> int:
+    """Planes of a map that stand for no true wall, heard or not, for its score; walls in one plane are one."""
+    walls = build_walls(scene)
+    surfaces = wall_surfaces(walls, coplanar(walls))
+    return int(ghost_planes(surfaces, estimate.wall_normal, estimate.wall_offset).sum())
 
-    The distance is linear in the point: over a triangle its mean square is (sum of squares + square of the sum) / 12.
+
+def coplanar(walls: Walls) -> Integers:
+    """(W,) number of the true plane of each wall, in the order of the walls: what an agent can tell apart."""
+    group = np.full(len(walls), -1)
+    count = 0
+    for wall in range(len(walls)):
+        if group[wall] >= 0:
+            continue
+        cosine = walls.normal @ walls.normal[wall]
+        same = (np.abs(cosine) >= np.cos(COPLANAR_ANGLE)) & (group < 0)
+        same &= np.abs(walls.offset * np.sign(cosine) - walls.offset[wall]) <= COPLANAR_OFFSET
+        same[wall] = True
+        group[same] = count
+        count += 1
+    return group
+
+
+def wall_surfaces(walls: Walls, group: Integers) -> Surfaces:
+    """True surface of each group of walls, `group` (W,) numbered from 0, for scores.
+
+    Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
     """
-    _, weight = walls.surface(number)
-    distance = walls.triangles[walls.wall_of_triangle == number] @ normal - offset
-    square = (np.sum(distance**2, axis=1) + np.sum(distance, axis=1) ** 2) / 12.0
-    return float(np.sqrt(weight @ square))
+    count = int(group.max(initial=-1)) + 1
+    middle, normal, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
+    merged = replace(walls, wall_of_triangle=group[walls.wall_of_triangle])
+    for number in range(count):
+        normal[number] = walls.normal[int(np.argmax(group == number))]
+        middle[number], weight = merged.surface(number)
+        corner: Any = walls.triangles[merged.wall_of_triangle == number] - middle[number]
+        total = corner.sum(axis=1)
+        square = np.einsum("tci,tcj->tij", corner, corner) + np.einsum("ti,tj->tij", total, total)
+        spread[number] = np.einsum("t,tij->ij", weight, square) / 12.0
+    return Surfaces(middle, normal, spread)

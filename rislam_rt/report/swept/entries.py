@@ -9,6 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.scores.audible import HEARD
 from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.swept import Group, paired_gain, spread
 
@@ -166,14 +167,14 @@ def _walls(group: Group, scheme: str) -> dict[str, float | None]:
     """Walls of an entry: angle and distance errors at the end of the run over all that were found, with bounds and own
     deviation.
 
-    The share is that of those found among the walls that have a bound: no path meets the others.
+    The share is that of those found among the walls that are heard: for `HEARD` s in all, as in unseen rooms.
     """
     names = group.parts(scheme, "walls")
-    angle, offset, own, least, near = (
+    angle, offset, own, least, near, audible = (
         _pooled(group, scheme, "walls", names, part)
-        for part in ("angle_deg", "offset_m", "std_deg", "bound_deg", "bound_m")
+        for part in ("angle_deg", "offset_m", "std_deg", "bound_deg", "bound_m", "audible_s")
     )
-    heard = ~np.isnan(least) if not np.isnan(least).all() else np.ones(len(least), dtype=np.bool_)
+    heard = ~(audible < HEARD - 1e-9)  # of long runs it is not known
     return {
         "wall_deg": _rms(angle),
         "wall_bound_deg": bound_beside(least, angle),

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
+from rislam_rt.pipeline.scores.audible import HEARD
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import (
     metres,
@@ -119,10 +121,12 @@ def rooms_body(content: Mapping[str, Any], spec: RoomsSpec, figure: str | None) 
     text = f"""Aims: agent's RMSE at most {aims["rmse_m"]:g} m and {aims["over_bound"]:g} times its posterior bound,
     panel at most {aims["ris_m"]:g} m, scatterers {aims["scatterer_m"]:g} m, walls {aims["wall_deg"]:g} degrees and
     {aims["wall_m"]:g} m, no divergence. Landmarks and walls are scored at the end of a run, RMS over those found, each
-    with the posterior bound of the same ones; a share in brackets says how many were, of walls among those that a path
-    meets. The distance of a wall is that at the middle of its surface. "Own" is the deviation of the angle that the map
-    itself reckons with; planes that stand for no wall are ghosts, a mean number a run. GOSPA is of the map's points,
-    cut off at 1 m, order 2."""
+    with the posterior bound of the same ones; a share in brackets says how many were, of walls among those over which
+    a path is above the detection threshold for {HEARD:g} s in all. A plane of the map stands for a wall within
+    {NEAR_WALL:g} m of it (RMS over its surface) and {NEAR_ANGLE:g} degrees, one to one, walls in one plane being one;
+    those that stand for none, heard or not, are ghosts, a mean number a run. The distance of a wall is that at the
+    middle of its surface. "Own" is the deviation of the angle that the map itself reckons with. GOSPA is of the map's
+    points, cut off at 1 m, order 2."""
     lines = [*paragraph(text), ""]
     text = """The error budget: each aim that is missed, with what limits it. That is the bound where the error is
     within 1.5 of it, else association where fewer than 95 % of the components are taken for what they are, else the

@@ -3,17 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
+from rislam_rt.pipeline.scores.audible import HEARD
 from rislam_rt.report.swept.entries import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
 from rislam_rt.studies.unseen.score import (
     FAR_OVER,
     GOOD_ANGLE,
     GOOD_OFFSET,
-    HEARD,
     LASTING,
     LOST,
     NEAR_POINT,
-    NEAR_WALL,
     SETTLED,
 )
 from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
@@ -62,10 +62,11 @@ def _meaning() -> list[str]:
     on end; silently so, if no cycle from then on says that it diverged, and the error exceeds {FAR_OVER:g} of the
     estimator's own deviations for as long. A wall or landmark counts as heard if a path of
     it is above the detection threshold for {HEARD:g} s in all; walls in one plane are one. A wall is found if at the
-    end a plane of the map lies within {NEAR_WALL:g} m of it (RMS over its surface), one to one, and found well within
-    {GOOD_ANGLE:g} degree and {GOOD_OFFSET:g} m at its middle; a landmark, within {NEAR_POINT:g} m. Ghosts are what
-    stands for nothing. A birth is of the right kind if most components that the landmark got were of that kind. Delays
-    are medians from the first audible cycle to the first in which the map holds it."""
+    end a plane of the map lies within {NEAR_WALL:g} m of it (RMS over its surface) and within {NEAR_ANGLE:g} degrees,
+    one to one, and found well within {GOOD_ANGLE:g} degree and {GOOD_OFFSET:g} m at its middle; a landmark, within
+    {NEAR_POINT:g} m. Ghosts are what stands for nothing, heard or not, one to one. A birth is of the right kind if most
+    components that the landmark got were of that kind. Delays are medians from the first audible cycle to the first in
+    which the map holds it."""
     return [*paragraph(text), "", *paragraph(lost)]
 
 

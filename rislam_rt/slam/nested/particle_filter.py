@@ -103,8 +103,7 @@ def step(
     front, used = take_in(front, observed, view)
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _look(front, told.belief, config)
-    slots = np.arange(front.window.num_poses)[0 if front.cycle % REFRESH == 0 else -1 :]
-    left = renew_slots(front, slots)[1]
+    left = renew_slots(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
-from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within
+from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_reach
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.returns import TX, Poses, poses_of
@@ -65,9 +65,11 @@ def echoes(observed: Observations, cell: Floats) -> Booleans:
     found = np.zeros(len(observed.log_amplitude), dtype=np.bool_)
     if observed.panel_odds is None:
         return found
-    inside = (np.abs(observed.seen[:, None] - observed.seen) < cell).all(axis=-1)
-    stronger = observed.log_amplitude > observed.log_amplitude[:, None] + FAR_STRONGER
-    return np.asarray((inside & stronger).any(axis=1) & (observed.odds < 0.0))
+    found = observed.odds < 0.0
+    row, other = (observed.log_amplitude > observed.log_amplitude[found, None] + FAR_STRONGER).nonzero()
+    inside = (np.abs(observed.seen[found][row] - observed.seen[other]) < cell).all(axis=1)
+    found[found] = np.bincount(row[inside], minlength=int(found.sum())) > 0
+    return found
 
 
 FAR_STRONGER = 1.0
@@ -80,8 +82,8 @@ def associate_cycle(
     observed: Observations, strangers: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Expect, cluster, associate."""
-    mean, held = window_gaussian.now(window)
-    covariance = _with_height(held, window, scene)
+    mean, held, excess = window_gaussian.now_with_excess(window)
+    covariance = _with_height(held, excess, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = predict_returns(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
@@ -112,7 +114,7 @@ def _median(values: Floats) -> Floats:
     return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 
 
-def _with_height(covariance: Floats, window: Window, scene: KnownEnvironment) -> Floats:
+def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) -> Floats:
     """Covariance of the present, the height's with what it may be off by beyond the window's own variance.
 
     Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
@@ -121,7 +123,7 @@ def _with_height(covariance: Floats, window: Window, scene: KnownEnvironment) ->
     if not scene.use_vt:
         return covariance
     wide = covariance.copy()
-    wide[2, 2] += window_gaussian.excess(window)[2, 2]
+    wide[2, 2] += excess[2, 2]
     return wide
 
 
@@ -158,33 +160,21 @@ def _associate(
     seen = places[lead] + share * groups.gap
     most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
     most = (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra
-    level, doubt = groups.log_amplitude, np.hypot(groups.log_amplitude_std, 0.5 * CONSTANTS.fading)
-    near = _within_reach(seen, most, level, doubt, side, observed)
-    lead, mate, share, seen, every, shows = lead[near], mate[near], share[near], seen[near], shows, shows[near]
+    doubt = np.hypot(groups.log_amplitude_std, 0.5 * CONSTANTS.fading)
+    odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
+    candidates = Candidates(seen, np.zeros((len(lead), 3, 3)), groups.log_amplitude, doubt, odds, side)
+    row, column = within_reach(seen, most, candidates, observed, GATE)
+    near = np.flatnonzero(np.bincount(row, minlength=len(lead)))
+    lead, mate, share = lead[near], mate[near], share[near]
     jacobian = expected.jacobian[lead] + share[..., None] * (expected.jacobian[mate] - expected.jacobian[lead])
     spread = (jacobian.reshape(-1, jacobian.shape[-1]) @ covariance).reshape(jacobian.shape)
     spread = spread @ np.swapaxes(jacobian, 1, 2)
     spread[:, [0, 1, 2], [0, 1, 2]] += extra[near]
-    odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
-    candidates = Candidates(seen, spread, level[near], doubt[near], odds, side[near])
-    cost = pair_costs(candidates, observed, GATE, strangers)
+    some = Candidates._make(field[near] for field in candidates)._replace(covariance=spread)
+    cost = pair_costs(some, observed, GATE, strangers, (np.searchsorted(near, row), column))
     rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
-    gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[rows]).sum())
+    gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[near[rows]]).sum())
     rows = near[rows]
     missed[rows] = False
-    return rows, columns, gain + float(np.log1p(-every[missed]).sum())
-
-
-def _within_reach(
-    seen: Floats, variance: Floats, level: Floats, doubt: Floats, side: Integers, observed: Observations
-) -> Integers:
-    """Rows of the clusters at (C, 3), each axis with at most that variance, that lie in the gate of any component."""
-    row, column = within(seen[:, 0], variance[:, 0], observed.seen[:, 0], observed.std[:, 0] ** 2, GATE).nonzero()
-    gap, loudness = seen[row] - observed.seen[column], level[row] - observed.log_amplitude[column]
-    near = (gap**2 <= GATE * (variance[row] + observed.std[column] ** 2)).all(axis=1)
-    near &= loudness**2 < GATE * (doubt[row] ** 2 + observed.log_amplitude_std[column] ** 2)
-    near &= (side[row] == observed.sides[column]) | (side[row] == UNTOLD) | (observed.sides[column] == UNTOLD)
-    found = np.zeros(len(seen), dtype=np.bool_)
-    found[row[near]] = True
-    return np.flatnonzero(found)
+    return rows, columns, gain + float(np.log1p(-shows[missed]).sum())

@@ -160,7 +160,8 @@ def unexplained(state: WindowState, observed: Observations) -> float:
     """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
     if not len(observed.seen):
         return 0.0
-    window, sensor = np.diff(state.scene.sensor.window)[0] * SPEED_OF_LIGHT, state.scene.sensor
+    sensor = state.scene.sensor
+    window = (sensor.window[1] - sensor.window[0]) * SPEED_OF_LIGHT
     loudness = 0.5 * np.log(sensor.radio.integrated_snr(np.exp(observed.log_amplitude.max())) / sensor.threshold)
     count = float((state.tracks.last == state.cycle - 1).sum())
     return count / (window * np.pi * max(float(loudness), 1.0))

@@ -203,8 +203,7 @@ def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[
     innovation, jacobian = innovations(view, state.log, used, state.cycle)
     window = window_gaussian.with_present(state.window, innovation, jacobian)
     window = window_gaussian.solve(window, spread=False)
-    slots = np.arange(window.num_poses)[0 if state.cycle % REFRESH == 0 else -1 :]
-    window, left = renew(state._replace(window=window), slots)
+    window, left = renew(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else window.num_poses - 1)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
 

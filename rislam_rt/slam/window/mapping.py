@@ -33,9 +33,9 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
     """Mean and covariance of the pose, equally likely samples of it, and the map."""
-    mean, covariance = window_gaussian.now(state.window)
+    mean, covariance, excess = window_gaussian.now_with_excess(state.window)
     spread = covariance.copy()
-    spread[:6, :6] += window_gaussian.excess(state.window)
+    spread[:6, :6] += excess
     spread[:3, :3] += np.diag(state.shift**2)
     position = mean[:3] + ahead * mean[3:6]
     root = square_root(spread[:3, :3])

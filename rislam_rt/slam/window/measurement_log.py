@@ -99,8 +99,6 @@ class Residuals(NamedTuple):
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
     """Distinct forms (U, 5), and which of them each (N, 5) is."""
     base = int(forms.max(initial=0)) + 3
-    code = np.zeros(len(forms), dtype=np.int64)
-    for column in forms.T:
-        code = code * base + column + 1
+    code = (forms + 1) @ base ** np.arange(forms.shape[1])[::-1]
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
     return forms[first], place

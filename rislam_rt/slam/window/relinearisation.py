@@ -5,43 +5,43 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import linearise_each, poses_of
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
 from rislam_rt.slam.window.smoother.steps import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 from rislam_rt.slam.window.state import WindowState
 
 
-def renew(state: WindowState, slots: Integers) -> tuple[Window, Residuals]:
-    """The window with the quadratics of some slots as they are at its estimate; the last pose is that of the cycle."""
+def renew(state: WindowState, first: int) -> tuple[Window, Residuals]:
+    """The window with the quadratics of the slots from `first` on as they are at its estimate; the last pose is that of
+    the cycle."""
     window, log = state.window, state.log
     slot = log.cycle - (state.cycle - window.num_poses + 1)
-    rows = (log.explained & np.isin(slot, slots)).nonzero()[0]
-    found, slopes = residuals(state, rows, slot[rows])
-    size, many = slopes.shape[2], len(slots)
+    rows, place = (log.explained & (slot >= first)).nonzero()[0], poses(window)
+    found, slopes = residuals(state, rows, slot[rows], place)
+    size, many, of = slopes.shape[2], window.num_poses - first, found.slot - first
     # the components of each slot side by side
-    of, first = np.searchsorted(slots, found.slot), np.searchsorted(found.slot, slots)
-    at = np.arange(len(rows)) - first[of]
-    most = int(at.max(initial=-1)) + 1
-    wide, heavy, left = (np.zeros((many, most, 3, width)) for width in (size, 1, 1))
-    wide[of, at], heavy[of, at], left[of, at, :, 0] = slopes, trust(found.left)[:, None, None], found.left
-    flat, thick = (each.reshape(many, 3 * most, size) for each in (wide, heavy * wide))
+    at = np.arange(len(rows)) - np.searchsorted(of, of)
+    wide = np.zeros((many, int(at.max(initial=-1)) + 1, 3, size + 1))
+    weight = np.sqrt(trust(found.left))[:, None]
+    wide[of, at, :, :size], wide[of, at, :, size] = weight[..., None] * slopes, weight * found.left
+    flat = wide.reshape(many, -1, size + 1)
+    product = np.swapaxes(flat[..., :size], 1, 2) @ flat
     hessian, gradient, middle = (field.copy() for field in window.slots)
-    hessian[slots] = np.swapaxes(thick, 1, 2) @ flat
-    gradient[slots] = -(np.swapaxes(thick, 1, 2) @ left.reshape(many, 3 * most, 1))[..., 0]
-    middle[slots, :POSE], middle[slots, POSE:] = poses(window)[slots], window.features.ravel()
+    hessian[first:], gradient[first:] = product[..., :size], -product[..., size]
+    middle[first:, :POSE], middle[first:, POSE:] = place[first:], window.features.ravel()
     return window._replace(slots=Quadratic(hessian, gradient, middle)), found
 
 
-def residuals(state: WindowState, rows: Integers, slot: Integers) -> tuple[Residuals, Floats]:
-    """Of some explained rows of the log, heard at those poses, with the slopes (A, 3, 4 + 3F) of the predictions by
-    pose and features, likewise in standard deviations."""
+def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats) -> tuple[Residuals, Floats]:
+    """Of some explained rows of the log, heard at those of the poses (K, 4), with the slopes (A, 3, 4 + 3F) of the
+    predictions by pose and features, likewise in standard deviations."""
     window, log, scene, form = state.window, state.log, state.scene, state.log.form[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
-    place = poses(window)[at]
+    place = place[at]
     ends = poses_of(place[:, :3], state.heading[at] + place[:, 3], scene.body)
-    returns = compile_forms(state.landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])), at)
+    returns = forms_apart(state.landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])))
     linear = linearise_each(returns, window.features, state.landmarks.anchor, ends, POSE)
     linear.wide[..., :3] = linear.by_pose
     if window.turns:

@@ -53,7 +53,7 @@ class WindowTracks(NamedTuple):
 
     def keep(self, rows: Booleans) -> "WindowTracks":
         """Only some of the tracks."""
-        return WindowTracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
+        return self if rows.all() else WindowTracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 
 def no_tracks(panels: int = 1) -> WindowTracks:

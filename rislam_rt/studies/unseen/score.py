@@ -5,21 +5,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.evaluate import gospa, match_nearest, match_points, normalised_squares, root_mean_square
+from rislam_rt.evaluate import (
+    ghost_planes,
+    gospa,
+    match_planes,
+    match_points,
+    normalised_squares,
+    plane_angle,
+    root_mean_square,
+)
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
+from rislam_rt.pipeline.scores.audible import heard_long
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0
 """[s] after which the error is counted once more: time for births."""
 LOST, FAR_OVER, LASTING = 0.1, 5.0, 1.0
 """Lost is a relative error beyond `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] without a break."""
-HEARD = 2.0
-"""[s] in all for which something must be audible to count as heard."""
-NEAR_POINT, NEAR_WALL = 1.0, 0.5
-"""Distance [m] from a true landmark, and RMS distance over a true wall's surface, within which an estimate stands for
-it; the map is laid into the true frame by the start's own error first."""
+NEAR_POINT = 1.0
+"""Distance [m] from a true landmark within which an estimate stands for it. For it and for walls the truth is laid into
+the map's frame first, by the start's own error."""
 GOOD_ANGLE, GOOD_OFFSET = 1.0, 0.02
 """[deg] and [m] within which a wall is found well."""
 MIN_PARTS = 3
@@ -81,19 +88,17 @@ def _lasting(flag: Booleans, time: Floats) -> Booleans:
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:
     """Walls found at the end of those heard, how well, how soon, and planes that stand for none."""
-    heard = heard_long(truth.wall_audible, time)
+    heard, walls = heard_long(truth.wall_audible, time), truth.walls(told)
     first = np.full(len(heard), -1)
     match = np.full(len(heard), -1)
     for cycle, found in enumerate(maps):
-        match = match_planes(truth, found, heard, told)
+        match = match_planes(walls, found.wall_normal, found.wall_offset, heard)
         first[(match >= 0) & (first < 0)] = cycle
     last = maps[-1]
     held = np.flatnonzero(match >= 0)
+    angle = plane_angle(walls, last.wall_normal)[held, match[held]]
     normal, offset = last.wall_normal[match[held]], last.wall_offset[match[held]]
-    sine = np.linalg.norm(np.cross(normal, truth.wall_normal[held]), axis=1)
-    angle = np.degrees(np.arcsin(np.clip(sine, 0.0, 1.0)))
-    shift = np.abs(np.einsum("wi,wi->w", normal, truth.wall_middle[held] + told) - offset)
-    ghosts = plane_distance(truth, last, told).min(axis=0, initial=np.inf) > NEAR_WALL
+    shift = np.abs(np.einsum("wi,wi->w", normal, walls.middle[held]) - offset)
     return {
         "walls_heard": int(heard.sum()),
         "walls_found": len(held),
@@ -101,7 +106,7 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
         "wall_deg": _median(angle),
         "wall_m": _median(shift),
         "wall_delay_s": _delay(first, truth.wall_audible, time),
-        "ghost_walls": int(ghosts.sum()),
+        "ghost_walls": int(ghost_planes(walls, last.wall_normal, last.wall_offset).sum()),
     }
 
 
@@ -160,30 +165,6 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
         if len(parts.get(ident, ())) >= MIN_PARTS
     ]
     return {"births": len(is_image), "births_judged": len(judged), "births_right": int(np.sum(judged))}
-
-
-def heard_long(audible: Booleans, time: Floats) -> Booleans:
-    """Which columns of (K, N) count in a score: audible for `HEARD` seconds in all."""
-    step = float(np.median(np.diff(time))) if len(time) > 1 else HEARD
-    return np.asarray(audible.sum(axis=0) * step >= HEARD - 1e-9)
-
-
-def plane_distance(truth: Truth, found: MapEstimate, told: Floats) -> Floats:
-    """(W, M) RMS distance [m] of each estimated plane from each true wall, over the wall's surface."""
-    level = (truth.wall_middle + told) @ found.wall_normal.T - found.wall_offset
-    spread = np.einsum("mi,wij,mj->wm", found.wall_normal, truth.wall_spread, found.wall_normal)
-    return np.asarray(np.sqrt(np.maximum(level**2 + spread, 0.0)))
-
-
-def match_planes(truth: Truth, found: MapEstimate, heard: Booleans, told: Floats) -> Integers:
-    """(W,) row of the estimated plane that stands for each wall that is heard, -1 for none; one to one."""
-    match = np.full(len(heard), -1)
-    asked = np.flatnonzero(heard)
-    if not len(asked) or not len(found.wall_offset):
-        return match
-    cost = plane_distance(truth, found, told)[asked]
-    match[asked] = match_nearest(cost, NEAR_WALL)
-    return match
 
 
 def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:

@@ -1,18 +1,19 @@
 """The truth that a run's score is measured against: motion, landmarks, walls, when each could be heard, the bounds."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.walls import Walls, build_walls
-from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.evaluate import root_mean_square
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.evaluate import Surfaces, root_mean_square
 from rislam_rt.information import posterior_bound
-from rislam_rt.model import PathKind, Paths, Scene, SchemeResult
+from rislam_rt.model import Paths, Scene, SchemeResult
+from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes
 from rislam_rt.pipeline.scores.bound import bound_problem
-from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 
 class Truth(NamedTuple):
@@ -46,17 +47,17 @@ class Truth(NamedTuple):
     relative_bound: Floats
     """(K,) the same of the position relative to the start: the start taken as the origin."""
 
+    def walls(self, shift: Floats) -> Surfaces:
+        """The walls, moved by `shift` (3,) [m]."""
+        return Surfaces(self.wall_middle + shift, self.wall_normal, self.wall_spread)
+
 
 def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> Truth:
     """The truth of one scheme in one run, under the codes that it applied."""
     settings, walls = build_settings(spec), build_walls(scene)
     audible = audible_paths(paths.with_gain(result.gain), settings)
     group = coplanar(walls)
-    middle, normal, spread = _surfaces(walls, group)
-    over = np.zeros((paths.num_paths, len(middle)), dtype=np.bool_)
-    for path in range(paths.num_paths):
-        _, _, tx, rx = paths.identity(path)
-        over[path, group[[*tx, *rx]]] = True
+    surfaces = wall_surfaces(walls, group)
     of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
     bound, relative = run_bounds(scene, paths, result, spec)
     return Truth(
@@ -65,10 +66,8 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
         scene.landmark_positions,
         scene.ris is not None,
         (audible[:, :, None] & of).any(axis=1),
-        middle,
-        normal,
-        spread,
-        (audible.astype(np.int64) @ over) > 0,
+        *surfaces,
+        audible_planes(paths, audible, group),
         paths.kind,
         paths.landmark,
         result.component_path,
@@ -98,53 +97,3 @@ def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineS
         for law in (motion, replace(motion, start_position=0.0))
     ]
     return found[0], found[1]
-
-
-def audible_paths(paths: Paths, settings: Settings) -> Booleans:
-    """(K, P) which paths are above the detection threshold, on the side that the array hears.
-
-    Wall returns count where the estimator uses them.
-    """
-    sensor = settings.sensor
-    heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
-    heard &= sensor.in_window(paths.tau)
-    if settings.radio.array.pattern == "upper":
-        heard &= paths.arrival[..., 2] >= 0.0
-    wanted = paths.landmark >= 0
-    if settings.slam.use_vt:
-        wanted |= paths.kind == PathKind.VT
-    return np.asarray(heard & wanted)
-
-
-def coplanar(walls: Walls) -> Integers:
-    """(W,) number of the true plane of each wall, in the order of the walls: what an agent can tell apart."""
-    group = np.full(len(walls), -1)
-    count = 0
-    for wall in range(len(walls)):
-        if group[wall] >= 0:
-            continue
-        cosine = walls.normal @ walls.normal[wall]
-        same = (np.abs(cosine) >= np.cos(COPLANAR_ANGLE)) & (group < 0)
-        same &= np.abs(walls.offset * np.sign(cosine) - walls.offset[wall]) <= COPLANAR_OFFSET
-        same[wall] = True
-        group[same] = count
-        count += 1
-    return group
-
-
-def _surfaces(walls: Walls, group: Integers) -> tuple[Floats, Floats, Floats]:
-    """True surface of each plane: centroid, normal and covariance of its points.
-
-    Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
-    """
-    count = int(group.max(initial=-1)) + 1
-    middle, normal, spread = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3, 3))
-    merged = replace(walls, wall_of_triangle=group[walls.wall_of_triangle])
-    for number in range(count):
-        normal[number] = walls.normal[int(np.argmax(group == number))]
-        middle[number], weight = merged.surface(number)
-        corner: Any = walls.triangles[merged.wall_of_triangle == number] - middle[number]
-        total = corner.sum(axis=1)
-        square = np.einsum("tci,tcj->tij", corner, corner) + np.einsum("ti,tj->tij", total, total)
-        spread[number] = np.einsum("t,tij->ij", weight, square) / 12.0
-    return middle, normal, spread

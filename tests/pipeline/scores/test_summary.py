@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.evaluate import match_planes, plane_distance
 from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
 from rislam_rt.pipeline.dataset import SCHEME
 from rislam_rt.pipeline.scores.bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import component_labels, landmark_track, over_budget, summarise
-from rislam_rt.pipeline.scores.walls import match_walls, surface_rms, wall_scores
+from rislam_rt.pipeline.scores.walls import coplanar, count_ghosts, wall_scores, wall_surfaces
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 PER_CYCLE = [
     name
@@ -36,7 +38,9 @@ def test_surface_rms_is_the_mean_over_the_wall(room):
     points[:, 1:] = np.random.default_rng(0).uniform([0.0, 0.0], [6.0, 3.0], (200_000, 2))
     sampled = np.sqrt(np.mean((points @ normal - 0.2) ** 2))
     # relative sampling error of a mean of squares over 200 000 points: below 0.3 %, halved by the root; 4 sigma
-    assert surface_rms(walls, number, normal, 0.2) == pytest.approx(sampled, rel=6e-3)
+    surfaces = wall_surfaces(walls, np.arange(len(walls)))
+    found = plane_distance(surfaces, normal[None], np.array([0.2]))
+    assert found[number, 0] == pytest.approx(sampled, rel=6e-3)
 
 
 def test_shifted_and_tilted_walls_are_scored(room):
@@ -54,12 +58,27 @@ def test_shifted_and_tilted_walls_are_scored(room):
     assert scores["floor"]["rmse_m"] is None
 
 
-def test_one_plane_stands_for_one_wall(room):
+def test_one_plane_stands_for_one_wall_and_a_second_one_is_a_ghost(room):
     walls = build_walls(room)
-    match = match_walls(walls, map_of_walls([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [0.3, 0.01]))
+    normal, offset = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.array([0.3, 0.01])
+    match = match_planes(wall_surfaces(walls, coplanar(walls)), normal, offset)
     number = walls.names.index("wall_x0")
     assert match[number] == 1
     assert (np.delete(match, number) == -1).all()
+    assert count_ghosts(room, map_of_walls(normal, offset)) == 1
+
+
+def test_walls_in_one_plane_are_one(room):
+    """The wall at x = 0 as two: one plane stands for both, and the second of two planes is still a ghost."""
+    number = next(n for n, r in enumerate(room.reflectors) if r.name == "wall_x0")
+    whole = room.reflectors[number]
+    halves = [replace(whole, name=f"half_{k}", faces=whole.faces[k : k + 1]) for k in (0, 1)]
+    split = replace(room, reflectors=(*room.reflectors[:number], *halves, *room.reflectors[number + 1 :]))
+    estimate = map_of_walls([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [0.01, 0.3])
+    scores = wall_scores(split, estimate)
+    assert scores["half_0"]["offset_m"] == pytest.approx(0.01)
+    assert scores["half_1"]["offset_m"] == pytest.approx(0.01)
+    assert count_ghosts(split, estimate) == 1
 
 
 def test_a_plane_stands_for_no_wall_that_no_path_meets(room):
@@ -168,3 +187,21 @@ def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles):
         position[cycles, 0] = short_result.scene.agent.position[cycles, 0] + far
         astray = replace(short_result, schemes={"random": replace(scheme, position=position)})
         assert summarise(astray)["schemes"]["random"]["diverged"] is lost
+
+
+def test_a_wall_is_audible_as_long_as_a_path_over_it_is_above_the_threshold(room, short_result):
+    paths, scheme = short_result.paths, short_result.schemes["random"]
+    settings = build_settings(PipelineSpec.model_validate(dict(short_result.config)))
+    names, heard = build_walls(room).names, {}
+    for path in range(paths.num_paths):
+        loud = settings.radio.integrated_snr(scheme.gain[:, path]) >= settings.sensor.threshold
+        loud &= paths.valid[:, path] & (paths.arrival[:, path, 2] >= 0.0)
+        _, landmark, tx, rx = paths.identity(path)
+        if landmark >= 0 or settings.slam.use_vt:
+            for wall in {*tx, *rx}:
+                heard[names[wall]] = heard.get(names[wall], False) | loud
+    step = float(np.median(np.diff(short_result.scene.agent.time)))
+    walls = summarise(short_result)["schemes"]["random"]["walls"]
+    assert heard
+    for name in names:
+        assert walls[name]["audible_s"] == pytest.approx(step * np.sum(heard.get(name, False)))

@@ -31,15 +31,15 @@ def test_returns_out_of_reach_change_nothing(monkeypatch):
     )  # fmt: skip
     given = view, seen, root @ root.T, observed, np.full(heard, 1e-3)
     near = cycle_association._associate(*given)
-    looked, within = [], cycle_association._within_reach
+    looked, within = [], cycle_association.within_reach
 
-    def look(seen, *more):
-        looked.append(within(seen, *more))
-        return np.arange(len(seen))
+    def look(*given):
+        looked.append(within(*given)[0])
+        return np.indices((size, heard)).reshape(2, -1)
 
-    monkeypatch.setattr(cycle_association, "_within_reach", look)
+    monkeypatch.setattr(cycle_association, "within_reach", look)
     every = cycle_association._associate(*given)
-    assert len(looked[0]) < 0.8 * len(groups.leader)
+    assert len(np.unique(looked[0])) < 0.8 * size
     assert len(near[0]) > heard // 2
     np.testing.assert_array_equal(near[0], every[0])
     np.testing.assert_array_equal(near[1], every[1])

@@ -34,11 +34,11 @@ def test_a_cycle_in_which_nothing_was_heard_takes_nothing_of_the_one_before():
     log = append(empty_log(), observed, 3, 0).explain(np.array([0]), form, 0.0, 0.0, np.zeros((1, 3)))
     known = {"window": window, "log": log, "landmarks": landmarks, "scene": SCENE, "heading": np.zeros(2)}
     for cycle, heard in ((3, True), (4, False)):
-        found, left = renew(SimpleNamespace(**known, cycle=cycle), np.array([1]))
+        found, left = renew(SimpleNamespace(**known, cycle=cycle), 1)
         assert len(left.row) == heard
         assert found.slots.hessian[-1].any() == heard
     # the whole window then: it is the pose before that heard it
-    found, left = renew(SimpleNamespace(**known, cycle=4), np.array([0, 1]))
+    found, left = renew(SimpleNamespace(**known, cycle=4), 0)
     np.testing.assert_array_equal(left.slot, [0])
 
 

@@ -18,9 +18,8 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
     """Gauss-Newton over the whole window."""
-    every = np.arange(context.window.num_poses)
     for _ in range(steps):
-        window, left = renew(context, every)
+        window, left = renew(context, 0)
         context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
     return context.window, left
 

@@ -162,16 +162,16 @@ def _equations(
     wide = np.concatenate(
         [digest.twist[track], pose @ digest.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
-    weight = digest.weight[track]
+    weight = digest.weight[track] * np.sqrt(trust)[..., None]
     wide *= weight[..., None]
     # the share stands in the prediction itself, the other errors are linear
-    size, heavy = wide.shape[-1], wide * trust[..., None, None]
-    flat, thick = wide.reshape(len(rows), -1, size), heavy.reshape(len(rows), -1, size)
+    size = wide.shape[-1]
+    flat = wide.reshape(len(rows), -1, size)
     told = flat[..., : error.shape[1] - 1] @ error[:, :-1, None]
     left = (digest.seen[track] - seen) * weight - told.reshape(seen.shape)
-    squared = np.vecdot(left, left)
-    normal = np.swapaxes(thick, 1, 2) @ flat
-    slope = (np.swapaxes(thick, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
+    squared = np.vecdot(left, left) / trust
+    normal = np.swapaxes(flat, 1, 2) @ flat
+    slope = (np.swapaxes(flat, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
     normal[:, common, common] += 1.0
     normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), RIDGE)[:, None]

@@ -35,15 +35,13 @@ def log_possible(
     first = (table.kind[rows] == WALL_KNOWN)[:, None]
     value, vector = np.linalg.eigh(spread[rows])
     roots = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :]
-    none = np.zeros((len(rows), 3))
-    moves = [(none, none)]
-    moves += [(roots[..., axis], none) for axis in range(3)] + [(none, known.root[wall, :, axis]) for axis in range(3)]
-    each = []
-    for by_new, by_known in moves:
-        new, old = place[rows] + by_new, known.place[wall] + by_known
-        each.append(_margins(tx, rx, np.where(first, new, old), np.where(first, old, new), digest.middle))
-    margin = each[0]
-    std = np.sqrt(sum((other - margin) ** 2 for other in each[1:]) + STEP**2)
+    # each as it is, and with either wall moved along the axes of its covariance
+    new, old = np.tile(place[rows], (7, 1, 1)), np.tile(known.place[wall], (7, 1, 1))
+    new[1:4] += np.moveaxis(roots, 2, 0)
+    old[4:] += np.moveaxis(known.root[wall], 2, 0)
+    inner, outer = (np.where(first, one, two).reshape(-1, 3) for one, two in ((new, old), (old, new)))
+    margin, *moved = _margins(np.tile(tx, (7, 1)), np.tile(rx, (7, 1)), inner, outer, digest.middle).reshape(7, -1, 3)
+    std = np.sqrt(((np.array(moved) - margin) ** 2).sum(axis=0) + STEP**2)
     found[rows] = np.log(2.0) + scipy.special.log_ndtr(margin / std).sum(axis=1)
     return found
 

@@ -42,7 +42,8 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
     rate = 1.0 / (1.0 + np.exp(-CONSTANTS.log_lost - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
     lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)
-    return float(np.clip(np.log(lost / (1.0 - lost)) - score, CONSTANTS.log_lost, -CONSTANTS.log_lost))
+    limit = -CONSTANTS.log_lost
+    return min(max(float(np.log(lost / (1.0 - lost))) - score, -limit), limit)
 
 
 def jump(view: CycleAssociation, observed: Observations) -> Floats:

@@ -119,10 +119,11 @@ def remove_features(landmarks: WindowTable, keep: Booleans) -> WindowTable:
     return landmarks._replace(**fields)
 
 
-def learn_ratio(landmarks: WindowTable, wall: int, log_ratio: float) -> WindowTable:
-    """A wall's log amplitude ratio after one more return over it."""
-    gain = landmarks.ratio_variance[wall] / (landmarks.ratio_variance[wall] + CONSTANTS.fading**2)
-    ratio, variance = landmarks.ratio.copy(), landmarks.ratio_variance.copy()
-    ratio[wall] += gain * (log_ratio - ratio[wall])
-    variance[wall] = max((1.0 - gain) * variance[wall], CONSTANTS.fading**2 / 10.0)
+def learn_ratios(landmarks: WindowTable, walls: Integers, surplus: Floats) -> WindowTable:
+    """Walls' log amplitude ratios after returns over walls (N,), louder by `surplus` (N,) than these ratios foresaw."""
+    ratio, variance, fading = landmarks.ratio.copy(), landmarks.ratio_variance.copy(), CONSTANTS.fading**2
+    for wall, more in zip(walls.tolist(), surplus.tolist(), strict=True):
+        gain = variance[wall] / (variance[wall] + fading)
+        ratio[wall] += gain * (min(max(ratio[wall] + more, -3.0), 0.1) - ratio[wall])
+        variance[wall] = max((1.0 - gain) * variance[wall], fading / 10.0)
     return landmarks._replace(ratio=ratio, ratio_variance=variance)

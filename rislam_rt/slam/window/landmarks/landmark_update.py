@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
-from rislam_rt.slam.returns import NONE, TX, Poses
-from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratio
+from rislam_rt.slam.returns import TX, Poses
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -38,10 +38,10 @@ def no_observations() -> VisibilityObservations:
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
     """Forms (R, 5) of rows as one number each, by ident."""
-    code = np.zeros(len(forms), dtype=np.int64)
-    for column in idents(landmarks, forms).T:
-        code = code * 4096 + column + 1
-    return code
+    return np.asarray((idents(landmarks, forms) + 1) @ DIGITS)
+
+
+DIGITS = 4096 ** np.arange(4, -1, -1)
 
 
 def recall(
@@ -120,24 +120,20 @@ def _existence(
     landmarks: WindowTable,
     expected: ExpectedComponents,
     groups: UnresolvedClusters,
-    hit: Floats,
-    missed: Floats,
+    hit: Booleans,
+    missed: Booleans,
     shows: Floats,
 ) -> WindowTable:
     """Every feature by the returns that only it explains: those over the fewest other features."""
     odds, hits = landmarks.log_odds.copy(), landmarks.hits.copy()
-    for where, tell in ((hit, 1.0), (missed, 0.0)):
-        rows = where.nonzero()[0]
-        forms, bounces = expected.forms[groups.leader[rows]], expected.bounces[groups.leader[rows]]
-        for form, bounce, show in zip(forms, bounces, shows[rows], strict=True):
-            names = [part for part in form if part >= 0]
-            direct = (form[0] >= 0 and bounce == 0) or (form[0] == TX and bounce == 1)
-            if tell:
-                for name in names:
-                    odds[name] = min(odds[name] + (1.0 if direct else 0.3), 12.0)
-                    hits[name] += 1
-            elif direct:
-                odds[names[0]] += np.log1p(-show)
+    forms, bounces = expected.forms[groups.leader], expected.bounces[groups.leader]
+    direct = bounces == (forms[:, 0] == TX)
+    row, part = ((forms >= 0) & hit[:, None]).nonzero()
+    np.add.at(odds, forms[row, part], np.where(direct, 1.0, 0.3)[row])
+    np.add.at(hits, forms[row, part], 1)
+    np.minimum(odds, 12.0, out=odds)
+    missed = missed & direct
+    np.add.at(odds, forms[missed].max(axis=1), np.log1p(-shows[missed]))
     return landmarks._replace(log_odds=odds, hits=hits)
 
 
@@ -149,13 +145,10 @@ def _strengths(
     """Walls' losses, and who the points are, from components that came out alone."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
     quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
-    for place in (alone & quiet).nonzero()[0]:
-        form = expected.forms[lead[place]]
-        walls = [part for part in form[1:] if part != NONE]
-        if len(walls) == 1 and (form[0] == TX or expected.log_amplitude_std[lead[place]] < 0.5):
-            surplus = observed.log_amplitude[pick[place]] - expected.log_amplitude[lead[place]]
-            ratio = min(max(float(landmarks.ratio[walls[0]] + surplus), -3.0), 0.1)
-            landmarks = learn_ratio(landmarks, int(walls[0]), ratio)
+    sure = (expected.forms[lead, 0] == TX) | (expected.log_amplitude_std[lead] < 0.5)
+    told = alone & quiet & sure & (expected.bounces[lead] == 1)
+    surplus = observed.log_amplitude[pick[told]] - expected.log_amplitude[lead[told]]
+    landmarks = learn_ratios(landmarks, expected.forms[lead[told], 1:].max(axis=1), surplus)
     return _identities(landmarks, window, expected, groups, row, pick, observed, poses, scene, code)
 
 

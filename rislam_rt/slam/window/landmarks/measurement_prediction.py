@@ -147,15 +147,21 @@ def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorM
     """(R,) averaged over a log amplitude of that spread: three points carry its mean and variance."""
     level = log_amplitude[..., None] + spread[..., None] * np.sqrt(3.0) * np.array([-1.0, 0.0, 1.0])
     snr = sensor.radio.integrated_snr(np.exp(np.minimum(level, 10.0)))
-    each = np.interp(np.sqrt(snr), *_detection_curve(sensor.threshold))
+    curve = _detection_curve(sensor.threshold)
+    place = np.minimum(np.sqrt(snr) / ROOT_STEP, len(curve) - 1.0)
+    below = np.minimum(place.astype(np.int64), len(curve) - 2)
+    each = curve[below] + (place - below) * (curve[below + 1] - curve[below])
     return np.asarray(each @ np.array([1.0, 4.0, 1.0]) / 6.0)
 
 
+ROOT_STEP = 2e-3
+"""Step of the root of the SNR in a table of the probability of detection."""
+
+
 @lru_cache(maxsize=4)
-def _detection_curve(threshold: float) -> tuple[Floats, Floats]:
-    """Roots of the SNR and the probability of detection there, close enough for 1e-6 in between."""
-    root = np.arange(0.0, np.sqrt(threshold) + 7.0, 2e-3)
-    return root, detection_probability_of(root**2, threshold)
+def _detection_curve(threshold: float) -> Floats:
+    """Probability of detection at roots of the SNR from 0 on, close enough for 1e-6 in between."""
+    return detection_probability_of(np.arange(0.0, np.sqrt(threshold) + 7.0, ROOT_STEP) ** 2, threshold)
 
 
 class UnresolvedClusters(NamedTuple):
@@ -259,8 +265,8 @@ def _taken_in(
     """
     count, level, weaker = len(strength), strength.tolist(), second.tolist()
     owner, partner = [-1] * count, np.full(count, -1)
-    begin = np.flatnonzero(np.diff(first, prepend=-1))
-    crowded, end = first[begin], np.append(begin[1:], len(first))
+    crowded = np.flatnonzero(np.bincount(first, minlength=count))
+    begin, end = (np.searchsorted(first, crowded, side) for side in ("left", "right"))
     order = np.argsort(-strength[crowded], kind="stable")
     for leader, low, high in zip(crowded[order].tolist(), begin[order].tolist(), end[order].tolist(), strict=True):
         members = [] if owner[leader] >= 0 else [member for member in weaker[low:high] if owner[member] < 0]

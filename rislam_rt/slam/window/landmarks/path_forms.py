@@ -19,14 +19,19 @@ UNKNOWN = -9
 """In a form's base: it is not known."""
 
 
-def compile_forms(forms: Integers, slot: Integers | int = 0) -> Returns:
-    """Forms (R, 5) as returns over the legs that they need; those of the Tx itself are shared within a slot (R,)."""
-    legs = np.concatenate([forms[:, :3], forms[:, [0, 3, 4]]])
+def forms_apart(forms: Integers) -> Returns:
+    """Forms (R, 5) as returns of which each has legs of its own."""
+    count = np.arange(len(forms))
+    return Returns(np.concatenate([forms[:, :3], forms[:, [0, 3, 4]]]), count, len(forms) + count)
+
+
+def compile_forms(forms: Integers) -> Returns:
+    """Forms (R, 5) as returns over the legs that they need."""
+    legs, tx, rx = forms_apart(forms)
     base = int(legs.max(initial=0)) + 3
     code = ((legs[:, 0] + 1) * base + legs[:, 1] + 1) * base + legs[:, 2] + 1
-    code += np.where(legs[:, 0] == TX, base**3 * np.tile(slot, 2 if np.ndim(slot) else 1), 0)
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
-    return Returns(legs[first], place[: len(forms)], place[len(forms) :])
+    return Returns(legs[first], place[tx], place[rx])
 
 
 def forms_of(returns: Returns) -> Integers:

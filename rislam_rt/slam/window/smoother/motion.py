@@ -65,7 +65,8 @@ def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
     one, two, both = spread[..., 0, 0], spread[..., 1, 1], spread[..., 0, 1]
     angle = 0.5 * np.arctan2(2.0 * both, one - two)
     large = 0.5 * (one + two) + np.hypot(0.5 * (one - two), both)
-    vector = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=-1)
+    cos, sin = np.cos(angle), np.sin(angle)
+    vector = np.stack([cos, -sin, sin, cos], axis=-1)
     return np.stack([large, (one * two - both**2) / large], axis=-1), vector.reshape(*one.shape, 2, 2)
 
 

@@ -29,6 +29,8 @@ def basis(steps: bytes, turns: bool) -> Floats:
     return found
 
 
+ONE, TWO = np.tril_indices(POSE)
+"""Every pair of axes once, those of the room first."""
 FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
 """The head's numbers in the order of a basis: first places, then first rates."""
 

@@ -15,7 +15,6 @@ is made again at the present estimate whenever that is worth it. The first pose 
 tells where the start was, whose error stands beside the Gaussian.
 """
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.factor import inverse, solution
-from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, POSE, TURN, basis, carry_on, latest, starts
+from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, ONE, POSE, TURN, TWO, basis, carry_on, latest, starts
 
 
 class Quadratic(NamedTuple):
@@ -54,7 +53,7 @@ class Window(NamedTuple):
     solved: Floats
     """(K - 1, A) [s^4/m^2] ...and in that of the covariance."""
     surplus: Floats
-    """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `excess`)."""
+    """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `now_with_excess`)."""
     step: Floats
     """(K - 1,) [s]."""
     prior: Quadratic
@@ -126,22 +125,33 @@ def poses(window: Window) -> Floats:
     return found
 
 
-def _present(window: Window) -> Floats:
-    """(7 + 3F, D) covariance of the present with all numbers of the window."""
-    size, whole, design = len(window.head), window.covariance, latest(window.step.tobytes(), window.turns)
-    return np.concatenate([design[:, :HEAD] @ whole[:HEAD] + design[:, HEAD:] @ whole[size:], whole[HEAD:size]])
-
-
-def _among(window: Window, rows: Floats) -> Floats:
-    """(N, 7 + 3F) covariance with the present of what has covariances (N, D) with all numbers of the window."""
+def _carried(window: Window, rows: Floats) -> Floats:
+    """(7, ...) last pose, velocity and compass offset of rows (D, ...) of all numbers of the window."""
     size, design = len(window.head), latest(window.step.tobytes(), window.turns)
-    moving = rows[:, :HEAD] @ design[:, :HEAD].T + rows[:, size:] @ design[:, HEAD:].T
-    return np.concatenate([moving, rows[:, HEAD:size]], axis=1)
+    return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
 def now(window: Window) -> tuple[Floats, Floats]:
     """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
-    return _among(window, np.append(window.head, window.accel)[None])[0], _among(window, _present(window))
+    return now_with_excess(window)[:2]
+
+
+def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
+    """`now`, and the covariance (6, 6) of position and velocity beyond what the window holds.
+
+    The estimate takes each acceleration by a precision p, that of the calmest motion mode that may be; its error hangs
+    on the variance q that the acceleration truly has. The slope `p a` of its prior then has the variance `p^2 q`, of
+    which the window's covariance C holds p: `C (p^2 q - p) C^T` over all steps is what is left out. That is the error
+    of an estimator with a wrong model (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
+    """
+    size, rows = len(window.head), _carried(window, window.covariance)
+    whole, late = rows[:6, :size], rows[:6, size:]
+    excess = whole @ window.noise @ whole.T + (late * window.surplus.ravel()) @ late.T
+    covariance = window.covariance[:size, :size].copy()
+    covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
+    covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
+    mean = np.append(_carried(window, np.append(window.head, window.accel)), window.head[HEAD:])
+    return mean, covariance, excess
 
 
 def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
@@ -153,7 +163,7 @@ def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] 
     at = change.nonzero()[0]
     own, change = len(window.head) + at, change[at, None]
     wide = window.covariance[own]
-    across = _among(window, wide)
+    across = np.concatenate([_carried(window, wide.T).T, wide[:, HEAD : len(window.head)]], axis=1)
     weight = np.linalg.solve(np.eye(len(at)) + change * wide[:, own], change * across)
     return mean - window.accel.ravel()[at] @ weight, covariance - across.T @ weight
 
@@ -176,20 +186,6 @@ def pose_covariance(window: Window, axis: int) -> Floats:
     rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
     used = along if rate else np.delete(along, 1, axis=1)
     return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
-
-
-def excess(window: Window) -> Floats:
-    """(6, 6) covariance of the present's position and velocity beyond what the window holds.
-
-    The estimate takes each acceleration by a precision p, that of the calmest motion mode that may be; its error hangs
-    on the variance q that the acceleration truly has. The slope `p a` of its prior then has the variance `p^2 q`, of
-    which the window's covariance C holds p: `C (p^2 q - p) C^T` over all steps is what is left out. That is the error
-    of an estimator with a wrong model (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
-    """
-    size, design = len(window.head), latest(window.step.tobytes(), window.turns)[:6]
-    rows = design[:, :HEAD] @ window.covariance[:HEAD] + design[:, HEAD:] @ window.covariance[size:]
-    late = rows[:, size:]
-    return np.asarray(rows[:, :size] @ window.noise @ rows[:, :size].T + (late * window.surplus.ravel()) @ late.T)
 
 
 def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:
@@ -288,8 +284,9 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     along, start, edge = _basis(window), starts(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
-    for one, two in product(range(free), repeat=2):
-        inner[:, one, :, two] = back[one] @ (slots[:, one, two, None] * along[two])
+    one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
+    both = back[one] @ (slots[:, one, two].T[..., None] * along[two])
+    inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
     inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
@@ -297,7 +294,7 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     hessian[start, size:], hessian[size:, start] = inner[:many, edge:], inner[edge:, :many]
     hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
     hessian[HEAD:size, start], hessian[HEAD:size, size:] = cross[:many].T, cross[edge:].T
-    hessian[HEAD:size, HEAD:size] = slots[:, POSE:, POSE:].sum(axis=0)
+    hessian[HEAD:size, HEAD:size] = slots.sum(axis=0)[POSE:, POSE:]
     gradient[start], gradient[size:] = pull[:many], pull[edge:]
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian

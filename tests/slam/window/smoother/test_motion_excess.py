@@ -56,7 +56,9 @@ def test_it_is_the_error_by_accelerations_that_are_livelier_than_their_prior(kee
             error = window_gaussian.now(window)[0][:6] - true
             found += (VARIANCE[axis] - 1.0 / PRECISION[axis]) * np.outer(error, error)
     # slopes of features that were added hang on nothing; rounding: condition of the window's matrix, 1e8
-    np.testing.assert_allclose(window_gaussian.excess(window), found, rtol=1e-6, atol=1e-9 * np.abs(found).max())
+    np.testing.assert_allclose(
+        window_gaussian.now_with_excess(window)[2], found, rtol=1e-6, atol=1e-9 * np.abs(found).max()
+    )
 
 
 def test_a_step_that_no_longer_counts_as_lively_leaves_what_it_did():
@@ -64,8 +66,8 @@ def test_a_step_that_no_longer_counts_as_lively_leaves_what_it_did():
     pushes = np.zeros((CYCLES - 1, 3))
     window, _ = _last(pushes, 4, leaving=False)
     calm = window._replace(surplus=np.zeros_like(window.surplus))
-    left = np.diag(window_gaussian.excess(calm))
-    assert (left > 0.1 * np.diag(window_gaussian.excess(window))).all()
+    left = np.diag(window_gaussian.now_with_excess(calm)[2])
+    assert (left > 0.1 * np.diag(window_gaussian.now_with_excess(window)[2])).all()
 
 
 def test_nothing_is_left_out_where_the_expected_precision_tells_all():
