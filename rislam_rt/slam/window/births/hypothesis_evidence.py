@@ -34,7 +34,8 @@ MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
 """Walls on the way of each kind beyond the first one of a wall return: each takes its share of the power, and so of the
 paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
 MORE_UNKNOWN = 2
-"""The same of a path of no kind here: over walls that the map lacks."""
+"""The same of a path of no kind here: over walls that the map lacks. Without wall returns most walls stay unknown:
+such paths are as frequent as points at least, and it counts none."""
 CLOSE = 0.8
 """Gap in cells below which two paths come out as one beyond doubt."""
 LOG_APART = np.log(1e-4)

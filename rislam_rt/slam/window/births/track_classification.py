@@ -166,7 +166,7 @@ def judge(
     seen = digest.mean[0]
     up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
     none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume
-    none += 2.0 * CONSTANTS.wall_ratio * MORE_UNKNOWN + beside
+    none += 2.0 * CONSTANTS.wall_ratio * (MORE_UNKNOWN if scene.use_vt else 0) + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
