@@ -24,9 +24,9 @@ from rislam_rt.arrays import Floats
 from rislam_rt.backend import prepare_backend
 from rislam_rt.model import Body
 from rislam_rt.slam import NestedConfig
-from rislam_rt.slam.nested.particles import belief
-from rislam_rt.slam.nested.particles.cloud import CloudEngine, Kernel, kernel_width
+from rislam_rt.slam.nested.particles import particle_belief
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update
 from rislam_rt.slam.returns import NONE, Returns, observe, poses_of
@@ -120,13 +120,15 @@ def walk(agents: int, points: int, landmarks: int, cycles: int) -> Floats:
     rng = np.random.default_rng(2)
     config = NestedConfig(num_agents=agents, num_points=points, adaptive=False, engine="drjit")
     engine, start = pick_engine("drjit"), np.concatenate([START, VELOCITY, [HEADING]])
-    state = belief.draw(start, 0.01 * np.array([1, 1, 0, 1, 1, 0, 0]), agents, rng=rng)
+    state = particle_belief.draw(start, 0.01 * np.array([1, 1, 0, 1, 1, 0, 0]), agents, rng=rng)
     places = rng.uniform([1.0, 1.0, 1.0], [5.0, 5.0, 3.0], (landmarks, 3))
     for row, place in enumerate(places):
         at = place + 0.03 * rng.standard_normal(3)
-        state = belief.place_landmark(state, np.tile(at, (agents, 1)), 0.03**2 * np.eye(3), config, engine, rng=rng)
+        state = particle_belief.place_landmark(
+            state, np.tile(at, (agents, 1)), 0.03**2 * np.eye(3), config, engine, rng=rng
+        )
         known = linear_sightline(state.centre[:, row] - at, np.zeros(3))
-        state, _ = belief.absorb(state, row, [Sighting(known, np.zeros(3), 0.03**2 * np.eye(3))], engine)
+        state, _ = particle_belief.absorb(state, row, [Sighting(known, np.zeros(3), 0.03**2 * np.eye(3))], engine)
     rows, anchor = np.arange(landmarks), np.zeros((landmarks, 3))
     returns = Returns(np.column_stack([rows, np.full((landmarks, 2), NONE)]), rows, rows)
     spent, noise = [], np.tile(STD**2, (landmarks, 1))
@@ -134,10 +136,10 @@ def walk(agents: int, points: int, landmarks: int, cycles: int) -> Floats:
         poses = poses_of(START + cycle * CYCLE * VELOCITY, np.asarray(HEADING), BODY)
         seen = observe(returns, places, anchor, poses).seen + STD * rng.standard_normal((landmarks, 3))
         began = time.process_time()
-        state = belief.propagate(state, CYCLE, SIGMA_A * np.array([1.0, 1.0, 0.0]), 0.0, rng=rng)
-        state = belief.remember(state, TRAIL)
+        state = particle_belief.propagate(state, CYCLE, SIGMA_A * np.array([1.0, 1.0, 0.0]), 0.0, rng=rng)
+        state = particle_belief.remember(state, TRAIL)
         state = update(state, Seen(returns, anchor, BODY, seen, noise), config, engine).belief
-        state, _ = belief.renew(state, CYCLE * np.arange(len(state.trail))[::-1], config, engine, rng=rng)
+        state, _ = particle_belief.renew(state, CYCLE * np.arange(len(state.trail))[::-1], config, engine, rng=rng)
         spent.append(time.process_time() - began)
     return np.array(spent)
 

@@ -29,7 +29,7 @@ def command(
     from rislam_rt.channel.compare import compare_channels
     from rislam_rt.cli.scenes import open_scene
     from rislam_rt.pipeline.specification.read import load_radio
-    from rislam_rt.report.tables import print_comparison
+    from rislam_rt.report.terminal_tables import print_comparison
 
     radio = load_radio(set_ or ())
     opened = open_scene(scene, radio)

@@ -29,7 +29,7 @@ def command(
     from rislam_rt.pipeline.design_at import design_at, design_table
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.pipeline.specification.read import load_radio
-    from rislam_rt.report.tables import print_designs
+    from rislam_rt.report.terminal_tables import print_designs
 
     radio = load_radio(set_ or ())
     opened = open_scene(scene, radio)

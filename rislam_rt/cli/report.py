@@ -32,7 +32,7 @@ def command(
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run
     from rislam_rt.report import write_report
-    from rislam_rt.report.tables import print_summary
+    from rislam_rt.report.terminal_tables import print_summary
 
     if gif is not None and gif.suffix.lower() != ".gif":
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")

@@ -86,7 +86,7 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
     from rislam_rt.report.page import PAGE, write_report
-    from rislam_rt.report.tables import print_summary
+    from rislam_rt.report.terminal_tables import print_summary
 
     summary = read_summary(folder, about)
     typer.echo("this run is complete already; nothing was computed")
@@ -117,7 +117,7 @@ def compute_run(
     from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
     from rislam_rt.pipeline.scores.summary import summarise
     from rislam_rt.pipeline.store.run_folder import open_run
-    from rislam_rt.report.tables import print_summary
+    from rislam_rt.report.terminal_tables import print_summary
 
     kept = 0
     try:

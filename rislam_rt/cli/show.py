@@ -39,7 +39,7 @@ def command(
     """
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.report.tables import print_scene
+    from rislam_rt.report.terminal_tables import print_scene
     from rislam_rt.scene.file_names import safe_name
 
     settings = settings_of(pipeline, set_ or ()) if html is not None else None

@@ -20,7 +20,7 @@ from rislam_rt.report.studies.claims import write_claims
 from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
 from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, write_comparison, write_fig4a
 from rislam_rt.report.swept import write_swept
-from rislam_rt.report.tables import print_validation
+from rislam_rt.report.terminal_tables import print_validation
 from rislam_rt.scene.file_names import safe_name
 from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
 from rislam_rt.studies.claims import SOURCE, judge, read_results

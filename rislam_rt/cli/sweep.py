@@ -45,7 +45,7 @@ def command(
     import os
 
     from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.report.tables import print_sweep
+    from rislam_rt.report.terminal_tables import print_sweep
     from rislam_rt.studies.pipeline_sweep import load_section, score_rows, slam_sweep
     from rislam_rt.sweeps import SweepOptions
 

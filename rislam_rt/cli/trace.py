@@ -68,7 +68,7 @@ def command(
     from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
     from rislam_rt.pipeline.specification.read import load_radio
     from rislam_rt.report.exports.deepmimo import deepmimo_files
-    from rislam_rt.report.tables import path_table, print_paths
+    from rislam_rt.report.terminal_tables import path_table, print_paths
     from rislam_rt.scene.file_names import safe_name
     from rislam_rt.scene.write import write_files
 

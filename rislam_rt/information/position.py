@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.information.outcome import Outcome
+from rislam_rt.information.bound_outcome import Outcome
 from rislam_rt.model import RadioConfig
 
 SINGULAR = 1e-13

@@ -19,8 +19,8 @@ from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
-from rislam_rt.pipeline.room.motion import draw_motion
 from rislam_rt.pipeline.room.scene_overrides import change_room
+from rislam_rt.pipeline.room.true_motion import draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds

@@ -2,9 +2,9 @@
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
 from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits, quantise
+from rislam_rt.ris.narrowband_check import delay_spread, delay_spread_warnings
 from rislam_rt.ris.rephase import panel_gain, rephase
 from rislam_rt.ris.response import far_field_response, leg_response, zero_code
-from rislam_rt.ris.validity import delay_spread, delay_spread_warnings
 
 __all__ = [
     "PanelErrors",

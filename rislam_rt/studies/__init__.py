@@ -1,7 +1,7 @@
 """Pipelines other than the main job: a file's `kind` says which; each has its specification and its run here."""
 
 from rislam_rt.studies.classifier.spec import ClassifierSpec
-from rislam_rt.studies.kinds import load_any
+from rislam_rt.studies.pipeline_kinds import load_any
 from rislam_rt.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec, StudySpec
 from rislam_rt.studies.swept.spec import SweptSpec
 from rislam_rt.studies.unseen.spec import UnseenSpec

@@ -1,6 +1,6 @@
 """Rows of a run's table: every wall that is heard has one, the others share one."""
 
-from rislam_rt.report.tables import summary_rows
+from rislam_rt.report.terminal_tables import summary_rows
 
 FOUND = {"rmse_m": 0.01, "angle_deg": 0.1, "bound_m": 0.005}
 MISSED = {"rmse_m": None, "angle_deg": None, "bound_m": 0.02}

@@ -11,7 +11,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report.studies.sweep import main_axis, scores_figure
-from rislam_rt.report.tables import print_sweep
+from rislam_rt.report.terminal_tables import print_sweep
 from rislam_rt.scene import load_scene
 from rislam_rt.studies.pipeline_sweep import load_section, run_cell, score_rows, slam_sweep, write_scores
 from rislam_rt.sweeps import build_cells, run_sweep

@@ -1,10 +1,10 @@
 """Path certificate: two channels of one room compared path by path, every difference proved from the geometry, every
 error judged by what precision explains."""
 
-from rislam_rt.channel.compare.channels import Validation, compare_channels, validate_rooms
-from rislam_rt.channel.compare.match import compare_paths
+from rislam_rt.channel.compare.both_channels import Validation, compare_channels, validate_rooms
+from rislam_rt.channel.compare.comparison_report import LimitViolation, OneSidedPath, PathReport
+from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
-from rislam_rt.channel.compare.report import LimitViolation, OneSidedPath, PathReport
 
 __all__ = [
     "LimitViolation",

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.channel.compare.explanation import SHORTEST_SEGMENT
-from rislam_rt.channel.compare.match import compare_paths
-from rislam_rt.channel.compare.report import PathReport
+from rislam_rt.channel.compare.comparison_report import PathReport
+from rislam_rt.channel.compare.path_matching import compare_paths
+from rislam_rt.channel.compare.unmatched_paths import SHORTEST_SEGMENT
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permittivity
 from rislam_rt.channel.walls import Walls, build_walls

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rislam_rt.channel.compose import compose_paths
 from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
+from rislam_rt.channel.path_composition import compose_paths
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rislam_rt.channel.compare import Validation
-from rislam_rt.report.swept.entries import table_lines
+from rislam_rt.report.markdown import table_lines
 
 _HEAD = [
     "room", "depth", "numbers", "poses", "matched", "explained", "unexplained",
@@ -18,7 +18,7 @@ Every path of every room, traced (Sionna RT) against analytic (image sources, fl
 landmark, walls in the order of travel. Written by `rislam-rt` from one run; do not edit.
 
 - *matched*: paths on both sides, counted per pose; *unexplained*: one-sided paths without a proof.
-- *explained*: one-sided paths with the proof recomputed from the geometry (`rislam_rt/channel/compare/explanation.py`);
+- *explained*: one-sided paths with the proof recomputed from the geometry (`channel/compare/unmatched_paths.py`);
   in brackets the weakest proof, the largest length or distance that any of them rests on.
 - both sides look among all wall sequences that the walls' sides allow, except where a room allows more than 2000 on the
   analytic side (mirrored beams rule out the others) or 100 000 on the traced one (cones do); the JSON says which.

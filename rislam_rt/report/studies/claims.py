@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.report.swept.entries import paragraph, table_lines
+from rislam_rt.report.markdown import paragraph, table_lines
 from rislam_rt.storage.files import csv_file, json_file, write_all
 from rislam_rt.studies.claims import Claim
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import paragraph, picture, table_lines
 from rislam_rt.slam.classify import FEATURES, network_arrays
 from rislam_rt.studies.classifier.codes import POLICIES
 from rislam_rt.studies.classifier.gather import Examples

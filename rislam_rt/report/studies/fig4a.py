@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design import GainCurves
+from rislam_rt.report.markdown import picture
 from rislam_rt.report.style import SCHEME, TRUTH, styled
-from rislam_rt.report.swept.entries import picture
 from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.fig4a import Fig4a
 from rislam_rt.studies.spec import Fig4aSpec

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.report.studies.certificate import draw_certificate
 from rislam_rt.report.studies.channel_validation import validation_page
+from rislam_rt.report.studies.channel_validation_figure import draw_certificate
 from rislam_rt.report.studies.fig4a import draw_fig4a, fig4a_csv, fig4a_page
 from rislam_rt.report.style import to_png
 from rislam_rt.storage.files import json_file, write_all

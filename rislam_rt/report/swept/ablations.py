@@ -6,17 +6,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import picture, table_lines
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.entries import (
     interval_entry,
     metres,
     metres_between,
     percent_between,
-    picture,
     ratio,
     rmse_change,
     scheme_entry,
-    table_lines,
 )
 from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
 from rislam_rt.studies.swept import AblationsSpec, Group

@@ -1,6 +1,5 @@
 """Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
 
-import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -98,21 +97,6 @@ def percent_between(entry: Mapping[str, Any], name: str) -> str:
     found = (entry[name + end] for end in ("", "_low", "_high"))
     value, low, high = (np.nan if part is None else 100 * part for part in found)
     return f"{value:.0f} % ({low:.0f} to {high:.0f})"
-
-
-def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Entries as a markdown table."""
-    return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
-
-
-def picture(figure: str | None, words: str) -> list[str]:
-    """A picture in markdown, if there is one."""
-    return [f"![{words}]({figure})", ""] if figure is not None else []
-
-
-def paragraph(text: str) -> list[str]:
-    """A paragraph of markdown in lines of readable length."""
-    return textwrap.wrap(" ".join(text.split()), 118, break_long_words=False, break_on_hyphens=False)
 
 
 def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, list[Mapping[str, Any]]]:

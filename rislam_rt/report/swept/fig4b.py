@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     NOTHING,
@@ -13,12 +14,9 @@ from rislam_rt.report.swept.entries import (
     interval_entry,
     metres,
     metres_between,
-    paragraph,
     percent_between,
-    picture,
     ratio,
     scheme_entry,
-    table_lines,
     what_limits,
 )
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import picture, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     by_scheme,
@@ -14,10 +15,8 @@ from rislam_rt.report.swept.entries import (
     metres_between,
     panel_of,
     percent_between,
-    picture,
     ratio,
     scheme_entry,
-    table_lines,
     what_limits,
 )
 from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, mark_metres

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import paragraph
 from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import ablations, fig4b, fig4c, hardware, robustness, rooms
-from rislam_rt.report.swept.entries import entries_csv, failure_notes, paragraph
+from rislam_rt.report.swept.entries import entries_csv, failure_notes
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.swept import (
     AblationsSpec,

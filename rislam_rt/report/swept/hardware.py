@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import NOTHING, paragraph, picture, ratio, table_lines
+from rislam_rt.report.swept.entries import NOTHING, ratio
 from rislam_rt.studies.swept import Group, HardwareSpec
 from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 

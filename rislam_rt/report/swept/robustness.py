@@ -5,18 +5,16 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import (
     interval_entry,
     metres,
     metres_between,
-    paragraph,
     percent_between,
-    picture,
     ratio,
     rmse_change,
     scheme_entry,
-    table_lines,
 )
 from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
 from rislam_rt.studies.swept import Group, RobustnessSpec

@@ -1,6 +1,6 @@
 """Scene files of Mitsuba 3 and Sionna RT, both ways: `read.py` meshes and materials, `scene.py` a scene, `write.py`."""
 
-from rislam_rt.scene.xml.read import read_xml, sionna_scenes
+from rislam_rt.scene.xml.read_scene import read_xml, sionna_scenes
 from rislam_rt.scene.xml.scene import new_from_xml, scene_of_xml
 from rislam_rt.scene.xml.write import write_xml
 

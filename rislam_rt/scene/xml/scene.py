@@ -21,7 +21,7 @@ from rislam_rt.scene.suggested_motion import suggest_agent
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_scene
 from rislam_rt.scene.xml.materials import material_element, read_material
-from rislam_rt.scene.xml.read import find_xml, read_xml
+from rislam_rt.scene.xml.read_scene import find_xml, read_xml
 from rislam_rt.scene.xml.write import SHADE_OF
 
 CITY_FACES = 1_000_000

@@ -15,9 +15,17 @@ from rislam_rt.model.sensor import ONE_PULSE
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
-from rislam_rt.slam.nested.particles.belief import Nested, draw, drop, effective_size, propagate, remember, renew
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
+from rislam_rt.slam.nested.particles.particle_belief import (
+    Nested,
+    draw,
+    drop,
+    effective_size,
+    propagate,
+    remember,
+    renew,
+)
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
 from rislam_rt.slam.nested.wall_return_removal import wall_returns

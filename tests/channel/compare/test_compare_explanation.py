@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.compare import Validation, compare_paths, random_poses
-from rislam_rt.channel.compare.explanation import SHORTEST_SEGMENT, DifferenceExplainer
+from rislam_rt.channel.compare.unmatched_paths import SHORTEST_SEGMENT, DifferenceExplainer
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles

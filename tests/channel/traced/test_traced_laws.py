@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.channel.compare.match import named_identity
+from rislam_rt.channel.compare.path_matching import named_identity
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.model import RadioConfig, RisPanel
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rislam_rt.channel.compare.match import named_identity
+from rislam_rt.channel.compare.path_matching import named_identity
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.model import Occluder, PathKind, RadioConfig
 from rislam_rt.scene.solids import sphere_mesh

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.channel.compare.match import named_identity
+from rislam_rt.channel.compare.path_matching import named_identity
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
 from rislam_rt.channel.traced import TracedChannel

@@ -9,7 +9,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.room.motion import CLEARANCE, draw_motion, draw_walks
+from rislam_rt.pipeline.room.true_motion import CLEARANCE, draw_motion, draw_walks
 from rislam_rt.pipeline.run import cut_scene, prepare_setup
 from rislam_rt.pipeline.specification.spec import build_settings
 

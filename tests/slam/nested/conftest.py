@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 
 
 @pytest.fixture(params=["numpy", "drjit"])

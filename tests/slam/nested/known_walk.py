@@ -7,10 +7,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body
 from rislam_rt.slam import NestedConfig, SlamConfig
-from rislam_rt.slam.nested.particles.belief import Nested, draw, gaussian, propagate, remember, renew
-from rislam_rt.slam.nested.particles.cloud import CloudEngine
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
+from rislam_rt.slam.nested.particles.particle_belief import Nested, draw, gaussian, propagate, remember, renew
 from rislam_rt.slam.nested.particles.weights import Seen, update
 from rislam_rt.slam.returns import NONE, Returns, observe, poses_of
 from rislam_rt.slam.window.landmarks.path_forms import compile_forms

@@ -5,8 +5,15 @@ import pytest
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.nested.particles.cloud import HOPELESS, Cloud, CloudEngine, Kernel, kernel_width, restoring_map
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.landmark_cloud import (
+    HOPELESS,
+    Cloud,
+    CloudEngine,
+    Kernel,
+    kernel_width,
+    restoring_map,
+)
 from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe

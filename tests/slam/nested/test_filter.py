@@ -7,10 +7,10 @@ from known_walk import BODY, CYCLE, HEADING, STD, room, walk
 from rislam_rt.arrays import Floats
 from rislam_rt.slam import NestedConfig, SlamConfig
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
-from rislam_rt.slam.nested.particles import agents, belief
-from rislam_rt.slam.nested.particles.belief import Nested
-from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles import agents, particle_belief
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
+from rislam_rt.slam.nested.particles.particle_belief import Nested
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update
@@ -40,16 +40,18 @@ def against_kalman(seed: int) -> tuple[Floats, Floats, Floats, int]:
     rng = np.random.default_rng(seed)
     std = np.repeat([START_STD, SPEED_STD, 0.0], [3, 3, 1])
     normal = agents.standardise(np.full(COUNT, 1.0 / COUNT), rng.standard_normal((COUNT, 7)))
-    state = belief.begin(std * normal)
+    state = particle_belief.begin(std * normal)
     mean = np.concatenate([np.zeros(6), LANDMARKS.ravel()])
     covariance = np.diag(np.repeat([START_STD, SPEED_STD, PRIOR, PRIOR], 3)) ** 2
     truth = mean + np.sqrt(np.diag(covariance)) * rng.standard_normal(12)
     for owner, place in enumerate(LANDMARKS):
-        state = belief.place_landmark(state, np.tile(place, (COUNT, 1)), PRIOR**2 * np.eye(3), config, engine, rng=rng)
+        state = particle_belief.place_landmark(
+            state, np.tile(place, (COUNT, 1)), PRIOR**2 * np.eye(3), config, engine, rng=rng
+        )
         known = Sighting(
             linear_sightline(state.centre[:, owner] - place, np.zeros(3)), np.zeros(3), PRIOR**2 * np.eye(3)
         )
-        state, _ = belief.absorb(state, owner, [known], engine)
+        state, _ = particle_belief.absorb(state, owner, [known], engine)
     move = np.eye(12)
     move[:3, 3:6] = CYCLE * np.eye(3)
     shake = np.concatenate([0.5 * CYCLE**2 * np.eye(3), CYCLE * np.eye(3), np.zeros((6, 3))])
@@ -61,13 +63,13 @@ def against_kalman(seed: int) -> tuple[Floats, Floats, Floats, int]:
         mean, covariance = move @ mean, move @ covariance @ move.T + WANDER**2 * shake @ shake.T
         gain = covariance @ look.T @ np.linalg.inv(look @ covariance @ look.T + NOISE**2 * np.eye(6))
         mean, covariance = mean + gain @ (seen - look @ mean), covariance - gain @ look @ covariance
-        state = belief.propagate(state, CYCLE, np.full(3, WANDER), 0.0, rng=rng)
+        state = particle_belief.propagate(state, CYCLE, np.full(3, WANDER), 0.0, rng=rng)
         for owner in range(2):
             part = linear(state, owner, seen[3 * owner : 3 * owner + 3], NOISE**2 * np.eye(3))
-            state, _ = belief.absorb(state, owner, part, engine)
-        state, done = belief.renew(state, np.zeros(1), config, engine, rng=rng)
+            state, _ = particle_belief.absorb(state, owner, part, engine)
+        state, done = particle_belief.renew(state, np.zeros(1), config, engine, rng=rng)
         renewals += done
-    found, spread = belief.gaussian(state)
+    found, spread = particle_belief.gaussian(state)
     rows = np.delete(np.arange(13), 6)
     std = np.sqrt(np.diag(covariance))
     apart = (spread[np.ix_(rows, rows)] - covariance) / np.outer(std, std)
@@ -106,11 +108,13 @@ def seen_once(weighting: str, noise: Floats) -> tuple[Nested, float]:
     config = NestedConfig(num_agents=50, num_points=64, adaptive=False, weighting=weighting)
     engine = pick_engine("numpy")
     pose = np.array([0.5, 0.7, 0.5, 0.0, 0.0, 0.0, HEADING]) + 0.02 * rng.standard_normal((50, 7))
-    state = belief.begin(pose)
+    state = particle_belief.begin(pose)
     for place in LANDMARKS:
-        state = belief.place_landmark(state, np.tile(place, (50, 1)), 0.01 * np.eye(3), config, engine, rng=rng)
+        state = particle_belief.place_landmark(
+            state, np.tile(place, (50, 1)), 0.01 * np.eye(3), config, engine, rng=rng
+        )
     returns = room(1, 0, rng=rng).returns
-    mean = belief.gaussian(state)[0]  # expected there, so that none of the two counts for less
+    mean = particle_belief.gaussian(state)[0]  # expected there, so that none of the two counts for less
     seen = observe(returns, mean[7:].reshape(-1, 3), np.zeros((2, 3)), poses_of(mean[:3], mean[6], BODY)).seen
     told = update(state, Seen(returns, np.zeros((2, 3)), BODY, seen, noise), config, engine)
     return told.belief, told.log_evidence
@@ -156,12 +160,19 @@ AGENTS = 100
 def started() -> tuple[Nested, NestedConfig, CloudEngine]:
     config = fixed(AGENTS, 32, "numpy").nested
     start, std = np.array([0.5, 0.7, 0.5, 0.07, 0.07, 0.0, HEADING]), 0.01 * np.array([1, 1, 0, 1, 1, 0, 0])
-    return belief.draw(start, std, AGENTS, rng=np.random.default_rng(1)), config, pick_engine(config.engine)
+    return particle_belief.draw(start, std, AGENTS, rng=np.random.default_rng(1)), config, pick_engine(config.engine)
 
 
 def finite(state: Nested) -> bool:
     """Whether all that the particles know is a number, and weights sum to one."""
-    parts = [state.position, state.velocity, state.trail, state.mean, state.covariance, *belief.gaussian(state)]
+    parts = [
+        state.position,
+        state.velocity,
+        state.trail,
+        state.mean,
+        state.covariance,
+        *particle_belief.gaussian(state),
+    ]
     return all(np.isfinite(part).all() for part in parts) and bool(np.isclose(state.weight.sum(), 1.0))
 
 
@@ -178,11 +189,13 @@ def test_no_measurements_change_nothing() -> None:
 def test_impossible_measurements_leave_a_belief(offset: float, engine: CloudEngine) -> None:
     state, config, _ = started()
     rng = np.random.default_rng(2)
-    state = belief.place_landmark(state, np.tile(LANDMARKS[0], (AGENTS, 1)), 0.01 * np.eye(3), config, engine, rng=rng)
+    state = particle_belief.place_landmark(
+        state, np.tile(LANDMARKS[0], (AGENTS, 1)), 0.01 * np.eye(3), config, engine, rng=rng
+    )
     for _ in range(3):
         far = linear(state, 0, np.full(3, offset), 1e-8 * np.eye(3))
-        state, _ = belief.absorb(state, 0, far, engine)
-        state, _ = belief.renew(state, np.zeros(1), config, engine, rng=rng)
+        state, _ = particle_belief.absorb(state, 0, far, engine)
+        state, _ = particle_belief.renew(state, np.zeros(1), config, engine, rng=rng)
     assert finite(state)
 
 
@@ -190,14 +203,14 @@ def test_coincident_landmarks_are_told_as_two() -> None:
     (state, config, engine), rng = started(), np.random.default_rng(3)
     for _ in range(2):
         place = np.tile(LANDMARKS[0], (AGENTS, 1))
-        state = belief.place_landmark(state, place, 1e-12 * np.eye(3), config, engine, rng=rng)
+        state = particle_belief.place_landmark(state, place, 1e-12 * np.eye(3), config, engine, rng=rng)
     truth = room(3, 0, rng=rng)
     for cycle in range(1, 4):
         seen = np.tile([3.4, 0.8, 0.2], (2, 1))
         told = update(state, Seen(truth.returns, truth.anchor, BODY, seen, np.tile(STD**2, (2, 1))), config, engine)
-        state, _ = belief.renew(told.belief, np.zeros(1), config, engine, rng=rng)
+        state, _ = particle_belief.renew(told.belief, np.zeros(1), config, engine, rng=rng)
         assert finite(state), cycle
-    assert belief.gaussian(belief.drop(state, np.array([True, False])))[0].shape == (10,)
+    assert particle_belief.gaussian(particle_belief.drop(state, np.array([True, False])))[0].shape == (10,)
 
 
 def test_a_known_map_enters_with_its_covariance() -> None:
@@ -206,7 +219,7 @@ def test_a_known_map_enters_with_its_covariance() -> None:
     root = 0.05 * np.random.default_rng(8).standard_normal((6, 6))
     covariance = root @ root.T
     known = set_prior_map(state, LANDMARKS, covariance, config, engine, rng=np.random.default_rng(7))
-    mean, spread = belief.gaussian(known)
+    mean, spread = particle_belief.gaussian(known)
     std = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose((mean[7:] - LANDMARKS.ravel()) / std, 0.0, atol=0.2)
     np.testing.assert_allclose(spread[7:, 7:] / np.outer(std, std), covariance / np.outer(std, std), atol=0.2)
@@ -216,8 +229,8 @@ def test_a_known_map_enters_with_its_covariance() -> None:
 def test_a_turn_of_the_heading_adds_up() -> None:
     state, *_ = started()
     for slot in range(10):
-        state = belief.propagate(state, CYCLE, np.full(3, 0.01), 0.003, rng=np.random.default_rng(slot))
-    mean, covariance = belief.gaussian(state)
+        state = particle_belief.propagate(state, CYCLE, np.full(3, 0.01), 0.003, rng=np.random.default_rng(slot))
+    mean, covariance = particle_belief.gaussian(state)
     assert mean[6] == pytest.approx(HEADING, abs=1e-9)
     assert covariance[6, 6] == pytest.approx(10 * 0.003**2, rel=1e-3)
 
@@ -230,13 +243,15 @@ def test_the_front_end_sees_the_particles_as_they_are(heading: str) -> None:
     for cycle in range(20):
         place = np.tile(LANDMARKS[0], (AGENTS, 1))
         if cycle == 5:
-            state = belief.place_landmark(state, place, 0.01 * np.eye(3), nested, engine, rng=rng)
+            state = particle_belief.place_landmark(state, place, 0.01 * np.eye(3), nested, engine, rng=rng)
         turn = 0.01 if heading == "estimated" else 0.0
-        state = belief.remember(belief.propagate(state, CYCLE, np.array([0.01, 0.01, 0.0]), turn, rng=rng), 40)
+        state = particle_belief.remember(
+            particle_belief.propagate(state, CYCLE, np.array([0.01, 0.01, 0.0]), turn, rng=rng), 40
+        )
         step.append(CYCLE)
         compass.append(HEADING)
     view = gaussian_view(state, np.array(step), np.array(compass), config)
-    (mean, covariance), (wanted, spread) = window_gaussian.now(view), belief.gaussian(state)
+    (mean, covariance), (wanted, spread) = window_gaussian.now(view), particle_belief.gaussian(state)
     wanted[6] -= HEADING
     np.testing.assert_allclose(mean, wanted, atol=1e-7)
     np.testing.assert_allclose(covariance, spread, atol=1e-11)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.nested.particles.cloud import kernel_width
+from rislam_rt.slam.nested.particles.landmark_cloud import kernel_width
 from rislam_rt.slam.systematic_resampling import systematic_ancestors
 
 ROOM = 10

@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.backend import prepare_backend
-from rislam_rt.slam.nested.particles.cloud import (
+from rislam_rt.slam.nested.particles.landmark_cloud import (
     DEEPEST,
     HOPELESS,
     SECOND,

@@ -3,7 +3,7 @@
 from functools import cache
 
 from rislam_rt.errors import SetupError
-from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
-from rislam_rt.slam.nested.particles.belief import Nested, absorb, mean_covariances, place_landmark, renew
-from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
+from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, mean_covariances, place_landmark, renew
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.weights import FLOOR, trusted
 from rislam_rt.slam.nested_config import NestedConfig

@@ -4,7 +4,15 @@ import numpy as np
 import numpy.typing as npt
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.nested.particles.cloud import DEEPEST, HOPELESS, Cloud, CloudSums, Kernel, combine, restoring_map
+from rislam_rt.slam.nested.particles.landmark_cloud import (
+    DEEPEST,
+    HOPELESS,
+    Cloud,
+    CloudSums,
+    Kernel,
+    combine,
+    restoring_map,
+)
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
 from rislam_rt.slam.systematic_resampling import ancestors_at
 

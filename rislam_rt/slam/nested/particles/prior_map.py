@@ -4,8 +4,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.belief import Nested, absorb, place_landmark
-from rislam_rt.slam.nested.particles.cloud import LEAST_STD, CloudEngine
+from rislam_rt.slam.nested.particles.landmark_cloud import LEAST_STD, CloudEngine
+from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, place_landmark
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested_config import NestedConfig
 

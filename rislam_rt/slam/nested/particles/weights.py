@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import Body
-from rislam_rt.slam.nested.particles.belief import Nested, absorb, gaussian, mean_covariances
-from rislam_rt.slam.nested.particles.cloud import CloudEngine
+from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
+from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
 from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import NONE, Returns, linearise, poses_of

@@ -14,8 +14,8 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
 from rislam_rt.slam.schemes.shared.loopy_association import Association
+from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
-from rislam_rt.slam.schemes.shared.scan import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
 from rislam_rt.slam.schemes.shared.sums import (
     PredictedRanges,

@@ -12,7 +12,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
-from rislam_rt.slam.schemes.shared.scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan
 from rislam_rt.slam.schemes.shared.sums import PredictedRanges, Sums, spread_of
 
 NO_VARIANCE = 1e12

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.channel.compare.match import compare_paths
+from rislam_rt.channel.compare.comparison_report import PathReport
+from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
-from rislam_rt.channel.compare.report import PathReport
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 

@@ -1,4 +1,4 @@
-"""Validity of a panel's formulas: delays over the panel that the band cannot tell apart."""
+"""Narrowband check of a panel's formulas: delays over the panel that the band cannot tell apart."""
 
 import numpy as np
 

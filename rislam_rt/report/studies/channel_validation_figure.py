@@ -1,4 +1,4 @@
-"""The path certificate as a picture: both path sets of one pose, what only one side has, and the errors."""
+"""The figure of the channel validation: both path sets of one pose, what only one side has, and the errors."""
 
 from collections.abc import Sequence
 

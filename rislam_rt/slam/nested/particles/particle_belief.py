@@ -7,8 +7,8 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.nested.particles import agents
-from rislam_rt.slam.nested.particles.cloud import HOPELESS, LEAST_STD, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
+from rislam_rt.slam.nested.particles.landmark_cloud import HOPELESS, LEAST_STD, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
 from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.window.smoother.steps import HEAD

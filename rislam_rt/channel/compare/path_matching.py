@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.channel.compare.comparison_report import OneSidedPath, PathReport
 from rislam_rt.channel.compare.error_limits import ErrorLimits, RoomPrecision, coherent_scale, with_perfect_mirrors
-from rislam_rt.channel.compare.explanation import SHORTEST_SEGMENT, DifferenceExplainer, Identity
-from rislam_rt.channel.compare.report import OneSidedPath, PathReport
+from rislam_rt.channel.compare.unmatched_paths import SHORTEST_SEGMENT, DifferenceExplainer, Identity
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
 from rislam_rt.constants import SPEED_OF_LIGHT
