@@ -36,7 +36,8 @@ def images_in(
     index = np.concatenate([3 * points[:, None] + axes, 3 * walls[:, None] + axes], axis=1)
     jacobian = np.concatenate([by_point, by_wall(point, wall, anchor)], axis=2)
     inner = covariance[index[:, :, None], index[:, None, :]]
-    return reflect(point, wall, anchor), jacobian @ inner @ np.swapaxes(jacobian, 1, 2)
+    spread = jacobian @ inner @ np.swapaxes(jacobian, 1, 2)
+    return reflect(point, wall, anchor), 0.5 * (spread + np.swapaxes(spread, 1, 2))
 
 
 def diagonal_blocks(covariance: Floats, rows: Integers) -> Floats:

@@ -38,6 +38,11 @@ def test_filter_survives(number: int) -> None:
     assert len(verdict.outcomes) >= 10
 
 
+def test_what_a_single_delay_leaves_blind_stays_solvable() -> None:
+    """One delay for all: normal equations that rounding makes singular, and images as uncertain as a room is wide."""
+    assert not hard.run_case(hard.draw_case("one delay", 4100023, "window")).faults
+
+
 def test_a_start_wrong_by_a_metre_shifts_the_map_and_nothing_else() -> None:
     """Absolute position is unobservable: the filter cannot notice, must not diverge, and stays off by what it was.
 

@@ -173,6 +173,7 @@ def _equations(
     normal = np.swapaxes(flat, 1, 2) @ flat
     slope = (np.swapaxes(flat, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
+    normal[:, np.arange(size), np.arange(size)] *= 1.0 + 1e-12  # a blind direction that rounding would make singular
     normal[:, common, common] += 1.0
     normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), RIDGE)[:, None]
     slope[:, common] -= error
