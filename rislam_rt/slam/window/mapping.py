@@ -13,6 +13,7 @@ from rislam_rt.slam.returns import AXES, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, image_ident
+from rislam_rt.slam.window.landmarks.same_wall import second_planes
 from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.steps import HEAD
@@ -46,7 +47,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         spread[:6, :6],
         position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.scene.body,
-        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks, state.shift),
+        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks, state.shift, mean[:3]),
     )
 
 
@@ -83,17 +84,23 @@ def revisit(
     return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3))
 
 
-def build_map(features: Floats, covariance: Floats, landmarks: WindowTable, shift: Floats) -> MapEstimate:
-    """Points, their images in each wall, and the walls; the start's error moves all of it together."""
+def build_map(
+    features: Floats, covariance: Floats, landmarks: WindowTable, shift: Floats, middle: Floats
+) -> MapEstimate:  # fmt: skip
+    """Points, their images in each wall, and the walls; the start's error moves all of it together.
+
+    Of planes that are one wall, seen from `middle` (3,) [m], one is shown.
+    """
     if not len(landmarks.ident):
         return empty_map()
-    covariance = covariance + shift_covariance(features, landmarks, shift)
+    wide = covariance + shift_covariance(features, landmarks, shift)
     points, walls = landmarks.points, landmarks.walls
     parent, wall = np.repeat(points, len(walls)), np.tile(walls, len(points))
-    place, spread = images_in(features, covariance, landmarks.anchor, parent, wall)
+    place, spread = images_in(features, wide, landmarks.anchor, parent, wall)
     columns = 3 * points[:, None] + np.arange(3)
-    normal, offset, std = wall_planes(features, covariance, landmarks.anchor, walls)
-    known = np.sqrt(2.0) * std[:, 0] < MAX_LEAN
+    normal, offset, std = wall_planes(features, wide, landmarks.anchor, walls)
+    known = (np.sqrt(2.0) * std[:, 0] < MAX_LEAN).nonzero()[0]
+    known = known[~second_planes(features, covariance, landmarks, walls[known], middle)]
     strength, ratio = np.exp(landmarks.log_strength[0][points]), np.exp(landmarks.ratio[wall])
     probability = np.concatenate(
         [landmarks.ris_probability[points], np.zeros((len(place), landmarks.log_ris.shape[1]))]
@@ -101,7 +108,7 @@ def build_map(features: Floats, covariance: Floats, landmarks: WindowTable, shif
     return MapEstimate(
         np.concatenate([landmarks.ident[points], image_ident(landmarks.ident[parent], landmarks.ident[wall])]),
         np.concatenate([features[points], place]),
-        np.concatenate([covariance[columns[:, :, None], columns[:, None, :]], spread]),
+        np.concatenate([wide[columns[:, :, None], columns[:, None, :]], spread]),
         np.concatenate([np.full(len(points), -1), np.searchsorted(points, parent)]),
         probability.max(axis=1),
         np.concatenate([strength, ratio]),
