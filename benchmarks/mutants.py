@@ -381,6 +381,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(run_tests(given))
     if missing := [path for path in given.tests if not (ROOT / path.partition("::")[0]).exists()]:
         parser.error(f"--tests {missing[0]}: no such file or folder; name them from the repository's root")
+    if given.workers < 1:
+        parser.error(f"--workers {given.workers}: at least 1")
     begin = time.perf_counter()
     chosen = [mutant for mutant in MUTANTS if not given.only or mutant.name in given.only]
     with ThreadPoolExecutor(given.workers) as pool:

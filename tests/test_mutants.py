@@ -56,3 +56,14 @@ def test_it_goes_on_to_the_next_file_and_stops_at_enough(tmp_path: Path) -> None
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     broken = [line.split()[1].partition("::")[0] for line in done.stdout.splitlines() if line.startswith("BROKEN ")]
     assert broken == 3 * files[:1] + 3 * files[1:2] + files[2:3]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [(["--workers", "0"], "--workers 0"), (["--tests", "no.py"], "--tests no.py")]
+)
+def test_what_cannot_be_run_is_told_in_a_line(
+    mutants: ModuleType, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    with pytest.raises(SystemExit):
+        mutants.main(words)
+    assert f"error: {said}" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """The package keeps its rules, and every rule would notice a breach."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -20,6 +21,8 @@ RULES = (
     rules.docstring_breaches,
 )
 DOC = '"""Doc."""\n'
+OF_USERS = {"mine.py"}
+"""Files of a user's own, named in examples."""
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
@@ -28,6 +31,16 @@ def test_the_package_keeps_the_rule(rule: Callable[[Source], Iterator[str]]) -> 
     assert len(sources) > 30
     breaches = [breach for source in sources for breach in rule(source)]
     assert not breaches, "\n" + "\n".join(breaches)
+
+
+def test_files_that_a_docstring_or_comment_names_are_there() -> None:
+    sources = rules.package_sources()
+    there = OF_USERS | {source.path.rpartition("/")[2] for source in sources}
+    there |= {file.name for folder in ("benchmarks", "tests", "tools") for file in (ROOT / folder).rglob("*.py")}
+    named = [(source.path, name) for source in sources for name in re.findall(r"`(?:\w+/)*(\w+\.py)`", source.text)]
+    assert len(named) > 10
+    gone = [f"{path} names {name}" for path, name in named if name not in there]
+    assert not gone, "\n".join(gone)
 
 
 @pytest.mark.parametrize(

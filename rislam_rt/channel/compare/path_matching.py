@@ -58,7 +58,7 @@ def compare_paths(
     """Compare two path sets of one scene and trajectory, cycle by cycle and identity by identity.
 
     Gains are compared as they are: give both sides the same code. Every path that one side lacks is looked up in the
-    geometry (`certificate.py`); what has no proof there counts as unexplained. Errors of those that both have are
+    geometry (`unmatched_paths.py`); what has no proof there counts as unexplained. Errors of those that both have are
     judged by limits that follow from precision and geometry (`error_limits.py`): float32 where `traced.source` says
     that the numbers are the tracer's own.
 

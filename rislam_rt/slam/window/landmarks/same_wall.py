@@ -54,5 +54,6 @@ def same_wall(place: Floats, blocks: Floats, anchor: Floats, middle: Floats) -> 
     along = gap / np.maximum(length, 1e-9)[..., None]
     std = np.sqrt(np.vecdot(along, (spread @ along[..., None])[..., 0]))
     apart = np.log(np.maximum(stdtr(tail, (length - 2.0 * CONSTANTS.depth) / np.maximum(std, 1e-9)), 1e-12))
-    two = apart - np.log(8.0 * np.pi * CONSTANTS.size * np.sqrt(square[:, None] * square))
+    area = np.sqrt(square[:, None] * square)  # none where the agent stands in one of the planes
+    two = apart - np.log(8.0 * np.pi * CONSTANTS.size * np.maximum(area, np.finfo(np.float64).tiny))
     return np.asarray(one - two + CONSTANTS.log_rare)
