@@ -76,7 +76,7 @@ def test_the_map_shows_a_cabinet_and_the_wall_behind_it():
 def test_an_agent_that_stands_in_a_plane_is_no_trouble():
     places, covariance = _walls(-0.3, 0.0)
     blocks = covariance.reshape(2, 3, 2, 3).swapaxes(1, 2)
-    foot = MIDDLE + [FAR, 0.0, 0.0]  # half way to the first image
+    foot = MIDDLE + np.array([FAR, 0.0, 0.0])  # half way to the first image
     with np.errstate(all="raise"):
         odds = same_wall(places, blocks, np.tile(MIDDLE, (2, 1)), foot)
     assert np.isfinite(odds).all()
