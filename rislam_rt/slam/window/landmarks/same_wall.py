@@ -1,7 +1,7 @@
 """Which planes of the map are one wall: a comparison of one plane with two."""
 
 import numpy as np
-from scipy.special import gammaln, stdtr
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.map_geometry import wall_planes
@@ -48,12 +48,14 @@ def same_wall(place: Floats, blocks: Floats, anchor: Floats, middle: Floats) -> 
     own = np.diagonal(wide, axis1=0, axis2=1).transpose(2, 0, 1) + CONSTANTS.lean**2 * across
     spread = own[:, None] + own - wide - np.swapaxes(wide, 2, 3) + 1e-8 * AXES
     tail, far = CONSTANTS.tail, np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
-    one = gammaln(0.5 * (tail + 3.0)) - gammaln(0.5 * tail) - 1.5 * np.log(np.pi * tail)
+    one = scipy.special.gammaln(0.5 * (tail + 3.0)) - scipy.special.gammaln(0.5 * tail) - 1.5 * np.log(np.pi * tail)
     one = one - 0.5 * np.linalg.slogdet(spread)[1] - 0.5 * (tail + 3.0) * np.log1p(far / tail)
     length = np.linalg.norm(gap, axis=2)
     along = gap / np.maximum(length, 1e-9)[..., None]
     std = np.sqrt(np.vecdot(along, (spread @ along[..., None])[..., 0]))
-    apart = np.log(np.maximum(stdtr(tail, (length - 2.0 * CONSTANTS.depth) / np.maximum(std, 1e-9)), 1e-12))
+    apart = np.log(
+        np.maximum(scipy.special.stdtr(tail, (length - 2.0 * CONSTANTS.depth) / np.maximum(std, 1e-9)), 1e-12)
+    )
     area = np.sqrt(square[:, None] * square)  # none where the agent stands in one of the planes
     two = apart - np.log(8.0 * np.pi * CONSTANTS.size * np.maximum(area, np.finfo(np.float64).tiny))
     return np.asarray(one - two + CONSTANTS.log_rare)
