@@ -163,10 +163,7 @@ def judge(
         if panel >= 0:
             evidence += np.where(IS_IMAGE[table.kind] & (table.known == panel), over.elsewhere[track, number], 0.0)
     smooth, _ = smooth_paths(digest)
-    seen = digest.mean[0]
-    up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
-    none = smooth + np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume
-    none += 2.0 * CONSTANTS.wall_ratio * (MORE_UNKNOWN if scene.use_vt else 0) + beside
+    none = smooth + log_no_kind(digest.mean[0], scene.use_vt) + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
@@ -199,6 +196,17 @@ def judge(
             )
         )  # fmt: skip
     return verdicts, shares
+
+
+def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
+    """Log prior density (T,) of paths of no kind here by what is seen of them, length [m] and two cosines (T, 3).
+
+    They seem to come from anywhere in the ball of places, half as far off as they are long. With wall returns they run
+    over walls that the map lacks; without, where most walls stay unknown, they are as frequent as points.
+    """
+    up = np.sqrt(np.maximum(1.0 - seen[:, 1] ** 2 - seen[:, 2] ** 2, 0.01))
+    share = 2.0 * CONSTANTS.wall_ratio * (MORE_UNKNOWN if use_vt else 0)
+    return np.asarray(np.log(seen[:, 0] ** 2 / (8.0 * up)) - CONSTANTS.log_volume + share)
 
 
 def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:

@@ -117,3 +117,17 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     # by itself, or as one with its edge wherever that is not hidden
     clear = 1.0 - CONSTANTS.rare
     assert np.allclose(np.exp(found[1.0]), [1.0 - CONSTANTS.shown * clear, clear])
+
+
+def test_without_wall_returns_a_path_of_no_kind_is_as_frequent_as_a_point_and_with_them_rarer_by_two_walls():
+    rng, count = np.random.default_rng(5), 200_000
+    length, radius = 2.0 * CONSTANTS.size * rng.random(count), np.sqrt(0.99 * rng.random(count))
+    angle = 2.0 * np.pi * rng.random(count)
+    seen = np.column_stack([length, radius * np.cos(angle), radius * np.sin(angle)])
+    domain = 2.0 * CONSTANTS.size * 0.99 * np.pi
+    share = {use_vt: domain * np.exp(track_classification.log_no_kind(seen, use_vt)) for use_vt in (False, True)}
+    # a point is anywhere in the ball: of its upper half, seen at elevations whose sine is a tenth or more, nine tenths
+    error = 4.0 * share[False].std() / np.sqrt(count)
+    assert abs(share[False].mean() - 0.5 * 0.9) < error
+    two_walls = np.exp(2.0 * CONSTANTS.wall_ratio) ** 2
+    assert np.allclose(share[True] / share[False], two_walls)
