@@ -21,6 +21,7 @@ from rislam_rt.slam.window.landmarks.landmark_update import learn
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
+from rislam_rt.slam.window.rim import bring_back
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
@@ -68,8 +69,10 @@ def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) ->
     seen = view.expected.seen[lead] + share * view.groups.gap[row]
     slope = view.expected.jacobian[lead]
     slope = slope + share[..., None] * (view.expected.jacobian[mate] - slope)
+    left = log.seen[at] - seen
+    bring_back(seen, log.std[at], left, slope)
     std = np.sqrt(log.std[at] ** 2 + log.extra[at])
-    return (log.seen[at] - seen) / std, slope / std[..., None]
+    return left / std, slope / std[..., None]
 
 
 def learn_cycle(

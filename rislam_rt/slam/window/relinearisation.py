@@ -7,6 +7,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import linearise_each, poses_of
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
+from rislam_rt.slam.window.rim import bring_back
 from rislam_rt.slam.window.smoother.steps import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 from rislam_rt.slam.window.state import WindowState
@@ -55,6 +56,7 @@ def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats)
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
     left = log.seen[rows] - seen
     left[:, 0] = scene.sensor.nearest(left[:, 0])
+    bring_back(seen, log.std[rows], left, slopes)
     slopes /= std[..., None]
     return Residuals(rows, slot, left / std), slopes
 

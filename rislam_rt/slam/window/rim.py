@@ -1,0 +1,34 @@
+"""Cosines at the rim of the unit disc: what a receiver reports of rays near the horizon, which noise puts beyond it.
+
+Directions lie within the unit disc, and a receiver that finds a pair of cosines beyond it brings them back to the rim.
+A ray of radius r (1 on the horizon), heard with noise of standard deviation s along it, so is reported at
+`min(1, r + n)`: at `r - s (f(a) - a Q(a))` on average, with `a = (1 - r) / s` and the normal density f and upper tail Q,
+and moves with r by `1 - Q(a)`. Half of all level returns lie on the rim, and on average they seem to arrive 0.4
+deviations above the horizon. Taken for angles, these make upright walls lean, and what leans seems to tell the height.
+"""
+
+import numpy as np
+import scipy
+
+from rislam_rt.arrays import Floats
+
+REACH = 4.0
+"""Standard deviations within the rim from which on noise puts nothing beyond it."""
+
+
+def bring_back(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
+    """Measured less predicted `left` (A, 3) and slopes (A, 3, D) of the predictions `seen` (A, 3), length and cosines,
+    in place: as they are where the receiver brings cosines of noise `std` (A, 3) back into the unit disc.
+
+    Where noise is not small against the disc, as along an axis without aperture, they stay.
+    """
+    radius, most = np.hypot(seen[:, 1], seen[:, 2]), REACH * std[:, 1:].max(axis=1)
+    near = ((radius + most > 1.0) & (most < 1.0)).nonzero()[0]
+    out = seen[near, 1:] / radius[near, None]
+    wide = np.sqrt(np.vecdot(out**2, std[near, 1:] ** 2))
+    deep = np.maximum(1.0 - radius[near], 0.0) / wide
+    beyond = scipy.special.ndtr(-deep)
+    lost = wide * (np.exp(-0.5 * deep**2) / np.sqrt(2.0 * np.pi) - deep * beyond)
+    left[near, 1:] += lost[:, None] * out
+    along = (out[:, None] @ slopes[near, 1:])[:, 0]
+    slopes[near, 1:] -= (beyond[:, None] * out)[..., None] * along[:, None]
