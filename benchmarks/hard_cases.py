@@ -91,6 +91,7 @@ def _radio(kind: str) -> RadioConfig:
 
 @cache
 def _paths(kind: str, depth: int) -> Paths:
+    """Of the whole walk; all kinds with nothing wrong with the room share them."""
     scene = _scene(kind)
     return ImageSourceChannel(scene, _radio(kind), depth).paths(scene.agent)
 
@@ -136,7 +137,7 @@ def draw_case(kind: str, seed: int, engine: str, most: int = 40) -> Case:
     panel = scene.ris.spec
     index = rng.integers(panel.levels, size=(count, panel.rows, panel.cols))
     code = RisCode(index, panel.levels)
-    paths = rephase(_stretch(_paths(kind, depth), stretch), code)
+    paths = rephase(_stretch(_paths(kind if kind in ROOMS else "", depth), stretch), code)
     # merged components are one more thing that may go wrong, and not always wanted
     receiver = ReceiverConfig(estimator="bound", merge=bool(rng.integers(2)))
     cycles = []

@@ -111,10 +111,9 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) 
     schemes, scores, paths, motion = {}, {}, None, scene.agent
     for name in about["schemes"]:
         tally = Tally(scene, about["config"]["budget"])
-        for part in read_parts(folder, name, scene, run):
-            tally.add(part)
+        parts = tally.counting(read_parts(folder, name, scene, run))
+        motion, paths, schemes[name] = subsample_scheme(parts, scene)
         scores[name] = tally.scores()
-        motion, paths, schemes[name] = subsample_scheme(folder, name, scene, run)
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // SHOWN)

@@ -4,6 +4,7 @@ The bound is a recursion over all cycles with every path that is ever heard amon
 """
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,12 @@ class Tally:
         self.overlap = _Overlap()
         self.map: Any = None
         self.panel = False
+
+    def counting(self, parts: Iterable[SlicePart]) -> Iterator[SlicePart]:
+        """The slices of a long run, each counted as it goes by: a slice's files are read once for all that asks."""
+        for part in parts:
+            self.add(part)
+            yield part
 
     def add(self, part: SlicePart) -> None:
         """Count one slice of a long run."""
