@@ -22,7 +22,7 @@ class StepInfo(NamedTuple):
     """Diagnostics of one cycle."""
 
     landmark: Integers
-    """(M,) ident that each measurement went to, of an image or of two walls a number made of both; -1 clutter or unused,
+    """(M,) ident that each measurement went to, of an image or two walls by a number of both; -1 clutter or unused,
     -2 removed as LOS or wall return."""
     ess: float
     """Effective sample size before resampling."""
