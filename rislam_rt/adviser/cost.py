@@ -11,8 +11,9 @@ from rislam_rt.model import RadioConfig, Scene
 DEPTHS = (1, 2, 3)
 START_SECONDS, PATH_SECONDS, SEQUENCE_SECONDS = 0.15, 1.5e-6, 2.5e-8
 """Processor time of the traced channel: of any trace, of a path in a cycle, and of a wall sequence that is sieved in a
-cycle. Measured on six rooms that come with the package (600 cycles, one core of a 2026 server): `benchmarks/adviser.py
---cost` sets them beside new ones. The tracer's import comes on top, and so does the filter."""
+cycle. Measured on six rooms that come with the package (600 cycles, one core of a 2026 server):
+`benchmarks/runs/adviser.py --cost` sets them beside new ones. The tracer's import comes on top, and so does the
+filter."""
 MANY_WALLS = 2000
 """More walls are not looked at here: the check is to take seconds."""
 COUNTED = 300_000

@@ -19,7 +19,7 @@ SAME = 0.7
 """Cells in the other two parameters within which a neighbour counts: one further off does not pull."""
 UNSEEN = 0.4
 """SNR of the unseen neighbours in a cell, over the threshold, for each seen neighbour in a cell: set to the wall
-returns of the paper's room, tried on everything else (`benchmarks/receiver_room.py`)."""
+returns of the paper's room, tried on everything else (`benchmarks/receiver/room.py`)."""
 
 
 def peak_bias(snr: Floats) -> Floats:

@@ -35,6 +35,8 @@ class Estimator(NamedTuple):
     """Whether it uses angles of arrival, or delays alone: what its posterior bound may count."""
     walls: Unknown = "planes"
     """How its bound holds mirror images: `planes`, tied to walls; `images`, each a point of its own."""
+    use_vt: Callable[[Settings], bool] = lambda settings: settings.slam.use_vt
+    """Whether wall returns are among the measurements of its map."""
     smoothed: Callable[..., Any] = lambda state: None
     """Positions (K, 3) of all cycles with hindsight; None of an estimator that does not look back."""
 
@@ -88,7 +90,7 @@ def own_estimator(name: str) -> Estimator:
             state = own.step(state, measurement, code, dt, heading, rng=rng)
         return state, Outcomes(np.full(len(measurement), -1))
 
-    return Estimator(init, predict, step, estimate, lambda settings: None)
+    return Estimator(init, predict, step, estimate, lambda settings: None, use_vt=lambda settings: False)
 
 
 class Estimators(dict[str, Estimator]):
@@ -104,15 +106,16 @@ ESTIMATORS = Estimators({
     ),
     "bp_slam": Estimator(
         bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
-        angles=False, walls="images",
+        angles=False, walls="images", use_vt=lambda settings: settings.bp_slam.planes,
     ),
     "bp_slam_aoa": Estimator(
         bp_slam_aoa.init, bp_slam_aoa.predict, bp_slam_aoa.step, bp_slam_aoa.estimate,
-        lambda settings: settings.bp_slam_aoa,
+        lambda settings: settings.bp_slam_aoa, use_vt=lambda settings: settings.bp_slam_aoa.use_vt,
     ),
     "channel_slam": Estimator(
         channel_slam.init, channel_slam.predict, channel_slam.step, channel_slam.estimate,
         lambda settings: settings.channel_slam, angles=False, walls="images",
+        use_vt=lambda settings: settings.channel_slam.planes,
     ),
 })  # fmt: skip
 """All built-in estimators by name, and those of one's own when they are asked for."""

@@ -78,14 +78,12 @@ def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
 def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Floats) -> tuple[Floats, Floats]:
     """One cycle's amplitudes for P points: new grids (P, G), and new log odds of panel against scatterer.
 
-    The odds, and what `panel` says of them, are (P,), or (P, Q) for Q panels.
+    Grids are log probabilities. The odds, and what `panel` says of them, are (P,), or (P, Q) for Q panels.
     """
-    before = np.logaddexp.reduce(log_grid, axis=1)
     grid = log_grid + scatterer
-    after = np.logaddexp.reduce(grid, axis=1)
-    surplus = (after - before).reshape(len(panel), *np.ones(panel.ndim - 1, dtype=np.int64))
-    ratio = np.clip(panel - surplus, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
-    return grid - after[:, None], log_ris + ratio
+    told = np.logaddexp.reduce(grid, axis=1)
+    surplus = panel - (told if panel.ndim == 1 else told[:, None])
+    return grid - told[:, None], log_ris + surplus.clip(-CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
 
 
 def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:

@@ -22,7 +22,8 @@ class StepInfo(NamedTuple):
     """Diagnostics of one cycle."""
 
     landmark: Integers
-    """(M,) ident that each measurement went to; -1 clutter or unused, -2 removed as LOS or wall return."""
+    """(M,) ident that each measurement went to, of an image or two walls by a number of both; -1 clutter or unused,
+    -2 removed as LOS or wall return."""
     ess: float
     """Effective sample size before resampling."""
     resampled: bool

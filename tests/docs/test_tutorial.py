@@ -63,7 +63,11 @@ def test_the_page_knows_every_reason_of_the_report() -> None:
 @pytest.mark.slow
 def test_the_tutorial_runs_from_a_wheel_in_an_empty_folder() -> None:
     done = subprocess.run(
-        [sys.executable, ROOT / "benchmarks" / "installed.py"], capture_output=True, text=True, timeout=290, check=False
+        [sys.executable, ROOT / "benchmarks" / "runs" / "installed.py"],
+        capture_output=True,
+        text=True,
+        timeout=290,
+        check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "  in all" in done.stdout

@@ -75,6 +75,11 @@ class Source:
     def tree(self) -> ast.Module:
         return ast.parse(self.text)
 
+    @cached_property
+    def nodes(self) -> list[ast.AST]:
+        """All of the tree's, which most rules look through."""
+        return list(ast.walk(self.tree))
+
     @property
     def folder(self) -> str:
         """First part of the path without suffix: the floor's member that it belongs to."""
@@ -92,7 +97,7 @@ def package_sources() -> list[Source]:
 def imported_modules(source: Source) -> Iterator[tuple[int, str]]:
     """Line and full dotted name of everything a file imports, relative and dynamic imports (by literal) included."""
     parts = [PACKAGE, *source.path.removesuffix(".py").split("/")]
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -141,7 +146,7 @@ def foreign_breaches(source: Source) -> Iterator[str]:
 
 def random_breaches(source: Source) -> Iterator[str]:
     """Numpy's global random state, generators without a seed, `rng` that is optional or positional."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.Attribute) and node.attr not in RANDOM_TYPES and _is_numpy_random(node.value):
             yield f"{source.path}:{node.lineno}: np.random.{node.attr} uses the global state"
         if isinstance(node, ast.Call) and _called(node) == "default_rng" and not node.args and not node.keywords:
@@ -157,7 +162,7 @@ def random_breaches(source: Source) -> Iterator[str]:
 
 def pickle_breaches(source: Source) -> Iterator[str]:
     """Reading that could execute what it reads."""
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.keyword) and node.arg == "allow_pickle" and ast.unparse(node.value) != "False":
             yield f"{source.path}:{node.value.lineno}: allow_pickle must be False"
         if isinstance(node, ast.Call) and _name(node.func) in ("eval", "exec"):
@@ -176,7 +181,7 @@ def size_breaches(source: Source) -> Iterator[str]:
     lines = source.text.count("\n")
     if lines > MAX_FILE_LINES:
         yield f"{source.path}: {lines} lines"
-    for node in ast.walk(source.tree):
+    for node in source.nodes:
         if isinstance(node, ast.FunctionDef):
             body = node.body[1:] if ast.get_docstring(node) is not None else node.body
             length = (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
@@ -224,8 +229,9 @@ def docstring_breaches(source: Source) -> Iterator[str]:
 
 def registry_breaches(path: str, text: str) -> Iterator[str]:
     """Addresses of package registries."""
-    for number, line in enumerate(text.splitlines(), start=1):
-        for host in REGISTRIES:
+    hosts = [host for host in REGISTRIES if host in text]
+    for number, line in enumerate(text.splitlines() if hosts else (), start=1):
+        for host in hosts:
             if re.search(rf"(?<![\w-]){re.escape(host)}\b", line):
                 yield f"{path}:{number}: names {host}"
 

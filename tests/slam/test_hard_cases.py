@@ -14,7 +14,7 @@ SAMPLE = 40
 
 def _load() -> ModuleType:
     """The benchmark that draws them; it is no part of a package."""
-    file = Path(__file__).parents[2] / "benchmarks" / "hard_cases.py"
+    file = Path(__file__).parents[2] / "benchmarks" / "filter" / "hard_cases.py"
     spec = importlib.util.spec_from_file_location("hard_cases", file)
     assert spec is not None
     assert spec.loader is not None

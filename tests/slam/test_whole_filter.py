@@ -86,14 +86,14 @@ def go(heard: Heard, measurements: list[Measurement] | None = None, cycles: int 
 @pytest.fixture(scope="module")
 def clear() -> tuple[Heard, Course]:
     """No clutter, nothing merges, 20 dB less noise."""
-    heard = hear(ReceiverConfig(clutter_rate=0.0, merge=False), 3.52e-13, 1, 1)
+    heard = hear(ReceiverConfig("bound", clutter_rate=0.0, merge=False), 3.52e-13, 1, 1)
     return heard, go(heard)
 
 
 @pytest.fixture(scope="module")
 def normal() -> tuple[Heard, Course]:
     """As a run has it, double bounces and all."""
-    heard = hear(ReceiverConfig(), 3.52e-12, 2, 2)
+    heard = hear(ReceiverConfig("bound"), 3.52e-12, 2, 2)
     return heard, go(heard)
 
 

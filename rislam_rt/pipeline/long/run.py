@@ -23,8 +23,9 @@ from rislam_rt.pipeline.long.slices import (
 )
 from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
+from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.store.exports import record_files
 from rislam_rt.pipeline.store.run_folder import (
     DONE,
@@ -109,12 +110,12 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) 
         A file is missing, damaged or changed.
     """
     schemes, scores, paths, motion = {}, {}, None, scene.agent
+    settings = build_settings(PipelineSpec.model_validate(dict(about["config"])))
     for name in about["schemes"]:
-        tally = Tally(scene, about["config"]["budget"])
-        for part in read_parts(folder, name, scene, run):
-            tally.add(part)
+        tally = Tally(scene, about["config"]["budget"], use_vt=uses_wall_returns(name, settings))
+        parts = tally.counting(read_parts(folder, name, scene, run))
+        motion, paths, schemes[name] = subsample_scheme(parts, scene)
         scores[name] = tally.scores()
-        motion, paths, schemes[name] = subsample_scheme(folder, name, scene, run)
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // SHOWN)

@@ -5,7 +5,7 @@ and the panel go along, the paths and the cycles' records do not. Noise is drawn
 law is that of a run in one piece, and its draws are not.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -127,11 +127,11 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
         yield SlicePart(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
 
 
-def subsample_scheme(folder: Path, name: str, scene: Scene, run: str) -> tuple[Trajectory, Paths, SchemeResult]:
-    """Every n-th cycle of a scheme, at most `SHOWN` in all, for figures."""
+def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
+    """Every n-th cycle of a scheme whose slices are `parts`, at most `SHOWN` in all, for figures."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
-    for part in read_parts(folder, name, scene, run):
+    for part in parts:
         rows = np.arange((-at) % stride, len(part.motion), stride)
         at += len(part.motion)
         if len(rows):

@@ -4,6 +4,7 @@ The bound is a recursion over all cycles with every path that is ever heard amon
 """
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,13 @@ from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import association_fractions, position_errors
 from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
+from rislam_rt.pipeline.scores.component_sources import path_sources
 from rislam_rt.pipeline.scores.summary import (
     has_diverged,
     landmark_track,
     map_score,
     nees_per_dof,
     over_budget,
-    path_sources,
 )
 from rislam_rt.pipeline.scores.walls import count_ghosts, wall_scores
 
@@ -26,10 +27,10 @@ CLUTTER = None
 
 
 class Tally:
-    """Running sums of one scheme."""
+    """Running sums of one scheme, whose estimator has wall returns in its map or not (`use_vt`)."""
 
-    def __init__(self, scene: Scene, budget: Any) -> None:
-        self.scene, self.budget = scene, budget
+    def __init__(self, scene: Scene, budget: Any, *, use_vt: bool) -> None:
+        self.scene, self.budget, self.use_vt = scene, budget, use_vt
         self.cycles, self.square, self.largest, self.final = 0, 0.0, 0.0, 0.0
         self.diverged = False
         self.nees: list[float] | None = [0.0]
@@ -42,6 +43,12 @@ class Tally:
         self.overlap = _Overlap()
         self.map: Any = None
         self.panel = False
+
+    def counting(self, parts: Iterable[SlicePart]) -> Iterator[SlicePart]:
+        """The slices of a long run, each counted as it goes by: a slice's files are read once for all that asks."""
+        for part in parts:
+            self.add(part)
+            yield part
 
     def add(self, part: SlicePart) -> None:
         """Count one slice of a long run."""
@@ -119,7 +126,7 @@ class Tally:
         scheme = part.scheme
         shown = scheme.component_path != NOTHING
         label = np.maximum(scheme.component_landmark[shown], -1)
-        sources = [*path_sources(part.paths), CLUTTER]
+        sources = [*path_sources(part.paths, use_vt=self.use_vt), CLUTTER]
         met, times = np.unique(np.stack([label, scheme.component_path[shown]]), axis=1, return_counts=True)
         for (who, path), count in zip(met.T.tolist(), times.tolist(), strict=True):
             self.pairs[who, sources[path]] += count

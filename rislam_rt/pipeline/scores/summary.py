@@ -16,10 +16,11 @@ from rislam_rt.evaluate import (
     rmse,
     root_mean_square,
 )
-from rislam_rt.model import NOTHING, STEPS, MapEstimate, PathKind, Paths, Scene, SchemeResult, SlamResult
+from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound
+from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
 from rislam_rt.pipeline.scores.walls import count_ghosts, seconds_audible, wall_scores
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
@@ -29,10 +30,6 @@ FAR_OVER = 5.0
 """Error over bound that chance does not explain: five standard deviations even if all error is along one line."""
 NEAR_LANDMARK = 1.0
 """Distance [m] from a true landmark beyond which an estimate is not held for it."""
-
-
-Source = tuple[int, int]
-"""Landmark of an image, and its wall next to the landmark; -1 for the landmark itself."""
 
 
 class LandmarkTrack(NamedTuple):
@@ -67,9 +64,10 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     error, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
     squares = nees_per_dof(scheme, truth)
     nees = None if squares is None else float(np.mean(squares))
-    score = association_score(*component_labels(result.paths, scheme))
     largest = float(errors.max())
     settings = build_settings(PipelineSpec.model_validate(dict(result.config)))
+    use_vt = uses_wall_returns(scheme.scheme, settings)
+    score = association_score(*component_labels(result.paths, scheme, use_vt=use_vt))
     audible = seconds_audible(scene, result.paths, settings, scheme.gain)
     walls = wall_scores(scene, scheme.map, least, audible)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
@@ -169,28 +167,3 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
             entry["cycles_identified"] = int(np.sum(scheme.named(panel)[cycles, column[cycles]]))
         scores[name] = entry
     return scores
-
-
-def component_labels(paths: Paths, scheme: SchemeResult) -> tuple[Integers, Integers]:
-    """What the agent took each component for, and which landmark or image it truly was; -1 for none, in time order.
-
-    As in the map, a path with walls belongs to the image in the wall next to the landmark, on the Rx leg if it has one.
-    """
-    shown = scheme.component_path != NOTHING
-    label = np.maximum(scheme.component_landmark[shown], -1)
-    numbers: dict[Source, int] = {}
-    identity = np.full(paths.num_paths + 1, -1)
-    for path, source in enumerate(path_sources(paths)):
-        if source is not None:
-            identity[path] = numbers.setdefault(source, len(numbers))
-    return label, identity[scheme.component_path[shown]]
-
-
-def path_sources(paths: Paths) -> list[Source | None]:
-    """(P,) landmark and wall of the image that each path comes from; None for LOS and wall returns."""
-    found: list[Source | None] = []
-    for path in range(paths.num_paths):
-        kind, landmark, tx, rx = paths.identity(path)
-        wall = rx[0] if rx else tx[-1] if tx else -1
-        found.append(None if kind in (PathKind.LOS, PathKind.VT) else (landmark, wall))
-    return found

@@ -208,13 +208,15 @@ def _follow(
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Ident (A,) of what each of the forms (A, 5) came over first: a point, its image in a wall, a wall."""
+    """Ident (A,) of what threw each form (A, 5): a point, its image in a wall, a wall, two walls in either order."""
     if not len(forms):
         return np.zeros(0, dtype=np.int64)
-    wall = np.where(forms[:, 3] >= 0, forms[:, 3], forms[:, 1])
-    own = landmarks.ident[np.where(forms[:, 0] >= 0, forms[:, 0], wall)]
-    image = (forms[:, 0] >= 0) & (wall >= 0)
-    return np.where(image, image_ident(own, landmarks.ident[wall]), own)
+    point, first, second = forms[:, 0] >= 0, forms[:, 3], forms[:, 4]
+    wall = np.where(first >= 0, first, forms[:, 1])
+    own, beside = landmarks.ident[np.where(point, forms[:, 0], wall)], landmarks.ident[np.where(point, wall, second)]
+    pair = ~point & (second >= 0)
+    named = image_ident(np.where(pair, np.minimum(own, beside), own), np.where(pair, np.maximum(own, beside), beside))
+    return np.where(pair | (point & (wall >= 0)), named, own)
 
 
 def grow(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:

@@ -35,7 +35,7 @@ def short_slices(monkeypatch):
 def spec():
     settings = [
         "channel=image_source",
-        "cycles=90",
+        "cycles=60",
         "depth=1",
         'schemes=["random", "no_ris"]',
         "receiver.estimator=bound",
@@ -56,7 +56,7 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def done(room, spec, tmp_path_factory):
-    """A completed run of four slices, the last of them short; nobody changes it."""
+    """A completed run of three slices, the last of them short; nobody changes it."""
     folder = tmp_path_factory.mktemp("done") / "run"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(slices, "SLICE", 25)
@@ -66,7 +66,7 @@ def done(room, spec, tmp_path_factory):
 def test_scores_counted_slice_by_slice_are_those_of_the_whole(room, spec, short_slices, done):
     found, folder = done
     assert is_long(room, spec)
-    assert sorted(p.name for p in (folder / "slices").iterdir()) == [f"{n:05d}" for n in range(4)]
+    assert sorted(p.name for p in (folder / "slices").iterdir()) == [f"{n:05d}" for n in range(3)]
     run = run_identity(spec, room).digest
     for name, scores in found.summary["schemes"].items():
         parts = list(slices.read_parts(folder, name, _cut(room), run))
@@ -98,7 +98,7 @@ def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
 def _cut(room):
     from rislam_rt.pipeline.run import cut_scene
 
-    return cut_scene(room, 90)
+    return cut_scene(room, 60)
 
 
 def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, short_slices, done, tmp_path):
@@ -133,7 +133,7 @@ def test_it_can_be_read_again_and_a_changed_slice_is_told(short_slices, done, tm
     assert again.summary["schemes"]["random"]["rmse_m"] == pytest.approx(
         found.summary["schemes"]["random"]["rmse_m"], rel=1e-6
     )  # the room's path file holds nanometres
-    assert len(again.shown.schemes["random"].position) == 90
+    assert len(again.shown.schemes["random"].position) == 60
     file = folder / "slices" / "00002" / "scheme_random.nc"
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1

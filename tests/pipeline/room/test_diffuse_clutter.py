@@ -15,7 +15,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.shipped import find_pipeline
 
 PIPELINE = find_pipeline("trace_then_slam")
-ROUGH = ["cycles=6", "depth=1", "schemes=['optimized']", "room.scattering=0.3", "extras.diffuse=true"]
+ROUGH = ["cycles=4", "depth=1", "schemes=['optimized']", "room.scattering=0.3", "extras.diffuse=true"]
 
 
 @pytest.fixture(scope="module")
@@ -52,11 +52,11 @@ def test_rough_walls_reflect_less(setup):
 
 def test_slices_hear_it_too(setup, tmp_path, monkeypatch):
     setup, spec = setup
-    monkeypatch.setattr(slices, "SLICE", 3)
+    monkeypatch.setattr(slices, "SLICE", 2)
     tell = lambda *_: None  # noqa: E731
     slices.run_slices("optimized", setup.scene, setup.body, spec, setup.seeds, tmp_path, "0" * 64, tell)
     parts = list(slices.read_parts(tmp_path, "optimized", setup.scene, "0" * 64))
-    assert [len(part.motion) for part in parts] == [3, 3]
+    assert [len(part.motion) for part in parts] == [2, 2]
     assert all((part.scheme.component_path == -1).sum(axis=1).min() > 5 for part in parts)
 
 

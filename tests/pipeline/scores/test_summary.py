@@ -9,17 +9,10 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import match_planes, plane_distance
 from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
-from rislam_rt.pipeline.dataset import SCHEME
 from rislam_rt.pipeline.scores.bound import SchemeBound
-from rislam_rt.pipeline.scores.summary import component_labels, landmark_track, over_budget, summarise
+from rislam_rt.pipeline.scores.summary import landmark_track, over_budget, summarise
 from rislam_rt.pipeline.scores.walls import coplanar, count_ghosts, wall_scores, wall_surfaces
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
-
-PER_CYCLE = [
-    name
-    for name, (dims, _, _) in SCHEME.items()
-    if dims[0] == "time" and not name.startswith("component") and name != "panel"  # of several panels alone
-]
 
 
 def map_of_walls(normal, offset):
@@ -107,30 +100,6 @@ def test_images_never_stand_for_landmarks(room, short_result):
     assert (track.column[:, 0] == 0).all()
     np.testing.assert_allclose(track.error[:, 0], 0.1)
     assert (track.column[:, 1] == -1).all()
-
-
-def test_true_identity_joins_reciprocals_and_leaves_wall_returns_out(short_result):
-    paths = short_result.paths
-    scheme = short_result.schemes["random"]
-    everything = np.arange(paths.num_paths)[None]
-    record = replace(
-        scheme,
-        **{name: getattr(scheme, name)[:1] for name in PER_CYCLE},
-        component_path=everything, component_landmark=np.full_like(everything, 5), outcome=("ok",),
-        info={name: value[:1] for name, value in scheme.info.items()}, smoothed=None,
-    )  # fmt: skip
-    label, identity = component_labels(paths, record)
-    assert (label == 5).all()
-    for path, number in enumerate(identity):
-        kind, landmark, tx, rx = paths.identity(path)
-        if landmark < 0:
-            assert number == -1
-            continue
-        same = [(kind, landmark, rx[:1], ()), (kind, landmark, (), rx[:1])] if rx else [(kind, landmark, (), tx[-1:])]
-        assert all(identity[q] == number for q in range(paths.num_paths) if paths.identity(q) in same)
-    assert (
-        len(np.unique(identity[identity >= 0])) == 2 * (1 + 6) - 1
-    )  # two landmarks with their images; none of the panel in its host
 
 
 def test_summary_is_plain_and_complete(short_result):

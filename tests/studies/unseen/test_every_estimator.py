@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import Measurement
+from rislam_rt.pipeline.cycle import Receptions
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
-from rislam_rt.pipeline.run import run_scheme
+from rislam_rt.pipeline.run import RunSetup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.scene.random_rooms import RandomRoom
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
 from rislam_rt.studies.unseen.cell import find_setup, scheme_here, trace_key
 
@@ -114,11 +116,18 @@ def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
         "nested": {"engine": "numpy", "num_agents": 100, "num_points": 200},
     }  # fmt: skip
     spec = PipelineSpec.model_validate(content)
-    room, setup = find_setup(case.room, trace_key(spec))
+    room, setup = _prepared(case.room, trace_key(spec))
     name = scheme_here(case.scheme, room)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[name].estimator])
     result = run_scheme(name, setup, spec, lambda *_: None, recorder.estimator)
     return score_run(build_truth(setup.scene, setup.paths, result, spec), recorder.inputs, recorder.answers)
+
+
+@cache
+def _prepared(room: int, key: str) -> tuple[RandomRoom, RunSetup]:
+    """A room that all cases in it share, with what was heard in it: receiver and noise are the same for all of them."""
+    drawn, setup = find_setup(room, key)
+    return drawn, setup._replace(receptions=Receptions())
 
 
 def deaf(estimator: Estimator) -> Estimator:

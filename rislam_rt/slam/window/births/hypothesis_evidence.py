@@ -198,6 +198,10 @@ def log_opacity(
     return total + np.where(wall, CONSTANTS.log_rare, 0.0) * small
 
 
+LEVEL_RISE, UPRIGHT_RISE = 0.9, 0.35
+"""Share of its height in the way to a wall's image above which it may be level, and below which it may be upright."""
+
+
 def direction_beliefs(
     place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> DirectionPriors:
@@ -207,27 +211,41 @@ def direction_beliefs(
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
-    if rise > 0.9:
+    if rise > LEVEL_RISE:
         axes += [AXES[0], AXES[1]]
         log_odds += 2 * [CONSTANTS.log_upright + np.log(reach)]
-    elif rise < 0.35:
+    elif rise < UPRIGHT_RISE:
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        others = known.place[landmarks.walls] - digest.middle
-        if len(others):
-            flat = np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)
-            off = np.arctan2(others[flat, 1], others[flat, 0]) - np.arctan2(span[1], span[0])
-            off = (off + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
-            if len(off) and np.min(np.abs(off)) < 0.15:
-                aim = np.arctan2(span[1], span[0]) + off[np.argmin(np.abs(off))]
-                axes.append(np.array([-np.sin(aim), np.cos(aim), 0.0]))
-                log_odds.append(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
+        rows, along = _square_axes(span[None], known.place[landmarks.walls] - digest.middle)
+        axes += list(along)
+        log_odds += [float(_log_square(np.asarray(reach)))] * len(rows)
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
     return DirectionPriors(
         np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip
+
+
+def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
+    """Those of N upright walls with images at `span` (N, 3) that nearly are at right angles to an upright one of
+    `others` (W, 3), or alike: rows (A,), and the axes (A, 3) along which their images do not lie if they are."""
+    flat = others[np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)]
+    if not len(flat):
+        return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    own = np.arctan2(span[:, 1], span[:, 0])
+    off = np.arctan2(flat[:, 1], flat[:, 0]) - own[:, None]
+    off = (off + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
+    off = off[np.arange(len(own)), np.argmin(np.abs(off), axis=1)]
+    rows = (np.abs(off) < 0.15).nonzero()[0]
+    aim = own[rows] + off[rows]
+    return rows, np.stack([-np.sin(aim), np.cos(aim), np.zeros(len(aim))], axis=1)
+
+
+def _log_square(reach: Floats) -> Floats:
+    """Log odds that a wall so far off is at right angles to another, times the width of the prior if it is not."""
+    return np.asarray(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
 
 
 class HeldWalls(NamedTuple):
@@ -251,37 +269,45 @@ def log_upright(
     Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
     along each axis: rivals that are rarer let ghosts of points through.
     """
-    trials, tx = table.trials, digest.mean[1]
-    held = HeldWalls(
-        np.zeros(len(fits.cost)), fits.place.copy(), fits.covariance.copy(), np.full(len(fits.cost), -np.inf)
-    )
-    for row in ((trials.is_wall | trials.is_pair) & np.isfinite(fits.cost)).nonzero()[0]:
-        place, turn = fits.place[row], trials.turn[row, 0]
-        if trials.is_pair[row]:  # what two walls do together goes across them both
-            if turn[2, 2] < 0.0:
-                continue  # an edge under the ceiling: any elevation
-            at = tx[trials.track[row]]
-            place = digest.middle + turn @ at + place - at
-        beliefs, span = direction_beliefs(place, digest, known, landmarks), place - digest.middle
-        if not len(beliefs.axis):  # it slants
-            held.gain[row] = -np.logaddexp(0.0, CONSTANTS.log_upright) if use_vt else 0.0
-            continue
-        level, spread = beliefs.axis[0, 2] == 0.0, fits.covariance[row]
-        across = not level and trials.is_pair[row] and turn[0, 0] < 0.0
-        axis, share = (beliefs.axis[:1], beliefs.log_odds[:1]) if across else (beliefs.axis, beliefs.log_odds)
-        off, inside = axis @ span, axis @ spread @ axis.T + beliefs.std[0] ** 2 * AXES[: len(axis), : len(axis)]
-        # odds hold the width: right against a density of one over it
-        if level and use_vt:  # along both axes at once
-            log_right = -0.5 * off @ np.linalg.solve(inside, off) - 0.5 * np.linalg.slogdet(2.0 * np.pi * inside)[1]
-            each = np.array([CONSTANTS.log_upright + 2.0 * np.log(np.linalg.norm(span)) + log_right])
+    trials, pair, spread = table.trials, table.trials.is_pair, fits.covariance
+    held = HeldWalls(np.zeros(len(pair)), fits.place.copy(), spread.copy(), np.full(len(pair), -np.inf))
+    turn, tx = trials.turn[:, 0], digest.mean[1][trials.track]
+    # what two walls do together goes across them both; an edge under the ceiling: any elevation
+    mirror = (turn @ tx[..., None])[..., 0] - tx
+    span = fits.place - digest.middle + np.where(pair[:, None], digest.middle + mirror, 0.0)
+    asked = np.isfinite(fits.cost) & np.where(pair, turn[:, 2, 2] >= 0.0, trials.is_wall)
+    reach = np.maximum(np.sqrt(np.vecdot(span, span)), 0.1)
+    rise, width = np.abs(span[:, 2]) / reach, np.log(reach)
+    noise, sure = (CONSTANTS.lean * reach) ** 2, float(np.logaddexp(0.0, CONSTANTS.log_upright))
+    level, upright = asked & (rise > LEVEL_RISE), asked & (rise < UPRIGHT_RISE)
+    if use_vt:
+        held.gain[asked & ~level & ~upright] = -sure
+    # odds hold the width: right against a density of one over it
+    for rows, told in ((level.nonzero()[0], slice(2)), (upright.nonzero()[0], slice(2, 3))):
+        off, across = span[rows, told], spread[rows, told]
+        inside = across[..., told] + noise[rows, None, None] * AXES[told, told]
+        if use_vt:  # along both axes at once
+            weight = np.linalg.solve(inside, off[..., None])[..., 0]
+            each = CONSTANTS.log_upright + off.shape[1] * width[rows] - 0.5 * np.vecdot(off, weight)
+            each = (each - 0.5 * np.linalg.slogdet(2.0 * np.pi * inside)[1])[:, None]
         else:
-            variance = np.diag(inside)
-            each = share - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
-        held.gain[row] = (np.logaddexp(0.0, each) - np.logaddexp(0.0, CONSTANTS.log_upright)).sum()
-        if not trials.is_pair[row]:
-            told = slice(None) if level else slice(1)
-            pull = np.linalg.solve(inside[told, told], axis[told] @ spread).T
-            held.place[row] -= pull @ off[told]
-            held.covariance[row] -= pull @ axis[told] @ spread
-            held.log_odds[row] = each[0]
+            each = _log_right(CONSTANTS.log_upright + width[rows, None], off, np.diagonal(inside, axis1=1, axis2=2))
+        held.gain[rows] = (np.logaddexp(0.0, each) - sure).sum(axis=1)
+        own = ~pair[rows]
+        rows, across, off = rows[own], across[own], off[own]
+        pull = np.swapaxes(np.linalg.solve(inside[own], across), 1, 2)
+        held.place[rows] -= (pull @ off[..., None])[..., 0]
+        held.covariance[rows] -= pull @ across
+        held.log_odds[rows] = each[own, 0]
+    rows = (upright & ~(pair & (turn[:, 0, 0] < 0.0))).nonzero()[0]
+    square, axis = _square_axes(span[rows], known.place[landmarks.walls] - digest.middle)
+    rows = rows[square]
+    variance = np.vecdot(axis, (spread[rows] @ axis[..., None])[..., 0]) + noise[rows]
+    each = _log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)
+    held.gain[rows] += np.logaddexp(0.0, each) - sure
     return held
+
+
+def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
+    """Log odds that a wall is as it may be held to be, its image being so far off that and uncertain by so much."""
+    return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))

@@ -131,8 +131,7 @@ def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None
             log_ris[at] += np.where(own[cycle, at], CONSTANTS.max_log_ratio, 0.0)
             hidden[at] = 0.0
         if len(silent) and gain is not None:
-            grid = log_grid[silent] - np.logaddexp.reduce(log_grid[silent], axis=1, keepdims=True)
-            lone = np.logaddexp.reduce(grid + scatterer[cycle, silent], axis=1)
+            lone = np.logaddexp.reduce(log_grid[silent] + scatterer[cycle, silent], axis=1)
             missed = np.concatenate([panel[cycle, silent], lone[:, None]], axis=1)
             hidden[silent], surplus = weigh_silence(hidden[silent], np.exp(missed))
             log_ris[silent] += surplus

@@ -4,6 +4,7 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.assignment import squared_distance
 from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import AXES, by_wall, reflect
@@ -47,9 +48,9 @@ def same_wall(place: Floats, blocks: Floats, anchor: Floats, middle: Floats) -> 
     across = square[:, None, None] * AXES - span[:, :, None] * span[:, None, :]
     own = np.diagonal(wide, axis1=0, axis2=1).transpose(2, 0, 1) + CONSTANTS.lean**2 * across
     spread = own[:, None] + own - wide - np.swapaxes(wide, 2, 3) + 1e-8 * AXES
-    tail, far = CONSTANTS.tail, np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0])
+    tail, (far, log_det) = CONSTANTS.tail, squared_distance(gap, spread)
     one = scipy.special.gammaln(0.5 * (tail + 3.0)) - scipy.special.gammaln(0.5 * tail) - 1.5 * np.log(np.pi * tail)
-    one = one - 0.5 * np.linalg.slogdet(spread)[1] - 0.5 * (tail + 3.0) * np.log1p(far / tail)
+    one = one - 0.5 * log_det - 0.5 * (tail + 3.0) * np.log1p(far / tail)
     length = np.linalg.norm(gap, axis=2)
     along = gap / np.maximum(length, 1e-9)[..., None]
     std = np.sqrt(np.vecdot(along, (spread @ along[..., None])[..., 0]))
