@@ -1,10 +1,10 @@
 """Cosines at the rim of the unit disc: what a receiver reports of rays near the horizon, which noise puts beyond it.
 
 Directions lie within the unit disc, and a receiver that finds a pair of cosines beyond it brings them back to the rim.
-A ray of radius r (1 on the horizon), heard with noise of standard deviation s along it, so is reported at
-`min(1, r + n)`: at `r - s (f(a) - a Q(a))` on average, with `a = (1 - r) / s` and the normal density f and upper tail Q,
-and moves with r by `1 - Q(a)`. Half of all level returns lie on the rim, and on average they seem to arrive 0.4
-deviations above the horizon. Taken for angles, these make upright walls lean, and what leans seems to tell the height.
+A ray of radius r (1 on the horizon), heard with noise of standard deviation s along it, is reported at `min(1, r + n)`:
+at `r - s (f(a) - a Q(a))` on average, with `a = (1 - r) / s` and the normal density f and upper tail Q, and moves with
+r by `1 - Q(a)`. Half of all level returns lie on the rim, and on average they seem to arrive from 0.4 deviations within
+it. Taken for an angle, that makes upright walls lean, and what leans seems to tell the height.
 """
 
 import numpy as np
