@@ -115,6 +115,8 @@ def start(
     """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)
+    if not count:
+        return tracks, ident
     covariance = np.zeros((count, 3, 2, 2))
     covariance[..., 0, 0], covariance[..., 1, 1] = observed.std[picks] ** 2, rate**2
     fresh = (

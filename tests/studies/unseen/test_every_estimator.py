@@ -58,8 +58,12 @@ CASES = [
     Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 266, 0.015, 9.0, 0.75),
 ]
 
+OFTEN = [pytest.param(case, marks=pytest.mark.slow) if (case.name, case.room) == ("bp_slam_aoa", 103) else case
+         for case in CASES]  # fmt: skip
+"""The longest run is that of the third room of one estimator."""
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.name}-{case.room}")
+
+@pytest.mark.parametrize("case", OFTEN, ids=lambda case: f"{case.name}-{case.room}")
 def test_it_is_better_than_dead_reckoning_and_near_its_bound(case: Case) -> None:
     scores = run(case, None)
     assert scores["relative_rmse_m"] < case.share * scores["dead_reckoning_m"]
@@ -67,7 +71,7 @@ def test_it_is_better_than_dead_reckoning_and_near_its_bound(case: Case) -> None
     assert not scores["lost"]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.name}-{case.room}")
+@pytest.mark.parametrize("case", OFTEN, ids=lambda case: f"{case.name}-{case.room}")
 def test_it_errs_no_more_than_it_says(case: Case) -> None:
     """Deviations half as large would make the NEES four times as large."""
     assert run(case, None)["nees"] < case.nees

@@ -1,5 +1,7 @@
 """What it tells of a new wall that is heard over a known one that its own return is not heard."""
 
+import math
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
@@ -76,11 +78,11 @@ def log_silence(shows: Floats, present: Booleans) -> float:
     What stands in its way comes and goes as it does for every return (`landmark_update.recall_forms`).
     """
     found, clear = 0.0, CONSTANTS.steady**2
-    for show, heard in zip(shows, present, strict=True):
+    for show, heard in zip(shows.tolist(), present.tolist(), strict=True):
         if heard:
             clear = 1.0
         else:
-            found += float(np.log1p(-clear * show))
+            found += math.log1p(-clear * show)
             clear *= (1.0 - show) / (1.0 - clear * show)
         clear = clear * (1.0 - CONSTANTS.rare) + (1.0 - clear) * CONSTANTS.cleared
     return found
