@@ -13,7 +13,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import association_fractions, position_errors
 from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
-from rislam_rt.pipeline.scores.component_sources import path_sources
+from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
 from rislam_rt.pipeline.scores.summary import (
     has_diverged,
     landmark_track,
@@ -31,6 +31,7 @@ class Tally:
 
     def __init__(self, scene: Scene, budget: Any, *, use_vt: bool) -> None:
         self.scene, self.budget, self.use_vt = scene, budget, use_vt
+        self.planes = true_planes(scene)
         self.cycles, self.square, self.largest, self.final = 0, 0.0, 0.0, 0.0
         self.diverged = False
         self.nees: list[float] | None = [0.0]
@@ -126,7 +127,7 @@ class Tally:
         scheme = part.scheme
         shown = scheme.component_path != NOTHING
         label = np.maximum(scheme.component_landmark[shown], -1)
-        sources = [*path_sources(part.paths, use_vt=self.use_vt), CLUTTER]
+        sources = [*path_sources(part.paths, self.planes, use_vt=self.use_vt), CLUTTER]
         met, times = np.unique(np.stack([label, scheme.component_path[shown]]), axis=1, return_counts=True)
         for (who, path), count in zip(met.T.tolist(), times.tolist(), strict=True):
             self.pairs[who, sources[path]] += count

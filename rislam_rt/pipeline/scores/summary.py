@@ -67,7 +67,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     largest = float(errors.max())
     settings = build_settings(PipelineSpec.model_validate(dict(result.config)))
     use_vt = uses_wall_returns(scheme.scheme, settings)
-    score = association_score(*component_labels(result.paths, scheme, use_vt=use_vt))
+    score = association_score(*component_labels(scene, result.paths, scheme, use_vt=use_vt))
     audible = seconds_audible(scene, result.paths, settings, scheme.gain)
     walls = wall_scores(scene, scheme.map, least, audible)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))

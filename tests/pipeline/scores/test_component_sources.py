@@ -5,10 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.evaluate import association_score
-from rislam_rt.model import PathKind
+from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline.dataset import SCHEME
-from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
+from rislam_rt.pipeline.scores.component_sources import (
+    component_labels,
+    path_sources,
+    true_planes,
+    uses_wall_returns,
+)
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 PER_CYCLE = [
@@ -29,7 +35,7 @@ def test_reciprocals_are_one_and_wall_returns_count_where_they_are_used(short_re
         component_path=everything, component_landmark=np.full_like(everything, 5), outcome=("ok",),
         info={name: value[:1] for name, value in scheme.info.items()}, smoothed=None,
     )  # fmt: skip
-    label, identity = component_labels(paths, record, use_vt=use_vt)
+    label, identity = component_labels(short_result.scene, paths, record, use_vt=use_vt)
     assert (label == 5).all()
     for path, number in enumerate(identity):
         kind, landmark, tx, rx = paths.identity(path)
@@ -59,9 +65,24 @@ def test_who_uses_wall_returns_is_a_setting(scheme, key):
         assert uses_wall_returns(scheme, settings) is use
 
 
+def test_pieces_of_a_wall_are_one_wall(room):
+    """What lies in one plane mirrors alike, and no agent can tell it apart."""
+    wall = next(r for r in room.reflectors if r.name == "wall_x0")
+    pieces = tuple(replace(wall, name=f"piece_{n}", faces=wall.faces[n : n + 1]) for n in range(2))
+    split = replace(room, reflectors=(*(r for r in room.reflectors if r is not wall), *pieces))
+    found = []
+    for scene in (room, split):
+        paths = ImageSourceChannel(scene, RadioConfig(), 2).paths(scene.agent[::60])
+        sources = path_sources(paths, true_planes(scene), use_vt=True)
+        found.append((paths.num_paths, len(set(sources))))
+    (whole, of_whole), (cut, of_cut) = found
+    assert cut > whole  # each piece has paths of its own
+    assert of_cut == of_whole
+
+
 def test_the_default_filter_tells_walls_apart(run_short):
     """Of what it names, nine in ten are named right, and two-wall returns are named; by its own and the true names."""
     result = run_short("cycles=40", 'schemes=["no_ris"]')
-    label, truth = component_labels(result.paths, result.schemes["no_ris"], use_vt=True)
+    label, truth = component_labels(result.scene, result.paths, result.schemes["no_ris"], use_vt=True)
     assert association_score(label, truth).precision > 0.9
     assert (label >= 2**32).any()
