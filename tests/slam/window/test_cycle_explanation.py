@@ -1,9 +1,12 @@
 """Weights of what was heard: by the scatter that a form shows before and after."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.cycle_explanation import scatter_variance, weigh_again
+from rislam_rt.slam.window.cycle_explanation import _names, innovations, scatter_variance, weigh_again
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals
 
@@ -55,3 +58,39 @@ def test_a_gross_error_counts_as_the_loudest_neighbour():
     truth[3, 0] = 1e9
     log, left = log_of(truth)
     assert scatter_held(weigh_again(log, left, CYCLES)).max() < 1e3
+
+
+def test_a_level_ray_moves_nothing_where_it_is_reported_on_average():
+    """Half of its reports lie on the rim of the unit disc, and those within it by 0.4 deviations in the mean."""
+    std = 0.01
+    inside = 1.0 - std / np.sqrt(2.0 * np.pi)
+    groups = SimpleNamespace(leader=np.array([0]), partner=np.array([-1]), gap=np.zeros((1, 3)))
+    expected = SimpleNamespace(seen=np.array([[5.0, 0.6, 0.8]]), jacobian=np.eye(3)[None])
+    view = SimpleNamespace(row=np.array([0]), pick=np.array([0]), groups=groups, expected=expected)
+    log = SimpleNamespace(
+        cycle=np.array([7]), share=np.zeros(1), seen=np.array([[5.0, 0.6 * inside, 0.8 * inside]]),
+        std=np.full((1, 3), std), extra=np.zeros((1, 3)),
+    )  # fmt: skip
+    left, slope = innovations(view, log, np.ones(1, dtype=np.bool_), 7)
+    np.testing.assert_allclose(left, 0.0, atol=1e-9)
+    assert std * slope[0, 1:, 1:] @ [0.6, 0.8] @ [0.6, 0.8] == pytest.approx(0.5)
+    np.testing.assert_array_equal(expected.jacobian, np.eye(3)[None])  # another cycle's map asks it again
+
+
+def test_labels_tell_points_images_walls_and_pairs_of_walls_apart():
+    landmarks = SimpleNamespace(ident=np.array([4, 9, 0, 7]))  # a point, and three walls
+    point, one, two, three, none, tx = 0, 1, 2, 3, -1, -1
+    alike = [
+        [[point, none, none, none, none]],
+        [[point, one, none, none, none], [point, two, none, one, none], [point, none, none, one, two]],
+        [[point, none, none, two, none]],
+        [[tx, none, none, one, none]],
+        [[tx, none, none, two, none]],
+        [[tx, none, none, one, two], [tx, none, none, two, one]],
+        [[tx, none, none, three, two], [tx, none, none, two, three]],
+        [[tx, none, none, one, three], [tx, none, none, three, one]],
+    ]
+    found = [_names(landmarks, np.array(forms)) for forms in alike]
+    assert all(len(set(names.tolist())) == 1 for names in found)
+    assert len({int(names[0]) for names in found}) == len(alike)
+    assert not len(_names(landmarks, np.zeros((0, 5), dtype=np.int64)))

@@ -14,6 +14,8 @@ from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.window.divergence import recovery
+from rislam_rt.slam.window.relinearisation import residuals
+from rislam_rt.slam.window.smoother import window_gaussian
 
 ROOM, CYCLES = Path(__file__).parents[3] / "scenes" / "paper_room", 70
 CONFIG = SlamConfig(filter="window", use_vt=True)
@@ -78,6 +80,19 @@ def test_error_relative_to_the_start_is_millimetres_and_told(run):
     nees = np.einsum("ki,kij,kj->k", late, np.linalg.inv(own), late) / 2.0
     # cycles are as good as one draw of two numbers or three, for the map is the same: 95 % lie below 3
     assert 0.01 < np.mean(nees) < 4.0
+
+
+def test_no_ray_is_foreseen_nearer_to_the_rim_than_level_ones_are_reported_on_average(run):
+    state = run[-1][0]
+    log, slot = state.log, state.log.cycle - (state.cycle - state.window.num_poses + 1)
+    rows = (log.explained & (slot >= 0)).nonzero()[0]
+    found, _ = residuals(state, rows, slot[rows], window_gaussian.poses(state.window))
+    foreseen = (log.seen[rows] - found.left * np.sqrt(log.std[rows] ** 2 + log.extra[rows]))[:, 1:]
+    radius = np.linalg.norm(foreseen, axis=1)
+    std = np.linalg.norm(foreseen / radius[:, None] * log.std[rows, 1:], axis=1)
+    level = (1.0 - radius) / std
+    assert level.min() > 0.39
+    assert (level < 0.41).sum() > 100
 
 
 def test_hindsight_is_no_worse_and_ends_where_the_filter_does(run):
