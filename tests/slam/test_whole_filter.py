@@ -92,7 +92,7 @@ def clear() -> tuple[Heard, Course]:
 
 @pytest.fixture(scope="module")
 def normal() -> tuple[Heard, Course]:
-    """As a run has it, double bounces and all."""
+    """With clutter, double bounces, and what comes out as one."""
     heard = hear(ReceiverConfig("bound"), 3.52e-12, 2, 2)
     return heard, go(heard)
 
@@ -187,6 +187,11 @@ def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:
             if ident in place:
                 assert np.linalg.norm(position - place[ident]) < 1.0
             place[ident] = position
+    held, last = course.state.landmarks.ident, course.infos[-1].landmark
+    image = last >= 1 << 32  # of an image, or of two walls: a number of both
+    parts = [last[(last >= 0) & ~image], (last[image] >> 32) - 1, last[image] % (1 << 32)]
+    assert all(len(part) for part in parts)
+    assert np.isin(np.concatenate(parts), held).all()
 
 
 def test_only_the_height_of_a_wheeled_agent_is_calmer_than_its_way(clear: tuple[Heard, Course]) -> None:
