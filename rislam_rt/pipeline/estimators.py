@@ -50,7 +50,7 @@ class Outcomes(NamedTuple):
 
 
 def own_estimator(name: str) -> Estimator:
-    """An estimator of one's own (`OwnEstimator`) behind the functions of all others."""
+    """An estimator of one's own (`docs/own_methods.md`) behind the functions of all others."""
     own = load_own(name)
 
     def checked(found: SlamEstimate, what: str) -> SlamEstimate:

@@ -13,64 +13,25 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import (
-    Body,
     DataSheet,
-    Measurement,
     Paths,
     RadioConfig,
     RisCode,
     Scene,
-    SensorModel,
     SlamEstimate,
     Trajectory,
 )
 from rislam_rt.pipeline.own_files import own_digest
-from rislam_rt.slam import StartPrior
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry points under which an installed package offers methods."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
-
-
-class OwnDesigner(Protocol):
-    """A phase designer: a function."""
-
-    def __call__(
-        self, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator
-    ) -> ArrayLike:
-        """Levels (N, M), whole numbers from 0 to H - 1, from the belief predicted to the cycle in which they act."""
-        ...
-
-
-class OwnEstimator(Protocol):
-    """A filter: an object, or a class without arguments."""
-
-    def init(
-        self, start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, *, rng: np.random.Generator
-    ) -> Any:
-        """First state of one's own estimator, whatever it is; states are not changed afterwards."""
-
-    def step(
-        self,
-        state: Any,
-        measurement: Measurement,
-        code: RisCode | None,
-        dt: float,
-        heading: float,
-        *,
-        rng: np.random.Generator,
-    ) -> Any:
-        """The state after a cycle: `dt` [s] since the last, `heading` [rad] of the compass, `code` in force."""
-
-    def estimate(self, state: Any) -> SlamEstimate:
-        """Pose and map of one's own estimator (`rislam_rt.model.pose_estimate` makes one of a pose alone)."""
 
 
 @cache
