@@ -13,64 +13,25 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.model import (
-    Body,
     DataSheet,
-    Measurement,
     Paths,
     RadioConfig,
     RisCode,
     Scene,
-    SensorModel,
     SlamEstimate,
     Trajectory,
 )
 from rislam_rt.pipeline.own_files import own_digest
-from rislam_rt.slam import StartPrior
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
-
-
-class OwnDesigner(Protocol):
-    """Interface of a user's own designer of phase codes: a function."""
-
-    def __call__(
-        self, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator
-    ) -> ArrayLike:
-        """Return phase levels (N, M), whole numbers from 0 to H - 1, from the belief predicted to the cycle of use."""
-        ...
-
-
-class OwnEstimator(Protocol):
-    """Interface of a user's own SLAM estimator: an object, or a class whose constructor takes no arguments."""
-
-    def init(
-        self, start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, *, rng: np.random.Generator
-    ) -> Any:
-        """Return the estimator's state at the start, of any type; the pipeline does not change states."""
-
-    def step(
-        self,
-        state: Any,
-        measurement: Measurement,
-        code: RisCode | None,
-        dt: float,
-        heading: float,
-        *,
-        rng: np.random.Generator,
-    ) -> Any:
-        """Return the state after a measurement: `dt` [s] since the last, compass `heading` [rad], `code` applied."""
-
-    def estimate(self, state: Any) -> SlamEstimate:
-        """Return pose and map of a state (`rislam_rt.model.pose_estimate` makes an estimate of a pose alone)."""
 
 
 @cache
