@@ -54,7 +54,7 @@ class Outcomes(NamedTuple):
 
 
 def own_estimator(name: str) -> Estimator:
-    """Estimator from the user's own class of that name (`docs/own_methods.md`), with checks of the poses that it returns.
+    """Estimator made of the user's own class of that name (`docs/own_methods.md`); the poses it returns are checked.
 
     The functions raise `ConfigError` for whatever it raises, and for a covariance or position that cannot be.
     """
