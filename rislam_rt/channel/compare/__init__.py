@@ -2,12 +2,11 @@
 error judged by what precision explains."""
 
 from rislam_rt.channel.compare.both_channels import Validation, compare_channels, validate_rooms
-from rislam_rt.channel.compare.comparison_report import LimitViolation, OneSidedPath, PathReport
+from rislam_rt.channel.compare.comparison_report import OneSidedPath, PathReport
 from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
 
 __all__ = [
-    "LimitViolation",
     "OneSidedPath",
     "PathReport",
     "Validation",

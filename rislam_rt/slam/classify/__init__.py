@@ -10,11 +10,10 @@ from rislam_rt.slam.classify.network import (
     network_arrays,
     read_network,
 )
-from rislam_rt.slam.classify.sighting_features import FEATURES, MotionFit, Sightings, fit_motion, track_features
+from rislam_rt.slam.classify.sighting_features import FEATURES, Sightings, fit_motion, track_features
 
 __all__ = [
     "FEATURES",
-    "MotionFit",
     "Network",
     "Sightings",
     "blend",
