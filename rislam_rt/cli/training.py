@@ -19,7 +19,8 @@ from rislam_rt.report.studies.classifier import (
 )
 from rislam_rt.report.style import to_png
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.studies.classifier.run import ALL, run_training
+from rislam_rt.studies.classifier.run import ALL, train_and_score
+from rislam_rt.studies.classifier.sets import gather_sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.spec import study_record
 
@@ -41,7 +42,7 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
     with show_progress() as progress:
-        found = run_training(scenes, spec, progress=progress)
+        found = train_and_score(gather_sets(scenes, spec, progress=progress), spec)
     content = {**record, **classifier_table(found)}
     contents = {
         f"{PAGE}.md": classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),

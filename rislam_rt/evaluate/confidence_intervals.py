@@ -37,11 +37,11 @@ def median_over_runs(samples: Floats) -> Floats:
     return np.asarray(np.median(samples, axis=0))
 
 
-def share_interval(count: int, runs: int, *, level: float = 0.95) -> Interval:
-    """A share `count / runs` with Wilson's interval (Wilson 1927), which holds at shares of 0 and 1 too."""
+def share_interval(count: int, runs: int) -> Interval:
+    """A share `count / runs` with Wilson's interval at 95 % (Wilson 1927), which holds at shares of 0 and 1 too."""
     if not 0 <= count <= runs or runs < 1:
         raise ConfigError(f"count, runs: {count} of {runs} received; give a part of at least one run")
-    z, share = float(scipy.special.ndtri(0.5 + 0.5 * level)), count / runs
+    z, share = float(scipy.special.ndtri(0.975)), count / runs
     middle = (share + z**2 / (2 * runs)) / (1.0 + z**2 / runs)
     half = z / (1.0 + z**2 / runs) * float(np.sqrt(share * (1.0 - share) / runs + z**2 / (4.0 * runs**2)))
     return Interval(share, min(share, max(0.0, middle - half)), max(share, min(1.0, middle + half)))
@@ -86,15 +86,9 @@ def bootstrap(
 
 
 def bootstrap_ratio(
-    numerator: Floats,
-    denominator: Floats,
-    *,
-    rng: np.random.Generator,
-    statistic: Statistic = rms_over_runs,
-    level: float = 0.95,
-    resamples: int = 2000,
+    numerator: Floats, denominator: Floats, *, rng: np.random.Generator, level: float = 0.95
 ) -> Interval:
-    """Interval of `statistic(numerator) / statistic(denominator)` of two schemes run on the same R seeds.
+    """Interval of the ratio of two schemes' root mean squares, both run on the same R seeds.
 
     Seeds are drawn in pairs, so that what both schemes share (room, noise) does not widen the interval. 1 minus this is
     the gain over the denominator's scheme.
@@ -102,6 +96,6 @@ def bootstrap_ratio(
     pairs = np.stack([np.asarray(numerator), np.asarray(denominator)], axis=-1)
 
     def ratio(samples: Floats) -> Floats:
-        return statistic(samples[..., 0]) / statistic(samples[..., 1])
+        return rms_over_runs(samples[..., 0]) / rms_over_runs(samples[..., 1])
 
-    return bootstrap(pairs, rng=rng, statistic=ratio, level=level, resamples=resamples)
+    return bootstrap(pairs, rng=rng, statistic=ratio, level=level)

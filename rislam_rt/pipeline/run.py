@@ -32,12 +32,8 @@ from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
 from rislam_rt.worker_pool import run_side_by_side
 
-"""Told the stage (`trace` or a scheme), how much of it is done, and how much there is."""
-
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
 """Libraries that numbers depend on; their versions go into every result."""
-
-
 IN_ONE_PIECE = 50_000
 """Most cycles that are traced and held at once: 5 GB in the paper's room."""
 SAME_CYCLE = 0.01
