@@ -5,7 +5,7 @@ each fault.
 """
 
 MOST_LINES = 20
-"""Faults that are told one by one."""
+"""Faults of one error that are printed one by one; of the others only the number is."""
 
 
 class RislamError(Exception):
@@ -22,7 +22,8 @@ class RislamError(Exception):
 
     @property
     def lines(self) -> list[str]:
-        """The error, every fault on one printable line."""
+        """Lines of an error's message: one printable line for each fault, and the number of those beyond
+        `MOST_LINES`."""
         told = [_printable(str(text)) for text in self.args[:MOST_LINES]]
         more = len(self.args) - len(told)
         return [*told, f"{more} more of this kind"] if more else told
@@ -71,7 +72,8 @@ class StoreError(RislamError):
 
 
 def disk_error(error: OSError) -> RislamError:
-    """What the disk answered, as one line: of a file that was named, or of where the output goes."""
+    """Error of this package for an `OSError` of the disk: `ConfigError` for a file that was named, `StoreError` where
+    the output cannot be written."""
     said = error.strerror or type(error).__name__
     if error.filename is None:
         return StoreError(f"output: cannot be written ({said}); check where it goes, and the free space")
@@ -83,7 +85,7 @@ def _printable(text: str) -> str:
 
 
 def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """Raise an error unless an argument of a public function is of its kind.
+    """Check the type of an argument of a public function.
 
     Raises
     ------

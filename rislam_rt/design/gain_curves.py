@@ -1,18 +1,15 @@
-"""Designs place by place along a path or over a grid: codes for maps, and the gain curves of Fig. 4(a)."""
+"""Designs place by place: the gain curves of Fig. 4(a)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Floats
 from rislam_rt.design.designers import designer
-from rislam_rt.design.genie import problem_from_paths
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single_path import exact_code
-from rislam_rt.errors import ConfigError
-from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
 
 class GainInterval(NamedTuple):
@@ -85,44 +82,6 @@ def direct_only(problem: DesignProblem) -> DesignProblem:
         problem.response[:, :1], problem.static_gain[:, :0], problem.gradient[:, :1], problem.prior, problem.scale,
         problem.levels, least_power=problem.least_power,
     )  # fmt: skip
-
-
-def design_along(
-    paths: Paths,
-    tx: Floats,
-    rx: Floats,
-    radio: RadioConfig,
-    ris: DataSheet,
-    *,
-    method: str,
-    rng: np.random.Generator,
-    prior: Floats | None = None,
-    least_snr: float = 0.0,
-    config: DesignConfig = _SINGLE,
-) -> RisCode:
-    """The genie's codes (K, N, M), one for each cycle of known paths; for places of a grid as well.
-
-    `tx`, `rx` (K, 3) [m]. Where the panel is out of sight the code is a random one.
-
-    Raises
-    ------
-    ConfigError
-        The paths hold no panel.
-    """
-    if paths.ris is None:
-        raise ConfigError("design: the scene has no panel; add a [ris] section")
-    run = designer(method)
-    seen: Booleans = np.logical_or.reduce(paths.valid & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)), axis=1)
-    index = np.empty((paths.num_cycles, ris.rows, ris.cols), dtype=np.int64)
-    for cycle, child in enumerate(rng.spawn(paths.num_cycles)):
-        if not bool(seen[cycle]):
-            index[cycle] = child.integers(ris.levels, size=(ris.rows, ris.cols))
-            continue
-        problem = problem_from_paths(
-            paths, tx[cycle], rx[cycle], radio, ris.levels, cycle=cycle, prior=prior, least_snr=least_snr
-        )
-        index[cycle] = run(problem, rng=child, config=config).code.index
-    return RisCode(index, ris.levels)
 
 
 def _db(magnitude: Floats) -> Floats:

@@ -97,11 +97,6 @@ def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) ->
     return RisCode(code.index ^ flipped, code.levels)
 
 
-def quantise(code: RisCode, levels: int) -> RisCode:
-    """The nearest code of a panel with fewer phase levels; half-way cases go to the even one."""
-    return RisCode(np.rint(code.index * (levels / code.levels)).astype(np.int64) % levels, levels)
-
-
 def _check_probability(name: str, value: float) -> None:
     if not 0.0 <= value <= 1.0:
         raise ConfigError(f"{name}: {value} received; give a probability from 0 to 1")

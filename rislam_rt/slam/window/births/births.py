@@ -1,4 +1,5 @@
-"""Births of features from tracks that are understood: by a new feature or by those that there are."""
+"""Births: tracks whose cause is clear become new features of the map, or measurements of the features that there
+are."""
 
 import numpy as np
 
@@ -24,7 +25,8 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def births(context: WindowState, view: CycleAssociation) -> WindowState:
-    """Every track whose time has come is weighed; the shortest of those that are clear enters."""
+    """Examine the tracks that are due: those explained by known features are associated with them, and of the others
+    the shortest whose decision is clear adds a feature to the map."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
         return context
@@ -75,7 +77,8 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
 
 
 def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
-    """(T,) log probability that of two walls that throw a track together so many single returns are not heard.
+    """Log probability (T,) that so few single-bounce returns are heard beside each track, were it a return over two
+    unknown walls.
 
     Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
     walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard. All of them are
@@ -103,7 +106,7 @@ def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
 
 
 def _bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> tuple[Floats, Floats]:
-    """Directions (N, 3) in the room's axes and lengths (N,) of those of the tracks that births are asked about."""
+    """Directions of arrival (N, 3) in the room's axes and lengths (N,) [m] of some tracks."""
     seen = context.tracks.mean[rows, :, 0]
     return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
 
@@ -111,8 +114,8 @@ def _bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> 
 def _company(
     context: WindowState, rows: Integers, ats: list[Integers], histories: TrackSummary, mean: Floats
 ) -> Floats:
-    """(T,) log odds by which a direction speaks for a path over unknown walls, and against all else: a shorter one
-    comes from there.
+    """Log odds (T,) by which a shorter path from the same direction speaks for each track being a path over unknown
+    walls on the Tx leg, and against all else.
 
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
@@ -135,14 +138,16 @@ def _company(
 
 
 LEG = 0.04
-"""Difference of cosines up to which one return may be a leg of another's right angle, or lie along its line."""
+"""Difference of cosines up to which a single-bounce return may be a leg of a track's right angle, or lie along its
+line."""
 
 
 def explanations(
     context: WindowState, rows: Integers, histories: TrackSummary, view: CycleAssociation, mean: Floats,
     covariance: Floats,
 ) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
-    """(track, log evidence, forms (2, 5) of feature rows, cluster) of returns of the map: nothing is free in them."""
+    """Explanations of tracks by predicted returns of the map, in which nothing is free: (track, log evidence, forms
+    (2, 5) of feature rows, cluster) of each."""
     expected, groups = view.expected, view.groups
     if not len(groups.leader):
         return []
@@ -165,7 +170,7 @@ def _explain(
     context: WindowState, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int,
     features: Floats, root: Floats,
 ) -> float:  # fmt: skip
-    """Log evidence of one explanation."""
+    """Log evidence that a track's history is one cluster of returns that the map predicts."""
     nearest, used = context.scene.sensor.nearest, histories.weight[row, :, 0] > 0.0
     poses = Poses(histories.tx[row, used], histories.rx[row, used], np.zeros(int(used.sum())))
     parts = forms[forms[:, 0] != UNKNOWN]
@@ -199,14 +204,16 @@ def _explain(
 
 
 def _taken(context: WindowState, at: Integers, form: Integers) -> bool:
-    """Whether, in most of the cycles of a track (rows of the log), another component is held to be that form (5,)."""
+    """Whether, in most cycles of a track (rows of the log), another component is already associated with the path of
+    form (5,)."""
     log = context.log
     same = (log.form[:, 0] == form).all(axis=1) & log.explained
     return bool(np.isin(log.cycle[at], log.cycle[same]).mean() > 0.5)
 
 
 def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float) -> WindowState:
-    """Rows of the log held to be forms (2, 5) of idents; they err by as much more as they scatter."""
+    """Associate a track's rows of the log with the paths of forms (2, 5) of idents, with extra variance by the track's
+    scatter."""
     extra = CONSTANTS.memory * context.log.std[at] ** 2 * (scatter**2 - 1.0)
     return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, 0.0, extra))
 
@@ -214,7 +221,8 @@ def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats
 def _enter(
     context: WindowState, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
 ) -> tuple[WindowState, bool]:
-    """The map with a new feature and its history, solved anew; as it was, if they do not agree."""
+    """Add a new feature with its track's history to the map and solve the window again; returns the state as it was,
+    and False, if they do not fit."""
     new = len(context.landmarks.ident)
     holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
     window = window_gaussian.add_feature(context.window, verdict.place, holds)

@@ -1,4 +1,4 @@
-"""Taking back: features that the evidence has turned against leave, and their measurements are tracks again."""
+"""Removal of features that the evidence contradicts, whose measurements become tracks again."""
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
-    """Gauss-Newton over the whole window."""
+    """Solve the whole window again by so many re-linearised Gauss-Newton steps; returns it and the residuals of the
+    last one."""
     for _ in range(steps):
         window, left = renew(context, 0)
         context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
@@ -25,7 +26,8 @@ def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, R
 
 
 def release(context: WindowState, keep: Booleans) -> WindowState:
-    """The map without some features; what they explained is unexplained, and goes on as tracks."""
+    """Remove the features not marked in `keep` (F,) from the map; the measurements that they explained go on as
+    tracks."""
     if keep.all():
         return context
     landmarks, log = context.landmarks, context.log
@@ -40,7 +42,7 @@ def release(context: WindowState, keep: Booleans) -> WindowState:
 
 
 def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
-    """One track for each form among the lost rows that was seen lately."""
+    """Begin a track for each path among the rows `lost` of the log that was detected lately."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
     fresh: list[tuple[object, ...]] = []
@@ -70,7 +72,8 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
 
 
 def condemned(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
-    """(F,) features to take back: that do not exist, or that their measurements contradict."""
+    """Which features (F,) to remove: those that probably do not exist, and those that their measurements' residuals
+    contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     form = log.form[left.row, 0]
     bounces = (form[:, 1:] != NONE).sum(axis=1)

@@ -1,4 +1,5 @@
-"""Prior and evidence of what tracks may be: kind, place, amplitude, what stands in the way, what others speak for."""
+"""Prior and evidence of the hypotheses of what caused a track: kind, place, amplitude, occlusion, and support by other
+tracks."""
 
 from typing import NamedTuple
 
@@ -31,21 +32,23 @@ from rislam_rt.slam.window.solver_limits import NEARBY
 from rislam_rt.slam.window.state import WindowState
 
 MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
-"""Walls on the way of each kind beyond the first one of a wall return: each takes its share of the power, and so of the
-paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
+"""Number of walls on a path of each kind beyond the one of a wall return: each takes its share of the power, and so of
+the paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
 MORE_UNKNOWN = 2
-"""The same of a path of no kind here: over walls that the map lacks. Without wall returns most walls stay unknown:
-such paths are as frequent as points at least, and it counts none."""
+"""The same of a path of none of these kinds: over walls that the map lacks. Without wall returns most walls stay
+unknown: such paths are as frequent as points at least, and it counts none."""
 CLOSE = 0.8
-"""Gap in cells below which two paths come out as one beyond doubt."""
+"""Gap in resolution cells below which two paths come out as one component beyond doubt."""
 LOG_APART = np.log(1e-4)
-"""Log probability that two that lie apart come out as one."""
+"""Log probability that two paths more than a cell apart come out as one component."""
 ASIDE = 10.0
-"""Log evidence behind a track's best from which on a hypothesis does not speak for others, nor is asked for more."""
+"""Log evidence behind a track's best hypothesis from which on another does not speak for other tracks, nor is asked for
+more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
-    """(H,) log prior of the kinds: walls on the way; over known features, of all of them together."""
+    """Log prior (H,) of the hypotheses' kinds: each wall on the path costs power, and kinds over known features are
+    shared among all of these."""
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     rivals[IS_IMAGE[table.kind]] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
@@ -53,7 +56,8 @@ def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
 
 
 def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
-    """(H,) log prior density [1/m^3] of the places: points anywhere in a ball, what two walls do in one twice as wide.
+    """Log prior density (H,) [1/m^3] of the new features' places: points anywhere in a ball, the shift by two walls in
+    one twice as wide.
 
     Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
     """
@@ -65,7 +69,8 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at another wall.
+    """Log probability (H,) that a new wall's return is resolved from, or comes out as one with, the return over its
+    edge with a known level or upright wall.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
     so does its edge.
@@ -89,7 +94,7 @@ def log_shared(
     table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats,
     concurrent: Booleans,
 ) -> Floats:  # fmt: skip
-    """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
+    """Gain (H,) in log evidence of hypotheses whose new feature other tracks ask for as well.
 
     A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
     that of one place given the other, against all else that it may be.
@@ -125,7 +130,7 @@ def log_shared(
 
 
 def concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
-    """(T, T) which tracks, rows of the log each, were heard in one cycle."""
+    """Whether each two of T tracks (T, T), rows of the log each, were detected in a common cycle."""
     cycle = context.log.cycle - context.log.cycle.min()
     heard = np.zeros((len(ats), cycle.max() + 1))
     for row, at in enumerate(ats):
@@ -136,7 +141,8 @@ def concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
 def log_amplitudes(
     table: Hypotheses, fits: Fits, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
-    """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
+    """Log density (H,) of the tracks' mean amplitudes under their hypotheses, given walls' reflectivity and points'
+    strengths."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
@@ -168,7 +174,8 @@ def log_amplitudes(
 def log_opacity(
     table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known.
+    """Log prior (H,) of a new feature behind known walls, or of a new wall before known features: what stands between
+    occludes.
 
     With wall returns a new wall that is heard over a known one stands where its path meets it.
     """
@@ -199,13 +206,13 @@ def log_opacity(
 
 
 LEVEL_RISE, UPRIGHT_RISE = 0.9, 0.35
-"""Share of its height in the way to a wall's image above which it may be level, and below which it may be upright."""
+"""Vertical share of the way to a wall's image above which the wall may be level, and below which it may be upright."""
 
 
 def direction_beliefs(
     place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> DirectionPriors:
-    """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
+    """Direction priors of a new wall at `place` (3,): upright, at right angles to a known wall, or level."""
     span = place - digest.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
@@ -229,8 +236,8 @@ def direction_beliefs(
 
 
 def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
-    """Those of N upright walls with images at `span` (N, 3) that nearly are at right angles to an upright one of
-    `others` (W, 3), or alike: rows (A,), and the axes (A, 3) along which their images do not lie if they are."""
+    """Upright walls, of N with images at `span` (N, 3), that are nearly parallel or at right angles to one of `others`
+    (W, 3): rows (A,), and the axes (A, 3) along which their images do not lie if they exactly are."""
     flat = others[np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)]
     if not len(flat):
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
@@ -244,27 +251,30 @@ def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
 
 
 def _log_square(reach: Floats) -> Floats:
-    """Log odds that a wall so far off is at right angles to another, times the width of the prior if it is not."""
+    """Prior log odds that a wall at distance `reach` [m] is at right angles to another, times the width [m] of the
+    prior if it is not."""
     return np.asarray(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
 
 
 class HeldWalls(NamedTuple):
-    """H hypotheses by what walls are beforehand."""
+    """Effect of direction priors on H hypotheses: gain in evidence, and new walls' places if they are upright or
+    level."""
 
     gain: Floats
-    """(H,) in log evidence."""
+    """(H,) gain in log evidence."""
     place: Floats
-    """(H, 3) of new walls that are upright or level, as they are held to be..."""
+    """(H, 3) [m] of new walls, given that they are upright or level..."""
     covariance: Floats
-    """(H, 3, 3) ...and theirs."""
+    """(H, 3, 3) [m^2] ...the covariances then..."""
     log_odds: Floats
-    """(H,) of that."""
+    """(H,) ...and the log odds that they are."""
 
 
 def log_upright(
     table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> HeldWalls:
-    """What walls are beforehand: upright, level, at right angles to another, or in any direction alike.
+    """Gain in evidence by the directions that walls have beforehand (upright, level, at right angles to another, or
+    any), and the new walls' places given these.
 
     Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
     along each axis: rivals that are rarer let ghosts of points through.
@@ -309,5 +319,6 @@ def log_upright(
 
 
 def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
-    """Log odds that a wall is as it may be held to be, its image being so far off that and uncertain by so much."""
+    """Posterior log odds that a direction prior holds, from the prior ones and the wall image's offset [m] from it with
+    that variance [m^2]."""
     return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))

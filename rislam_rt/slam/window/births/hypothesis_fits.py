@@ -1,4 +1,4 @@
-"""One Gauss-Newton fit for all hypotheses of all tracks at once, with its marginal likelihood.
+"""Hypothesis fits: one Gauss-Newton fit for all hypotheses of all tracks at once, with its marginal likelihood.
 
 Known walls are affine maps here. What is sought is a wall `w` (as image of the agent's place), with the Tx's image
 `m = S_out R_w(S_in x + t_in) + t_out`, or a point `p`, seen by the Rx at `S_r p + t_r` and by the Tx at `S_t p + t_t`.
@@ -19,26 +19,28 @@ from rislam_rt.slam.window.solver_limits import ASTRAY, HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):
-    """H hypotheses."""
+    """Inputs of the fits of H hypotheses: initial value of the new feature, and affine maps of the known walls on the
+    path."""
 
     track: Integers
-    """(H,) row of the digest."""
+    """(H,) row of the track summary."""
     is_wall: Booleans
-    """(H,)."""
+    """(H,) whether the new feature is a wall."""
     is_pair: Booleans
-    """(H,) two unknown walls."""
+    """(H,) whether two unknown walls are sought, as the shift that both make."""
     start: Floats
-    """(H, 3) first guess of what is sought."""
+    """(H, 3) [m] initial value of the new feature."""
     turn: Floats
-    """(H, 2, 3, 3) for a wall: S_in, S_out; for a point: S_t, S_r."""
+    """(H, 2, 3, 3) linear parts of the two maps: for a wall S_in, S_out; for a point S_t, S_r."""
     shift: Floats
-    """(H, 2, 3) likewise."""
+    """(H, 2, 3) [m] translations of the two maps."""
     uncertainty: Floats
-    """(H, 2, 3, 3) square roots of the covariance with which the two maps move what they map (at about the start)."""
+    """(H, 2, 3, 3) square roots of the covariance that the errors of the two maps give to what they map
+    (at about the start)."""
     mixed: Booleans
-    """(H,) whether it comes out as one with what a known wall makes of it (`beyond`), at an unknown share between."""
+    """(H,) whether the return is unresolved from its reflection in a known wall (`beyond`), at an unknown share."""
     beyond: Floats
-    """(H, 3, 4) turn and shift of that wall."""
+    """(H, 3, 4) linear part and translation of the reflection in that wall."""
     fixed: Booleans
     """(H,) whether the wall mirrors a known point, which is `shift[:, 0]`, and not the Tx..."""
     far: Booleans
@@ -50,24 +52,26 @@ class Trials(NamedTuple):
 
 
 class Fits(NamedTuple):
-    """H fitted hypotheses."""
+    """Fitted hypotheses, H of them: place of the new feature, its covariance, cost and log evidence."""
 
     place: Floats
-    """(H, 3)."""
+    """(H, 3) [m] of the new feature."""
     covariance: Floats
-    """(H, 3, 3) with all else uncertain."""
+    """(H, 3, 3) [m^2] of the place, with all else uncertain."""
     held: Floats
-    """(H, 3, 3) with the poses held: what keeps the map from being linear in it."""
+    """(H, 3, 3) [m^2] of the place with the poses held fixed: what keeps the map from being linear in it."""
     cost: Floats
     """(H,) twice the negative log likelihood under Student's t, without its constants."""
     share: Floats
-    """(H,) of what a known wall makes of it, where the two come out as one."""
+    """(H,) weight of the reflection in a known wall, where the return is unresolved from it."""
     log_evidence: Floats
-    """(H,) of a density 1 over the place, without the constants that hypotheses of a track share."""
+    """(H,) Laplace's log evidence under a prior density 1 over the place, without the constants that hypotheses of a
+    track share."""
 
 
 def try_all(trials: Trials, digest: TrackSummary) -> Fits:
-    """Fit everything; hypotheses that fall hopelessly behind after one step keep what they had then."""
+    """Fit all hypotheses to their tracks by Gauss-Newton; those hopelessly behind after the first step are dropped, at
+    infinite cost."""
     count = len(trials.track)
     active = np.arange(count)
     cost, log_det = np.full(count, np.inf), np.zeros(count)
@@ -107,10 +111,13 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
 
 
 COMMON = 13
-"""Unknowns beside the place: errors of pose and velocity, of the two maps, and of the share; headings come on top."""
+"""Number of a fit's unknowns beside the place: errors of pose and velocity, of the two maps, and of the share; headings
+come on top."""
 
 
 class _Equations(NamedTuple):
+    """Normal equations of H fits, their costs, and the weights of their measurements under Student's t."""
+
     normal: Floats
     slope: Floats
     cost: Floats
@@ -120,7 +127,8 @@ class _Equations(NamedTuple):
 def _equations(
     trials: Trials, digest: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
 ) -> _Equations:
-    """Normal equations (H, 15, 15) of the rows, and their cost."""
+    """Normal equations of the next Gauss-Newton step of the hypotheses `rows`, at places (H, 3) and errors of all else
+    (H, E), and their costs."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
     tx, rx = digest.tx[track], digest.rx[track]
@@ -183,7 +191,8 @@ def _equations(
 
 
 def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
-    """Slopes (H, B, 3, 3) by the errors of the map on the new feature's near side, and of that behind it.
+    """Slopes (H, B, 3, 3) of the predictions by the errors of the map on the new feature's near side, and of the map
+    behind it.
 
     What is seen moves by `by_image` (H, B, 3, 3) with the image that the Rx hears, its length by `toward` (H, B, 3)
     with what the Tx sees; `flip` (H, 3, 3) mirrors.
@@ -199,7 +208,8 @@ def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, f
 
 
 def _through(slopes: Floats, maps: Floats) -> Floats:
-    """Slopes (H, B, 3, 3) by what maps (H, 3, 3) move: one product of matrices for each hypothesis."""
+    """Slopes (H, B, 3, 3) multiplied by matrices (H, 3, 3) (chain rule), one product of matrices for each
+    hypothesis."""
     count, points = slopes.shape[:2]
     return np.asarray((slopes.reshape(count, 3 * points, 3) @ maps).reshape(count, points, 3, 3))
 
@@ -208,8 +218,8 @@ def _mix(
     trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, maps: tuple[Floats, Floats, Floats],
     seen: tuple[Floats, Floats, Floats],
 ) -> Floats:  # fmt: skip
-    """What is seen, and its slopes by place and pose, moved towards what a known wall makes of it; the slope
-    (H, B, 3, 1) by the share's error. `seen` is changed in place."""
+    """Move predictions, and their slopes by place and pose, towards the reflection in a known wall from which they are
+    unresolved, `seen` in place; returns the slope (H, B, 3, 1) by the share's error."""
     (second, inside, by_tx), (value, new, pose) = maps, seen
     split = np.zeros((*value.shape, 1))
     both = trials.mixed[rows].nonzero()[0]
@@ -232,7 +242,7 @@ def _mix(
 
 
 def _by_image(arrival: Floats, reach: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of length and cosines by the place from which a ray comes."""
+    """Derivatives (..., 3, 3) of length and cosines by the apparent place from which a ray arrives."""
     found = np.empty((*reach.shape, 3, 3))
     found[..., 0, :] = arrival
     found[..., 1:, :] = (AXES[:2] - arrival[..., :2, None] * arrival[..., None, :]) / reach[..., None, None]
@@ -240,7 +250,8 @@ def _by_image(arrival: Floats, reach: Floats) -> Floats:
 
 
 def smooth_paths(digest: TrackSummary) -> tuple[Floats, Floats]:
-    """Log evidence (T,) and cost (T,) of paths of no kind: length and cosines that change smoothly.
+    """Log evidence (T,) and cost (T,) of tracks as paths of none of the listed kinds, whose length and cosines change
+    smoothly.
 
     Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place
     counts with a density 1 over length and cosines.

@@ -1,4 +1,4 @@
-"""Images of known points in new walls, on either leg, straight or over one known wall besides.
+"""Hypotheses of known points' images in new walls, on either leg, straight or over one known wall besides.
 
 What makes walls known where wall returns are thrown away. On the leg to the Rx an image is a direction of its own. On
 the leg to the Tx the direction stays that of the point: a longer way from where a shorter one comes. Its length alone
@@ -33,7 +33,8 @@ from rislam_rt.slam.window.solver_limits import APART, BEARINGS, REACH
 
 
 def with_images(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
-    """The hypotheses (H,), and behind them the images of every known point in a new wall that are in reach."""
+    """Hypotheses with those appended of every known point's image in a new wall that a track's length and direction
+    allow."""
     ways = [(point, wall) for point in landmarks.points.tolist() for wall in (NONE, *landmarks.walls.tolist())]
     more = [_in_reach(_images(digest, known, point, wall), digest, known) for point, wall in ways]
     every = [table, *more]
@@ -43,7 +44,8 @@ def with_images(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, l
 
 
 def _images(digest: TrackSummary, known: KnownFeatures, point: int, wall: int) -> Hypotheses:
-    """The images of one point in a new wall for T tracks, over a known wall besides, or none (`NONE`)."""
+    """Hypotheses of T tracks as images of one known point in a new wall, over a known wall besides, or none
+    (`NONE`)."""
     (seen, _, rx), count = digest.mean, len(digest.seen)
     spot, root, still = known.place[point], known.root[point], (AXES, np.zeros(3), np.zeros((3, 3)))
     # kind; what the new wall mirrors, with its root; what stands on the other leg; the map behind the new wall
@@ -84,7 +86,8 @@ def _images(digest: TrackSummary, known: KnownFeatures, point: int, wall: int) -
 def _initial_values(
     digest: TrackSummary, kind: int, inner: Floats, other: Floats, outer: tuple[Floats, Floats, Floats]
 ) -> list[Floats]:
-    """Walls (T, 3) each: on the Tx leg level ones below and above, and upright ones all around."""
+    """Initial values of the new wall, a list of (T, 3): on the Rx leg one, on the Tx leg level walls below and above
+    and upright ones all around."""
     seen, tx, rx = digest.mean
     if kind not in FAR:
         reach = np.maximum(seen[:, 0] - np.linalg.norm(other - tx, axis=1), 0.1)
@@ -100,12 +103,13 @@ def _initial_values(
 
 
 def _mirror_of(digest: TrackSummary, spot: Floats, image: Floats) -> Floats:
-    """Walls (T, 3), as images of the agent, that mirror a point (3,) to the places (T, 3)."""
+    """Walls (T, 3), as images of the agent's position, that mirror a point (3,) to the places (T, 3)."""
     return reflect(np.broadcast_to(digest.middle, image.shape), image, np.broadcast_to(spot, image.shape))
 
 
 def _in_reach(table: Hypotheses, digest: TrackSummary, known: KnownFeatures) -> Hypotheses:
-    """Without what the track is too short for, and images on the Tx leg of points that it does not come from."""
+    """Drop image hypotheses whose path is longer than the track, and those on the Tx leg whose point lies in another
+    direction."""
     (seen, tx, rx), track, other = digest.mean, table.trials.track, table.trials.other
     out = other[:, None] - digest.rx[track]
     reach = np.linalg.norm(out, axis=2)
@@ -124,7 +128,8 @@ def _in_reach(table: Hypotheses, digest: TrackSummary, known: KnownFeatures) -> 
 
 
 def fitted_twice(table: Hypotheses, place: Floats, evidence: Floats) -> Integers:
-    """Rows of images on the Tx leg that another initial value has led to as well, with more evidence (H,)."""
+    """Rows of image hypotheses on the Tx leg whose fit ended where that of another initial value did, with more
+    evidence (H,)."""
     rows = (table.trials.far & np.isfinite(evidence)).nonzero()[0]
     rows = rows[np.argsort(-evidence[rows])]
     same = np.linalg.norm(place[rows][:, None] - place[rows], axis=-1) < APART
@@ -136,8 +141,8 @@ def fitted_twice(table: Hypotheses, place: Floats, evidence: Floats) -> Integers
 def image_amplitudes(
     table: Hypotheses, digest: TrackSummary, landmarks: WindowTable, radio: RadioConfig
 ) -> tuple[Integers, Floats]:
-    """Rows (R,) of images of known points, and the log probability (R,) of their amplitudes; the panel's hangs on
-    codes."""
+    """Rows (R,) of image hypotheses, and the log probability (R,) of their tracks' amplitudes; a panel's hangs on
+    codes, and has no misfit."""
     rows = IS_IMAGE[table.kind].nonzero()[0]
     if not len(rows):
         return rows, np.zeros(0)

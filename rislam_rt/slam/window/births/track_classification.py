@@ -1,4 +1,4 @@
-"""What a track is held to be: the posterior over all hypotheses with at most one new feature."""
+"""Track classification: the posterior over all hypotheses of what caused a track, each with at most one new feature."""
 
 from typing import NamedTuple
 
@@ -40,54 +40,54 @@ from rislam_rt.slam.window.state import WindowState
 
 
 class TrackDecision(NamedTuple):
-    """What a track is held to be."""
+    """Decision on what caused a track: the best hypothesis, its probability, and the new feature that it asks for."""
 
     kind: int
-    """-1: of no kind here."""
+    """Number in `hypotheses.KINDS`; -1: a path of no kind there."""
     probability: float
     known: int
     """Row of the known wall or point, -1 for none."""
     over: int
-    """Row of the known wall that an image of a known point runs over besides, -1 for none."""
+    """Row of a second known wall, on the path of a known point's image, -1 for none."""
     place: Floats
-    """(3,) of the new feature."""
+    """(3,) [m] of the new feature."""
     covariance: Floats
-    """(3, 3), the poses held."""
+    """(3, 3) [m^2] of that, the poses held fixed."""
     holds: DirectionPriors
-    """What may be held of it beforehand; its row is 0."""
+    """Direction priors of the new feature, whose row in them is 0."""
     share: float
-    """Of the edge with the known wall in its place, where it comes out as one with that."""
+    """Weight of the return over the edge with a known wall, where the new wall's return is unresolved from that."""
     misfit: float
-    """Standard deviations by which it costs more than noise makes it."""
+    """Standard deviations by which the fit's cost exceeds what noise makes it."""
     identity: PanelIdentity
-    """(1,) who it is, if it is a point."""
+    """(1,) panel identity, if it is a point."""
     length: float
     """[m] of its path."""
 
     @property
     def form(self) -> tuple[int, int, int, int, int]:
-        """Five rows, the new feature being `NEW`."""
+        """Form of the track's path as five feature rows, with `NEW` for the new feature."""
         held = {KNOWN: self.known, OVER: self.over}
         base, *walls = (held.get(part, part) for part in _TEMPLATES[self.kind])
         return base, walls[0], walls[1], walls[2], walls[3]
 
     @property
     def is_wall(self) -> bool:
-        """Whether the new feature is one."""
+        """Whether the new feature is a wall."""
         return self.kind in WALLS
 
     @property
     def is_return(self) -> bool:
-        """Whether the track is a wall return: the Tx's own image."""
+        """Whether the track is a wall return, a path over walls alone."""
         return self.kind >= 0 and _TEMPLATES[self.kind][0] == TX
 
 
 NEW = -5
-"""In a form: the feature that is sought."""
+"""Stands in a form for the new feature."""
 KNOWN = -6
-"""In a template: the known wall, or the known point."""
+"""Stands in a form's template for the known wall, or the known point."""
 OVER = -7
-"""In a template: the known wall that an image of a known point runs over besides."""
+"""Stands in a form's template for the second known wall, on the path of a known point's image."""
 _TEMPLATES = (
     (TX, NONE, NONE, NEW, NONE), (TX, NONE, NONE, KNOWN, NEW), (TX, NONE, NONE, NEW, KNOWN),
     (NEW, NONE, NONE, NONE, NONE), (NEW, NONE, NONE, KNOWN, NONE), (NEW, KNOWN, NONE, NONE, NONE),
@@ -96,14 +96,14 @@ _TEMPLATES = (
     (KNOWN, OVER, NONE, NEW, NONE), (KNOWN, NONE, NONE, OVER, NEW), (KNOWN, NONE, NONE, NEW, OVER),
     (KNOWN, NEW, NONE, OVER, NONE),
 )  # fmt: skip
-"""Form of each kind."""
+"""Template of the form of each kind of hypothesis, in the order of `hypotheses.KINDS`."""
 
 
 def _weigh(
     context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures, lonely: Floats
 ) -> tuple[Hypotheses, Fits, Floats, Floats]:
-    """What T tracks may be, fitted, with log evidence (H,), and the length (H,) [m] that the path then has: as heard,
-    or whole periods of the sounding more."""
+    """Fit all hypotheses of what caused T tracks, and return them, their fits, log evidences (H,), and path lengths
+    (H,) [m]: as heard, or whole periods of the sounding more."""
     landmarks, scene, near = context.landmarks, context.scene, len(digest.seen)
     owner = np.arange(near)
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
@@ -147,12 +147,14 @@ def judge(
     told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
-    """Verdicts of T tracks, and the posterior (E,) of each of the explanations by the map.
+    """Decide what caused each of T tracks, and return the decisions with the posteriors (E,) of the explanations by the
+    map.
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
-    `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that two walls throw so few single
-    returns beside it, `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
+    `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that so few single-bounce returns are
+    heard beside a return over two unknown walls, `beside` (T,) the log odds that its direction speaks for a path over
+    unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
     table, fits, evidence, length = _weigh(context, ats, digest, known, lonely)
@@ -199,7 +201,7 @@ def judge(
 
 
 def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
-    """Log prior density (T,) of paths of no kind here by what is seen of them, length [m] and two cosines (T, 3).
+    """Log prior density (T,) of tracks as paths of none of the listed kinds, from length [m] and two cosines (T, 3).
 
     They seem to come from anywhere in the ball of places, half as far off as they are long. With wall returns they run
     over walls that the map lacks; without, where most walls stay unknown, they are as frequent as points.
@@ -210,9 +212,9 @@ def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
 
 
 def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
-    """Which others of a track's hypotheses `own` put the same feature where hypothesis `at` has it: it is in question
-    then over which known wall it is heard (before or after, where two stand at right angles), not whether it is there.
-    """
+    """Which other hypotheses `own` of a track put the same kind of feature where hypothesis `at` has it: in question is
+    only over which known wall it is heard (before or after, where two stand at right angles), not whether it is
+    there."""
     wall, pair = table.trials.is_wall, table.trials.is_pair | table.trials.far
     if pair[at]:
         return np.zeros(len(own), dtype=np.bool_)
@@ -222,11 +224,13 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
 
 
 COST_MEAN, COST_STD = 3.56, 2.17
-"""Mean and standard deviation of `(4 + 3) log(1 + chi^2 / 4)` for chi^2 with 3 degrees of freedom."""
+"""Mean and standard deviation of a fit's cost per measurement under noise alone: `(4 + 3) log(1 + chi^2 / 4)` for chi^2
+with 3 degrees of freedom."""
 
 
 def wanted(verdict: TrackDecision) -> bool:
-    """Whether a verdict is clear enough to enter the map: likely, a fit, and known well enough to be linear in."""
+    """Whether a decision is clear enough for its feature to enter the map: likely, a fit, and located well enough to be
+    linearised."""
     if verdict.kind < 0 or verdict.kind == TWO_WALLS:
         return False
     holds = verdict.holds

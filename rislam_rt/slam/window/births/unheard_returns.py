@@ -1,4 +1,4 @@
-"""What it tells of a new wall that is heard over a known one that its own return is not heard."""
+"""Evidence against a new wall that is heard over a known one, from its own single-bounce return not being heard."""
 
 import math
 
@@ -24,8 +24,8 @@ def log_unheard(
     context: WindowState, table: Hypotheses, ats: list[Integers], owner: Integers, evidence: Floats, place: Floats,
     spread: Floats, digest: TrackSummary,
 ) -> Floats:  # fmt: skip
-    """(H,) log probability that the own returns of new walls at `place` (H, 3) [m], within covariances `spread`
-    (H, 3, 3) [m^2], are heard no oftener than they are; 0 where the track is that return itself.
+    """Log probability (H,) that the single-bounce returns of new walls at `place` (H, 3) [m], within covariances
+    `spread` (H, 3, 3) [m^2], are detected no oftener than they are; 0 for hypotheses not over a known wall.
 
     `ats` are the tracks' rows of the log, `owner` the track of each row of the digest, `evidence` (H,) without this.
     """
@@ -58,8 +58,8 @@ def log_unheard(
 
 
 def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, digest: TrackSummary) -> Floats:
-    """(K,) probability that the own returns of these lengths (K,) [m] of hypothesis `row`'s wall are in the
-    window and above the threshold: as loud as what the wall leaves of the path over the known one as well tells."""
+    """Detection probability (K,) of single-bounce returns of lengths (K,) [m] over the wall of hypothesis `row`, whose
+    reflectivity follows from the track's amplitude."""
     radio, track, wall = context.scene.radio, table.trials.track[row], table.known[row]
     told = digest.log_amplitude[track] - free_space(radio) + np.log(digest.mean[0][track, 0])
     noise = context.landmarks.ratio_variance[wall] + CONSTANTS.fading**2
@@ -72,10 +72,10 @@ def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, di
 
 
 def log_silence(shows: Floats, present: Booleans) -> float:
-    """Log probability that a return that shows with probabilities (K,), were nothing in its way, is silent in the
-    cycles in which nothing is `present` (K,) where it would be; what is there may be it, and tells nothing.
+    """Log probability that a return with detection probabilities (K,), were nothing in its way, is missed in all cycles
+    in which no component is `present` (K,) at its place; one that is there may be it, and tells nothing.
 
-    What stands in its way comes and goes as it does for every return (`landmark_update.recall_forms`).
+    Occlusion comes and goes as it does for every return (`landmark_update.recall_forms`).
     """
     found, clear = 0.0, CONSTANTS.steady**2
     for show, heard in zip(shows.tolist(), present.tolist(), strict=True):

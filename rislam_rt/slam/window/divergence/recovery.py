@@ -1,4 +1,4 @@
-"""Recovery of a belief that may be lost: another start, another place, or a new beginning."""
+"""Recovery from divergence: a corrected start, a jump to another position, or a restart with an empty map."""
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def ask(state: WindowState) -> tuple[WindowState, bool]:
-    """Whether the picture moves as the agent is told; the start as the first tracks would have it."""
+    """Check the motion against the rates of path lengths: before any birth a wrong start is corrected, later the odds
+    of being lost are updated; also returns whether it was corrected."""
     if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
@@ -45,7 +46,8 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
 
 
 def restart(state: WindowState) -> WindowState:
-    """The pose that is kept, with what it may be off by beside it, and nothing else."""
+    """State after a restart with an empty map: the pose is kept, its position's deviation grown by `walk` beside the
+    Gaussian."""
     window = state.window
     mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
@@ -67,7 +69,8 @@ def restart(state: WindowState) -> WindowState:
 
 
 def landed(state: WindowState, by: Floats) -> WindowState:
-    """After a jump: the last pose alone, with the map; held for lost until the next cycle agrees."""
+    """State after a jump by `by` (3,) [m]: the last pose alone, with the map, and even odds of being lost until the
+    next cycle."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
         window=divergence_monitor.landed(state.window, by), motion_mode=state.level, heading=state.heading[-1:],

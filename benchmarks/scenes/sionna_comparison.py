@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from sionna_paths import solve_file
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compare.comparison_report import PathReport
@@ -45,8 +46,6 @@ def compare_with_path_solver(
     `samples` rays are shot from each device: candidates are found at random, more rays find more of them. The panel is
     left out, and so are scatterers with an occluding mesh: it hides its own centre from Sionna.
     """
-    from rislam_rt.channel.traced.path_solver import solve_file
-
     alone = tuple(s for s in scene.scatterers if s.shade is None)
     hiding = tuple(replace(s.shade, name=s.name) for s in scene.scatterers if s.shade is not None)
     scene = replace(scene, ris=None, scatterers=alone, occluders=(*scene.occluders, *hiding))
