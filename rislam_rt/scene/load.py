@@ -25,7 +25,7 @@ SCENE_FILE = "scene.toml"
 
 
 class SceneDraft(NamedTuple):
-    """A scene as far as it could be read."""
+    """A scene folder as far as it could be read: the scene, None if it is unusable, and what is wrong with it."""
 
     file: str
     scene: Scene | None
@@ -35,7 +35,7 @@ class SceneDraft(NamedTuple):
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene of a folder, of its `scene.toml`, or the built-in room of that name.
+    """Load a scene from its folder, its `scene.toml`, or the name of a built-in room.
 
     Raises
     ------
@@ -68,6 +68,7 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
 
 
 def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+    """Check a scene that has been read: its errors, or if it has none its warnings and notes."""
     errors = find_errors(scene, file)
     if radio is not None:
         errors += material_errors(scene, file, radio)
@@ -75,7 +76,7 @@ def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding
 
 
 def _plain_table(file: Path) -> dict[str, Any]:
-    """The scene file as TOML gives it; empty if it is none."""
+    """Content of a scene file as TOML gives it, not validated; empty if it cannot be read."""
     try:
         return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
     except (OSError, ValueError):
@@ -83,7 +84,7 @@ def _plain_table(file: Path) -> dict[str, Any]:
 
 
 def read_draft(path: str | Path) -> SceneDraft:
-    """Read a scene, collecting what is wrong with it instead of raising."""
+    """Read a scene folder, collecting what is wrong with it instead of raising."""
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
@@ -93,18 +94,20 @@ def read_draft(path: str | Path) -> SceneDraft:
 
 
 def scene_file(path: str | Path) -> Path:
-    """The scene file of a scene folder; a file is taken as it is."""
+    """Path of the scene file that a scene folder, a scene file or the name of a built-in room stands for."""
     path = find_room(path)
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
-    """Read what a specification names and put the scene together."""
+    """Build a scene from the validated content of its file: read the meshes that it names, and collect what is wrong
+    with them."""
     shelf = MeshFiles(file.parent, spec.limits, spec.meshes)
     findings: list[Finding] = []
 
     def made(kind: str, sections: Sequence[Any], build: Callable[[Any], Any]) -> list[Any]:
-        """The parts that can be made; what is wrong with the others goes to the findings."""
+        """Reflectors, scatterers, occluders or panels made from their sections of the scene file; what is wrong with a
+        section goes to the findings."""
         found = []
         for number, section in enumerate(sections):
             try:
@@ -140,11 +143,12 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
 
 
 def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
-    """(T, 3, 3) [m] of all loaded surfaces that stand in an agent's way."""
+    """Triangles (T, 3, 3) [m] of all reflectors and occluders of a scene, from which a random walk keeps away."""
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
 
 
 def _material(section: MaterialSection) -> Material:
+    """Material of a reflector from its section of the scene file."""
     given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
     return Material(
         section.reflection,
@@ -159,7 +163,8 @@ def _material(section: MaterialSection) -> Material:
 
 
 def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
-    """Load a scatterer: the paper's sphere has the cross-section pi r^2, unless the file gives another one.
+    """Scatterer from its section of the scene file: a sphere has the cross-section pi r^2, as in the paper, unless the
+    file gives another one.
 
     A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.
     """
@@ -180,7 +185,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
 
 
 def build_panel(section: RisSection) -> RisPanel:
-    """Build the panel of a scene file's section.
+    """RIS panel from its section of the scene file.
 
     Raises
     ------

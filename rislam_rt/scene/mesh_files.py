@@ -12,7 +12,8 @@ from rislam_rt.scene.schema import LimitsSection, MeshesSection, MeshSection
 
 
 class MeshFiles:
-    """The mesh files of a scene: each is read once and kept for the digest, and together they have so many faces."""
+    """Reader of a scene's mesh files: each is read once and kept for the digest, and together they have no more faces
+    than the scene's limit."""
 
     def __init__(self, folder: Path, limits: LimitsSection, lying: MeshesSection) -> None:
         self.folder, self.limits, self.lying = folder, limits, lying
@@ -21,7 +22,8 @@ class MeshFiles:
         self.faces = 0
 
     def mesh(self, place: str, section: MeshSection) -> Mesh:
-        """The mesh `file` or `file#node`, placed as its section says, or else all meshes of the scene."""
+        """Read the mesh `file` or `file#node` of a scene and place it in the room as its section says, or else as
+        `[meshes]` says for all."""
         name, _, node = place.partition("#")
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)

@@ -1,4 +1,5 @@
-"""A walk through a room at random: waypoints drawn one after the other, each as far from every surface as is asked."""
+"""A random walk of the agent through a room: waypoints drawn one after the other, each as far from every surface as is
+asked."""
 
 import numpy as np
 
@@ -9,22 +10,23 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 WIDEST_TURN = np.radians(110.0)
-"""[rad] Largest turn at a corner."""
+"""Largest turn [rad] at a corner of a random walk."""
 LEG = (0.5, 6.0)
-"""[m] Range of the legs drawn, log-uniform, besides what the arcs at both ends take."""
+"""Range [m] of the lengths drawn for a random walk's legs, log-uniform, besides what the arcs at both ends take."""
 LOOK = 0.05
-"""[m] Step along the way at which its distance from the surfaces is looked at; a quarter of the clearance, if less."""
+"""Spacing [m] of the points of a random walk at which its distance from the surfaces is checked; a quarter of the
+clearance, if less."""
 TRIES, STEPS_BACK = 40, 3
-"""Draws of a next waypoint before the last few are given up, and how many those are."""
+"""Draws of a random walk's next waypoint before the last few waypoints are given up, and how many those are."""
 GIVE_UP = 400
-"""Waypoints given up before the walk is."""
+"""Times that waypoints are given up before the random walk is."""
 
 
 def draw_walk(
     start: Floats, length: float, radius: float, clearance: float, triangles: Floats, *, rng: np.random.Generator
 ) -> RoundedPath:
-    """A level way of at least `length` [m] from `start` (3,) with corners of `radius` [m], `clearance` [m] or more from
-    all triangles (T, 3, 3).
+    """Draw a level random walk of at least `length` [m] from `start` (3,), with corners of `radius` [m], `clearance`
+    [m] or more from all triangles (T, 3, 3).
 
     Raises
     ------
@@ -56,6 +58,7 @@ def draw_walk(
 
 
 def _next(points: list[Floats], radius: float, rng: np.random.Generator) -> Floats:
+    """Draw the next waypoint (3,) [m] of a random walk."""
     if len(points) > 1:
         last = points[-1] - points[-2]
         course = np.arctan2(last[1], last[0]) + rng.uniform(-WIDEST_TURN, WIDEST_TURN)
@@ -66,7 +69,7 @@ def _next(points: list[Floats], radius: float, rng: np.random.Generator) -> Floa
 
 
 def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: Floats) -> bool:
-    """Whether the last two legs of a random walk and the corner between them keep clear."""
+    """Whether the last two legs of a random walk and the corner between them keep their clearance from all surfaces."""
     corners = triangles.reshape(-1, 3)
     if (points[-1] < corners.min(axis=0)).any() or (points[-1] > corners.max(axis=0)).any():
         return False
@@ -79,5 +82,6 @@ def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: 
 
 
 def _look(clearance: float) -> float:
-    """Step [m] at which a random walk is looked at: between two looks it comes nearer by half of it at most."""
+    """Spacing [m] of the points at which a random walk's clearance is checked: between two of them it comes nearer by
+    half of it at most."""
     return min(LOOK, clearance / 4.0)

@@ -22,7 +22,7 @@ TRAJECTORY_FILE = "path.tum"
 
 
 def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a scene's files into a folder, which it returns.
+    """Write a scene as the files of a scene folder. Returns the folder.
 
     Raises
     ------
@@ -35,7 +35,8 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
-    """A scene as files, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless straight."""
+    """Files of a scene folder, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless
+    straight."""
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
@@ -81,7 +82,7 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
-    """Poses as TUM lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
+    """Content of a TUM file of poses, lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
         row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
@@ -91,6 +92,7 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
 
 
 def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
+    """Write files into a temporary folder, each synchronised with the disk."""
     for name, content in files.items():
         target = staged / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -101,6 +103,7 @@ def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
 
 
 def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
+    """Move a temporary folder to its place by one rename, or its files one by one into a folder that exists."""
     if not folder.exists():
         staged.chmod(0o755)
         staged.rename(folder)
@@ -111,6 +114,7 @@ def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
+    """Table of `scene.toml` for a scene, with the table of its agent."""
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
         {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
@@ -124,6 +128,7 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
 
 
 def _panel_table(panel: RisPanel) -> dict[str, Any]:
+    """Table of `scene.toml` for a RIS panel."""
     spec, table = panel.spec, {"name": panel.name, "center": panel.center.tolist()}
     table |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
     table |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
@@ -132,7 +137,7 @@ def _panel_table(panel: RisPanel) -> dict[str, Any]:
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
-    """Table to write for a scatterer: a cross-section where it does not follow from shape and law."""
+    """Table of `scene.toml` for a scatterer: a cross-section where it does not follow from shape and law."""
     radius, table = scatterer.radius, {"name": scatterer.name, "position": scatterer.position.tolist()}
     table |= {"radius": radius} if radius is not None else {}
     if scatterer.height is not None:
@@ -149,7 +154,8 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
 
 
 def _has_own_shadow(scatterer: Scatterer) -> bool:
-    """Whether to write a shade as `shadow = true`, which makes the same."""
+    """Whether a scatterer's occluder is the mesh of its own sphere or cylinder, so that `shadow = true` is written for
+    it."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
@@ -158,11 +164,12 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
 
 
 def mesh_file(name: str) -> str:
-    """Where the mesh of a part lies in a scene folder."""
+    """Relative path in a scene folder of the PLY file of a reflector's or occluder's mesh."""
     return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:
+    """Table of `scene.toml` for a material."""
     thick = {"thickness_m": material.thickness}
     if material.reflection is not None:
         own: dict[str, Any] = {"reflection": material.reflection}
@@ -176,7 +183,7 @@ def _material_table(material: Material) -> dict[str, Any]:
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:
-    """Table to write for the agent: a straight motion by its velocity, any other by its path file."""
+    """Table of `scene.toml` for the agent: a straight motion by its velocity, any other by its path file."""
     offsets = {"tx_offset_m": agent.body.tx_offset.tolist(), "rx_offset_m": agent.body.rx_offset.tolist()}
     cycles, velocity = len(agent), agent.velocity[0]
     heading = float(np.arctan2(velocity[1], velocity[0])) if velocity[:2].any() else 0.0
