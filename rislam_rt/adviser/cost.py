@@ -47,9 +47,9 @@ def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[TraceCost]:
             costs.append(TraceCost(depth, walls, legs * most, None, None))
             continue
         channel = ImageSourceChannel(scene, radio, depth)
-        asked, paths = _asked(channel, depth), int(channel.paths(middle).valid.sum())
-        seconds = START_SECONDS + len(scene.agent) * (PATH_SECONDS * paths + SEQUENCE_SECONDS * asked)
-        costs.append(TraceCost(depth, walls, asked, paths, seconds))
+        sequences, paths = _count_sequences(channel, depth), int(channel.paths(middle).valid.sum())
+        seconds = START_SECONDS + len(scene.agent) * (PATH_SECONDS * paths + SEQUENCE_SECONDS * sequences)
+        costs.append(TraceCost(depth, walls, sequences, paths, seconds))
     return costs
 
 
@@ -62,7 +62,7 @@ def cost_words(cost: TraceCost) -> str:
     return f"{bounces}: {cost.sequences} wall sequences, {cost.paths} paths at a time, {cost.seconds:.2g} s"
 
 
-def _asked(channel: ImageSourceChannel, depth: int) -> int:
+def _count_sequences(channel: ImageSourceChannel, depth: int) -> int:
     """Number of wall sequences that tracing has to test: of all legs at the middle of the trajectory, those that the
     walls' sides leave possible, the empty sequence of each leg included."""
     scene, facets, row = channel.scene, channel.looked.facets, len(channel.scene.agent) // 2

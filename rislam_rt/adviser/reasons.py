@@ -36,11 +36,11 @@ class Reasons(NamedTuple):
         front = self.scene.panels[panel] if panel >= 0 else None
         if front is not None and (agent.position[place] - front.center) @ front.spec.normal <= 0.0:
             return "the agent is behind the panel"
-        hider = self._hider(point, place, number)
+        blocker = self._blocker(point, place, number)
         weak = margin_db < 0.0
         own = (self.paths.landmark == number) & self.paths.valid[place]
-        if hider and weak:
-            return f"shaded by '{hider}'"
+        if blocker and weak:
+            return f"shaded by '{blocker}'"
         upper = self.settings.radio.array.pattern == "upper"
         if own.any() and upper and (self.paths.arrival[place, own, 2] < -HORIZON_MARGIN).all():
             return "below the array, which hears from above only"
@@ -50,7 +50,7 @@ class Reasons(NamedTuple):
             return "no path"
         return WEAK if weak else ""
 
-    def _hider(self, point: Floats, place: int, number: int) -> str:
+    def _blocker(self, point: Floats, place: int, number: int) -> str:
         """Name of the reflector or occluder that stands between a landmark and Tx or Rx at one position; empty if none
         does."""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):

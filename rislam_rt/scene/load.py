@@ -58,16 +58,16 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
     warnings only those about units are looked for: such a mistake often is what the errors come from.
     """
     if isinstance(scene, Scene):
-        return _look_at(scene, scene.name, radio)
+        return _check_read(scene, scene.name, radio)
     draft = read_draft(scene)
-    findings = draft.findings if draft.scene is None else _look_at(draft.scene, draft.file, radio)
+    findings = draft.findings if draft.scene is None else _check_read(draft.scene, draft.file, radio)
     units = list(unit_warnings(draft.file, _plain_table(Path(draft.file)), draft.bounds))
     if any(finding.severity == "error" for finding in findings):
         return findings + units
     return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it
 
 
-def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
     """Check a scene that has been read: its errors, or if it has none its warnings and notes."""
     errors = find_errors(scene, file)
     if radio is not None:
@@ -102,7 +102,7 @@ def scene_file(path: str | Path) -> Path:
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     """Build a scene from the validated content of its file: read the meshes that it names, and collect what is wrong
     with them."""
-    shelf = MeshFiles(file.parent, spec.limits, spec.meshes)
+    mesh_files = MeshFiles(file.parent, spec.limits, spec.meshes)
     findings: list[Finding] = []
 
     def made(kind: str, sections: Sequence[Any], build: Callable[[Any], Any]) -> list[Any]:
@@ -121,15 +121,15 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     reflectors = made(
         "reflector",
         spec.reflector,
-        lambda one: Reflector(one.name, *shelf.mesh(one.mesh, one), _material(one.material)),
+        lambda one: Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material)),
     )
-    scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, shelf))
-    occluders = made("shade", spec.shade, lambda one: Occluder(*shelf.mesh(one.mesh, one), one.name))
+    scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, mesh_files))
+    occluders = made("shade", spec.shade, lambda one: Occluder(*mesh_files.mesh(one.mesh, one), one.name))
     panels = made("ris", spec.ris, build_panel)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
             surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
-            agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
+            agent, mesh_files.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
     corners = np.concatenate([np.zeros((0, 3)), *(reflector.vertices for reflector in reflectors)])
@@ -137,7 +137,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     if findings:
         return SceneDraft(str(file), None, findings, bounds)
     ris = join_panels(tuple(panels))
-    digest = _digest(content, shelf.contents)
+    digest = _digest(content, mesh_files.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
     return SceneDraft(str(file), scene, [], bounds)
 
@@ -162,7 +162,7 @@ def _material(section: MaterialSection) -> Material:
     )
 
 
-def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
+def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:
     """Scatterer from its section of the scene file: a sphere has the cross-section pi r^2, as in the paper, unless the
     file gives another one.
 
@@ -177,7 +177,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
         rcs = np.pi * (radius or 0.0) ** 2
     mesh = None
     if section.mesh is not None:
-        mesh = shelf.mesh(section.mesh, section)
+        mesh = mesh_files.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
     shade = None if mesh is None else Occluder(*mesh)

@@ -15,8 +15,8 @@ class MeshFiles:
     """Reader of a scene's mesh files: each is read once and kept for the digest, and together they have no more faces
     than the scene's limit."""
 
-    def __init__(self, folder: Path, limits: LimitsSection, lying: MeshesSection) -> None:
-        self.folder, self.limits, self.lying = folder, limits, lying
+    def __init__(self, folder: Path, limits: LimitsSection, placement: MeshesSection) -> None:
+        self.folder, self.limits, self.placement = folder, limits, placement
         self.contents: dict[str, bytes] = {}
         self.reader = MeshReader()
         self.faces = 0
@@ -28,11 +28,11 @@ class MeshFiles:
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)
         most = self.limits.faces
-        up, unit = section.up_axis or self.lying.up, UNITS[section.units or self.lying.units]
+        up, unit = section.up_axis or self.placement.up, UNITS[section.units or self.placement.units]
         reach = MAX_COORDINATE / unit
         mesh = self.reader.parse(self.contents[name], name, node or None, most, self.limits.nodes, reach)
         self.faces += len(mesh.faces)
         if self.faces > most:
             raise too_many_faces(self.faces, most)
-        origin = self.lying.origin if section.origin is None else section.origin
+        origin = self.placement.origin if section.origin is None else section.origin
         return Mesh(place_points(mesh.vertices, up, unit, np.array(origin)), mesh.faces)

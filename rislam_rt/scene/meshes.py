@@ -100,7 +100,7 @@ class MeshReader:
         if self._key != (file_type, content):
             self._loaded = unfold(content, file_type)
             self._key = (file_type, content)
-        with _one_answer(file_type):
+        with _errors_as_faults(file_type):
             return _flatten(self._loaded, node)
 
 
@@ -115,7 +115,7 @@ def unfold(content: bytes, file_type: str) -> Any:
     """
     import trimesh
 
-    with _one_answer(file_type):
+    with _errors_as_faults(file_type):
         return trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
 
 
@@ -151,7 +151,7 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 
 @contextmanager
-def _one_answer(file_type: str) -> Iterator[None]:
+def _errors_as_faults(file_type: str) -> Iterator[None]:
     """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep numpy's warnings back."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():

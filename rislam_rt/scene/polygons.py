@@ -70,12 +70,12 @@ def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: fl
     for begin, end in zip(anchors, [*anchors[1:], anchors[0] + len(loop)], strict=True):
         chain = [loop[i % len(loop)] for i in range(begin, end + 1)]
         turned = chain[0] > chain[-1]
-        chain = _drop_slivers(chain[::-1] if turned else chain, points, tolerance)
+        chain = _simplify_chain(chain[::-1] if turned else chain, points, tolerance)
         thinned += (chain[::-1] if turned else chain)[:-1]
     return thinned
 
 
-def _drop_slivers(chain: list[int], points: Floats, tolerance: float) -> list[int]:
+def _simplify_chain(chain: list[int], points: Floats, tolerance: float) -> list[int]:
     """Simplify an open chain of corners within a tolerance by Douglas and Peucker's algorithm; its ends stay."""
     keep, stack = {0, len(chain) - 1}, [(0, len(chain) - 1)]
     while stack:

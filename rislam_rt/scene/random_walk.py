@@ -34,7 +34,7 @@ def draw_walk(
         The start is nearer than that to a surface, or no way is found.
     """
     gap = float(distance_to_triangles(start[None], triangles).min())
-    if gap < clearance + 0.5 * _look(clearance):
+    if gap < clearance + 0.5 * _check_step(clearance):
         raise Fault(f"the start is {gap:.3g} m from a surface", "move it, or lower agent.random_walk.clearance_m")
     points, given_up = [start], 0
     while True:
@@ -74,14 +74,14 @@ def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: 
     if (points[-1] < corners.min(axis=0)).any() or (points[-1] > corners.max(axis=0)).any():
         return False
     way = round_corners(np.array(points[-3:]), radius)
-    count = int(np.ceil(way.total / _look(clearance))) + 1
+    count = int(np.ceil(way.total / _check_step(clearance))) + 1
     places, _ = way.at(np.linspace(0.0, way.total, count))
     if len(crossings(places[:-1], places[1:], triangles)[0]):
         return False
-    return float(distance_to_triangles(places, triangles).min()) >= clearance + 0.5 * _look(clearance)
+    return float(distance_to_triangles(places, triangles).min()) >= clearance + 0.5 * _check_step(clearance)
 
 
-def _look(clearance: float) -> float:
+def _check_step(clearance: float) -> float:
     """Spacing [m] of the points at which a random walk's clearance is checked: between two of them it comes nearer by
     half of it at most."""
     return min(LOOK, clearance / 4.0)

@@ -1,4 +1,4 @@
-"""Rooms drawn at random, in memory: what a classifier learns from, so that every named room stays unseen."""
+"""Random box rooms, drawn in memory: what a classifier learns from, so that every named room stays unseen."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from rislam_rt.scene.solids import sphere_mesh
 SIZE, HEIGHT = (3.5, 9.0), (2.3, 4.0)
 """Ranges of a room's sides and height [m]."""
 TILTED, TILT = 0.4, 0.08
-"""Share of rooms whose planes all lean, and standard deviation of their normals then."""
+"""Share of rooms whose planes all lean, and the standard deviation of their normals then."""
 FURNISHED = 0.4
 """Share of rooms with a reflecting block on the floor."""
 REFLECTION, RADIUS = (0.3, 0.95), (0.03, 0.3)
@@ -32,7 +32,8 @@ MARGIN = 0.5
 
 
 def random_room(name: str, *, rng: np.random.Generator) -> Scene:
-    """A room with walls, perhaps a block, one to four spheres, and perhaps a panel; the agent stands at a corner."""
+    """Draw a random box room: walls, perhaps a block, one to four spheres, and perhaps a RIS panel; the agent stands at
+    a corner."""
     size = np.array([*rng.uniform(*SIZE, size=2), rng.uniform(*HEIGHT)])
     corners = _corners(size, TILT if rng.uniform() < TILTED else 0.0, rng)
     meshes = hexahedron(corners)
@@ -53,7 +54,7 @@ def random_room(name: str, *, rng: np.random.Generator) -> Scene:
 
 
 def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
-    """Corners of a random box room (2, 2, 2, 3): each the common point of three planes, so that faces are flat."""
+    """Corners (2, 2, 2, 3) of a random box room: each the common point of three planes, so that faces are flat."""
     normal = np.concatenate([np.eye(3), np.eye(3)]).reshape(2, 3, 3)
     normal = unit(normal + tilt * rng.standard_normal((2, 3, 3)))
     point = np.stack([0.5 * size * (1.0 - np.eye(3)), 0.5 * size * (1.0 + np.eye(3))])
@@ -66,6 +67,7 @@ def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
 
 
 def _materials(count: int, rng: np.random.Generator) -> list[Material]:
+    """Draw the materials of a random box room's walls and block."""
     kind = rng.uniform()
     if kind < ALIKE:
         return count * [Material(reflection=float(rng.uniform(*REFLECTION)))]
@@ -76,6 +78,7 @@ def _materials(count: int, rng: np.random.Generator) -> list[Material]:
 
 
 def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
+    """Draw a spherical scatterer in a random box room."""
     radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
     center = rng.uniform([MARGIN, MARGIN, 0.15 * size[2]], [*(size[:2] - MARGIN), 0.8 * size[2]])
     shade = None
@@ -86,7 +89,7 @@ def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
 
 
 def _panel(corners: Floats, size: Floats, rng: np.random.Generator) -> RisPanel:
-    """In the ceiling or in the upper half of a wall, its front into the room."""
+    """Draw a RIS panel in the ceiling of a random box room or in the upper half of a wall, its front into the room."""
     host, (a, b, c) = "ceiling", (corners[0, 0, 1], corners[1, 0, 1], corners[0, 1, 1])
     share = rng.uniform(0.25, 0.75, size=2)
     if rng.uniform() >= CEILING_PANEL:
