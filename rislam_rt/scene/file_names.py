@@ -1,4 +1,4 @@
-"""File names from the names of walls, scatterers and rooms, which may be in any script."""
+"""File names in a scene folder from the names of walls, scatterers and rooms, which may be in any script."""
 
 import hashlib
 import re

@@ -59,7 +59,7 @@ def panel_key(number: int, panels: int) -> str:
 
 
 def one_line(text: str) -> str:
-    """Text without line breaks and other control characters (names in hostile files may hold both)."""
+    """Text of a finding without line breaks and other control characters (names in hostile files may hold both)."""
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
 
 

@@ -1,4 +1,4 @@
-"""Loading a scene folder as a `Scene`."""
+"""Loading of a scene folder as a `Scene`."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -22,6 +22,7 @@ from rislam_rt.shipped import find_room
 from rislam_rt.toml import parse_toml
 
 SCENE_FILE = "scene.toml"
+"""Name of the scene file in a scene folder."""
 
 
 class SceneDraft(NamedTuple):
@@ -51,7 +52,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
-    """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
+    """Find everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
     A bad scene is an answer, not an exception. Materials are held against the carrier of a radio that is given;
     warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, of the

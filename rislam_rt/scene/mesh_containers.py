@@ -30,7 +30,8 @@ def too_many_faces(count: int, limit: int) -> Fault:
 
 
 def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
-    """Refuse a GLB file whose nodes, unfolded, are too many, or have too many faces.
+    """Refuse a GLB mesh file whose nodes are too many, or, each mesh counted as often as a node names it, have too many
+    faces.
 
     What cannot be read as a GLB file passes: the reader will say what is wrong with it.
 
@@ -56,7 +57,7 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
 
 
 def _document(content: bytes) -> dict[str, Any]:
-    """The JSON chunk of a GLB file; empty if there is none."""
+    """Table of contents (JSON chunk) of a GLB mesh file; empty if there is none."""
     try:
         magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
         found = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}

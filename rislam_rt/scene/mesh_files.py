@@ -1,4 +1,4 @@
-"""The mesh files of a scene, each read once."""
+"""Mesh files of a scene, each read once and placed in the room."""
 
 from pathlib import Path
 

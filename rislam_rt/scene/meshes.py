@@ -19,6 +19,7 @@ from rislam_rt.scene.mesh_containers import check_glb, too_many_faces, without_c
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""
 MAX_MESH_BYTES = 200_000_000
+"""Most bytes of a mesh file."""
 MAX_FACES = 50_000
 """Most faces of a scene by default: what check and trace serve within minutes; a scene file can raise it."""
 MAX_COORDINATE = 1e5

@@ -16,7 +16,9 @@ from rislam_rt.scene.schema import AgentSection
 from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 MAX_TUM_BYTES = 100_000_000
+"""Most bytes of a recording of the agent's motion."""
 MAX_CYCLES = 1_000_000
+"""Most cycles of a trajectory."""
 SAME_STEP = 1e-6
 """Steps [s] of a recording this near to the cycle are the cycle; time stamps from the epoch on are no finer."""
 LONGEST_GAP = 5.0

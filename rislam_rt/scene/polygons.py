@@ -149,7 +149,7 @@ def _opens_to(ring: list[int], i: int, points: Floats, target: Floats) -> bool:
 
 
 def _crosses_any(start: Floats, end: Floats, heads: Floats, tails: Floats) -> bool:
-    """Whether a segment passes through the inside of any other."""
+    """Whether a segment crosses any of several others, other than at its ends."""
     a, b = _turn(heads, tails, start), _turn(heads, tails, end)
     c, d = _turn(start, end, heads), _turn(start, end, tails)
     small = 1e-12 * float(np.abs(heads).max(initial=1.0)) ** 2

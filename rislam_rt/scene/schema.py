@@ -26,7 +26,8 @@ Name = Annotated[
     Field(pattern=r"^[.\-]*[\p{L}\p{N}_][\p{L}\p{M}\p{N}_.\-]*$", max_length=64),
     AfterValidator(lambda name: unicodedata.normalize("NFC", name)),
 ]
-"""Letters and digits of any script, in the composed form, so that names which look alike are alike."""
+"""Name in a scene file: letters and digits of any script, in the composed form, so that names which look alike are
+alike."""
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
@@ -168,7 +169,7 @@ class WalkSection(SceneSection):
 
     seed: Annotated[int, Field(ge=0, lt=2**63)]
     clearance_m: Length = 0.4
-    """Least distance from every surface."""
+    """Least distance [m] of the walk from every surface."""
 
 
 class AgentSection(SceneSection):
@@ -223,11 +224,11 @@ class LimitsSection(SceneSection):
     that knows better says so."""
 
     faces: Annotated[int, Field(ge=1, le=20_000_000)] = 50_000
-    """Triangles of all meshes together: check and trace take time in proportion to them, times cycles."""
+    """Most triangles of all meshes together: check and trace take time in proportion to them, times cycles."""
     nodes: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
-    """Nodes of a GLB file: reading takes time in proportion to their square."""
+    """Most nodes of a GLB file: reading takes time in proportion to their square."""
     scatterers: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
-    """Point scatterers: each is traced on its own, with every wall on both legs."""
+    """Most point scatterers: each is traced on its own, with every wall on both legs."""
 
 
 def _listed(value: Any) -> Any:
@@ -351,5 +352,6 @@ def _known_keys() -> list[str]:
 
 
 def _short(text: str, length: int) -> str:
+    """Text on one line, cut to a length."""
     text = one_line(text)
     return text if len(text) <= length else text[: length - 3] + "..."

@@ -64,7 +64,7 @@ def _icosahedron() -> Floats:
 
 
 def _quartered(triangles: Floats) -> Floats:
-    """Every triangle (T, 3, 3) of a solid cut into four: (4 T, 3, 3)."""
+    """Cut every triangle (T, 3, 3) of a solid's mesh into four: (4 T, 3, 3)."""
     a, b, c = triangles.swapaxes(0, 1)
     ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])

@@ -19,7 +19,8 @@ MANY_FACES = 5000
 HEADROOM = 1.0
 """[m] Free height above what counts as a floor, where there is such a place."""
 CARRIED = 1.5
-"""[m] Height above what lies below at which a person carries a radio; half of the height where there is less."""
+"""[m] Height above what lies below at which a person carries a radio, that of the suggested motion; half of the height
+where there is less."""
 CLEAR, LEAST_CLEAR = 0.5, 0.02
 """[m] Distance that the suggested motion keeps from all surfaces, and the least it makes do with in a tight room."""
 SPEED, CYCLE, CYCLES = 0.1, 0.1, 600

@@ -1,4 +1,4 @@
-"""Writing a `Scene` as a scene folder, whole or not at all."""
+"""Writing of a `Scene` as a scene folder, whole or not at all."""
 
 import os
 import shutil
@@ -19,6 +19,7 @@ from rislam_rt.scene.solids import solid_mesh
 from rislam_rt.toml import toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
+"""Name of the agent's path in a scene folder."""
 
 
 def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) -> Path:
@@ -50,7 +51,8 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
 
 
 def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write files (relative name -> content) under a folder: a new folder appears complete, by one rename.
+    """Write files (relative name -> content) under a folder, such as a scene's: a new folder appears complete, by one
+    rename.
 
     With `overwrite`, files of an existing folder are replaced one by one and others in it stay.
 

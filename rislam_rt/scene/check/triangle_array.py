@@ -27,7 +27,7 @@ class TriangleArray(NamedTuple):
     triangles: Floats
     """(T, 3, 3) [m]."""
     owner: Integers
-    """(T,) reflector of each triangle."""
+    """(T,) number of the reflector of each triangle."""
     bounds: Floats
     """(2, 3) [m] lowest and highest corner."""
 

@@ -16,9 +16,9 @@ from rislam_rt.scene.mesh_placement import UNITS
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
 """Units other than metres that rooms are drawn in, and their names in a scene file."""
 LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
-"""[m] Longest side of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
+"""Longest side [m] of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
 USUAL_ROOM = (2.0, 100.0)
-"""[m] Range of the longest side of rooms, to tell which unit was meant."""
+"""Range [m] of the longest side of rooms, to tell which unit was meant."""
 FAR = 3.0
 """Distance of a point from the room, in sizes of the room, above which it was given in another unit, or is a mistake of
 another kind."""

@@ -92,7 +92,7 @@ def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
 
 
 def _flattest(triangles: Floats, part: PlanarRegions) -> float:
-    """Smallest angle [rad] at which two walls of a mesh meet in an edge, infinite where none do."""
+    """Smallest angle [rad] at which two walls of one mesh meet in an edge, infinite where none do."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3), 6) + 0.0, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)
     ends = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)

@@ -15,11 +15,13 @@ from rislam_rt.scene.importing.materials import parse_material
 from rislam_rt.scene.polygons import signed_area, triangulate
 
 KINDS = ("room", "wall", "door", "window")
+"""Kinds of shapes on a floor plan."""
 SPANS = {"door": (0.0, 2.0), "window": (0.9, 2.1)}
 """Lower and upper edge [m] of doors and windows of a floor plan that says nothing else."""
 CLOSED_WITH = {"door": "itu:wood", "window": "itu:glass"}
 """Materials that close doors and windows of a floor plan that names none."""
 MAX_SHAPES = 5_000
+"""Most shapes of a floor plan."""
 
 
 class PlanShape(NamedTuple):
@@ -39,7 +41,7 @@ class Opening(NamedTuple):
 
     name: str
     ends: Floats
-    """(2, 2) [m]."""
+    """(2, 2) [m] of its line along the wall."""
     bottom: float
     """Height [m] of the lower edge above the floor."""
     top: float
@@ -55,7 +57,7 @@ class FloorPlan:
     rooms: list[Floats]
     """Corners (n, 2) of each room, counter-clockwise."""
     walls: list[tuple[Floats, dict[str, Any] | None, str]]
-    """Line (2, 2), material and name, of walls that are drawn by themselves."""
+    """Line (2, 2), material and name of each wall that is drawn by itself."""
     openings: list[Opening]
 
 

@@ -32,7 +32,7 @@ class FreeSpace(NamedTuple):
     clearance: float
     """[m] that this line keeps off all surfaces."""
     enclosed: float
-    """Share of rays from the start that meet something."""
+    """Share of rays from the start of `way` that meet something."""
 
 
 def find_free(triangles: Floats, floor: float) -> FreeSpace | None:

@@ -1,4 +1,4 @@
-"""Materials of an imported room: by hand, by the name that the file gives them, or one for all the rest."""
+"""Materials of an imported room: given by the user, by the name that the file gives them, or one for all the rest."""
 
 import re
 from collections.abc import Iterable

@@ -17,7 +17,9 @@ from rislam_rt.scene.mesh_containers import check_glb
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, node_mesh, sound_mesh, unfold
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
+"""Endings of the mesh files that can be imported."""
 MAX_IMPORT_FACES = 2_000_000
+"""Most triangles of an imported mesh file."""
 MAX_IMPORT_NODES = 5_000
 """Most nodes of an imported GLB or glTF file: reading takes time in proportion to their square."""
 ANY_UNIT = 1e9

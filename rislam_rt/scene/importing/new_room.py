@@ -23,7 +23,9 @@ from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_files
 
 PLANS = (".svg", ".geojson", ".json")
+"""Endings of the files that are imported as floor plans."""
 MAX_PLAN_BYTES = 10_000_000
+"""Most bytes of a floor plan's file."""
 IMMEASURABLE = 1e12
 """Largest coordinate of a floor plan whose size is looked at."""
 

@@ -6,6 +6,7 @@ from typing import Any
 from rislam_rt.constants import SPEED_OF_LIGHT
 
 CONCRETE = {"itu": "concrete", "thickness_m": 0.2}
+"""Material of an imported room where nothing is known of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +21,9 @@ class ImportOptions:
     """[m] in metres, z up: the point that becomes the room's zero."""
     carrier_ghz: float = 10.0
     detail: float = 3.0
-    """[wavelengths] Flat regions narrower than this do not reflect like a plane: they shade."""
+    """[wavelengths] Flat regions narrower than this do not reflect like a plane: they hide."""
     curved: str = "shade"
-    """`shade` or `planes`: what cylinders become."""
+    """What cylinders become: `shade`, occluders, or `planes`, flat sides that reflect."""
     max_walls: int = 150
     """Most walls that reflect; where a file has more, the smallest become occluders: the image sources' time grows with
     walls."""
@@ -31,7 +32,7 @@ class ImportOptions:
     fill: float = 1.0
     """[m^2] Holes of a scan up to this are gaps of the scan; larger ones are openings."""
     materials: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Materials by name or pattern of wall, node or material of the file."""
+    """Tables of materials by name or pattern of wall, node or material of the file."""
     rest: dict[str, Any] = field(default_factory=lambda: dict(CONCRETE))
     """Material of all walls of which nothing is known."""
 

@@ -26,17 +26,17 @@ class Line(NamedTuple):
     """A straight line of walls on a floor plan."""
 
     start: Floats
-    """(2,) [m]."""
+    """(2,) [m] point of the line from which `spans` count."""
     along: Floats
-    """(2,) unit vector."""
+    """(2,) unit vector along the line."""
     spans: Spans
-    """[m] From where to where along the line there is wall."""
+    """From where to where [m] along the line there is wall."""
     material: dict[str, Any] | None
     name: str
 
     @property
     def across(self) -> Floats:
-        """(2,) unit vector to the left of a wall's line."""
+        """Unit vector (2,) to the left of a line of walls."""
         return np.array([-self.along[1], self.along[0]])
 
     def at(self, place: float, height: float) -> Floats:
@@ -44,7 +44,7 @@ class Line(NamedTuple):
         return np.append(self.start + place * self.along, height)
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distances (...,) [m] of points (..., 2) from a wall's line, positive to its left."""
+        """Signed distances (...,) [m] of points (..., 2) from a line of walls, positive to its left."""
         return np.asarray((points - self.start) @ self.across)
 
 
@@ -79,7 +79,7 @@ def wall_lines(plan: FloorPlan) -> list[Line]:
 
 
 def is_on_line(line: Line, ends: Floats, along: Floats) -> bool:
-    """Whether a wall from one end to the other (2, 2) [m] lies on a line and along it."""
+    """Whether a wall from one end to the other (2, 2) [m] lies on a floor plan's line of walls and along it."""
     turn = abs(float(line.along[0] * along[1] - line.along[1] * along[0]))
     return turn < PARALLEL and float(np.abs(line.distance(ends)).max()) < SAME_LINE
 
@@ -96,7 +96,7 @@ def _joined_spans(spans: Spans) -> Spans:
 
 
 def without_span(spans: Spans, low: float, high: float) -> Spans:
-    """Spans of a wall's line with what lies from `low` to `high` cut out."""
+    """Spans of a floor plan's line of walls with what lies from `low` to `high` cut out."""
     found: Spans = []
     for a, b in spans:
         found += [(x, y) for x, y in ((a, min(b, low)), (max(a, high), b)) if y - x > SAME_LINE]

@@ -9,24 +9,26 @@ from rislam_rt.scene.shapes import block, hexahedron
 from rislam_rt.scene.solids import sphere_mesh
 
 SIZE, HEIGHT = (3.5, 9.0), (2.3, 4.0)
-"""Ranges of a room's sides and height [m]."""
+"""Ranges [m] of a random box room's sides and height."""
 TILTED, TILT = 0.4, 0.08
 """Share of rooms whose planes all lean, and the standard deviation of their normals then."""
 FURNISHED = 0.4
-"""Share of rooms with a reflecting block on the floor."""
+"""Share of random box rooms with a reflecting block on the floor."""
 REFLECTION, RADIUS = (0.3, 0.95), (0.03, 0.3)
-"""Ranges of reflection coefficients, and of scatterer radii [m] (log-uniform)."""
+"""Ranges of a random box room's reflection coefficients, and of its scatterers' radii [m] (log-uniform)."""
 ALIKE, SLABS = 0.35, 0.35
-"""Shares of rooms of one reflection coefficient, and of slabs of building materials; in the others every wall has its
-own coefficient."""
+"""Shares of random box rooms of one reflection coefficient, and of slabs of building materials; in the others every
+wall has its own coefficient."""
 THICKNESS = {"concrete": 0.2, "brick": 0.12, "plasterboard": 0.025, "chipboard": 0.02, "marble": 0.03, "glass": 0.008,
              "plywood": 0.02, "wood": 0.03, "metal": 0.005}  # fmt: skip
-"""ITU materials and thicknesses [m], which vary by a factor of 0.6 to 1.6."""
+"""ITU materials of random box rooms and their thicknesses [m], which vary by a factor of 0.6 to 1.6."""
 SHADING = 0.5
-"""Share of scatterers above 0.1 m of radius that hide what lies behind them."""
+"""Share of a random box room's scatterers above 0.1 m of radius that hide what lies behind them."""
 PANEL, CEILING_PANEL, ELEMENTS = 0.8, 0.5, (4, 16)
-"""Share of rooms with a panel, of panels in the ceiling (the others are on a wall); range of elements along a side."""
+"""Share of random box rooms with a RIS panel, of panels in the ceiling (the others are on a wall); range of elements
+along a side."""
 MAX_SCATTERERS = 4
+"""Most scatterers of a random box room."""
 MARGIN = 0.5
 """Least distance [m] of a scatterer's or the panel's centre from the walls of an upright room."""
 

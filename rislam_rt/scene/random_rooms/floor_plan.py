@@ -11,11 +11,11 @@ SHAPES = ("convex", "l", "t", "u")
 SIZE, SIZE_WITH_ARMS = (2.0, 30.0), (5.0, 30.0)
 """Ranges [m] of a plan's longer side, log-uniform; a plan with arms begins where an arm has room for an agent."""
 ASPECT = (0.5, 1.0)
-"""Shorter side over the longer."""
+"""Shorter side of a random floor plan over the longer."""
 RECTANGLES = 0.5
-"""Share of the convex plans that are rectangles; the others have 4 to 7 corners on an ellipse."""
+"""Share of the random convex floor plans that are rectangles; the others have 4 to 7 corners on an ellipse."""
 ARM = (0.28, 0.48)
-"""Width of an arm as a share of the side that it stands on."""
+"""Width of an arm of a random floor plan as a share of the side that it stands on."""
 OFFSET = 5.0
 """Largest distance [m] of a plan's middle from the origin along either axis, so that no coordinate means anything."""
 

@@ -12,27 +12,27 @@ from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimi
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
 RADIUS = (0.03, 0.25)
-"""Range [m] of the scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
+"""Range [m] of the random scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
 PLACES = ("open", "below", "hidden")
 """Where a random scatterer is: anywhere, below the whole motion, or behind a screen for most of it."""
 SHARES = (0.6, 0.2, 0.2)
 """Shares of the random scatterers that each of `PLACES` is asked for."""
 OFF_SURFACES, OFF_WAY, APART = 0.2, 0.45, 0.5
-"""Least distances [m] of a scatterer from surfaces, from the way and from other landmarks."""
+"""Least distances [m] of a random scatterer from surfaces, from the agent's path and from other landmarks."""
 BELOW = 0.15
-"""[m] by which a scatterer lies below all of the motion."""
+"""[m] by which a random scatterer at `below` lies below all of the motion."""
 BEHIND, TALLER = (0.35, 0.7), 0.4
 """Range [m] of a screen's distance from the scatterer that it hides, and by how much it is taller."""
 MOST = 0.6
 """Least share of the agent's path from which a hidden scatterer is not seen over the straight line."""
 ELEMENTS = (4, 16)
-"""Range of a panel's elements along one side."""
+"""Range of a random RIS panel's elements along one side."""
 SQUARE = 0.6
-"""Share of panels that are square."""
+"""Share of random RIS panels that are square."""
 LEVELS, PATTERNS = (2, 4, 8), ("tang", "energy")
-"""Phase levels and element patterns, each as often."""
+"""Phase levels and element patterns of random RIS panels, each as often."""
 SPACING = 0.015
-"""[m] half a wavelength at 10 GHz."""
+"""Distance [m] between the elements of a random RIS panel: half a wavelength at 10 GHz."""
 EDGE = 0.4
 """Least distance [m] of a RIS panel's centre from the edges of its wall or ceiling."""
 ABOVE = 0.3

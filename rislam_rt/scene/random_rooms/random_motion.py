@@ -21,15 +21,15 @@ SPEED, SLOWEST = (0.05, 0.6), 0.01
 OFF_WALLS, BELOW_CEILING = 0.45, 0.6
 """Least distances [m] of a random motion from the walls and from the ceiling."""
 HEIGHT, CLIMB = (0.3, 1.6), (0.3, 0.9)
-"""Ranges [m] of the height at the start, and of a climb or descent."""
+"""Ranges [m] of a random motion's height at the start, and of its climb or descent."""
 WANDER = 0.12
-"""Standard deviation [rad/s] of the rate of turn of a curve."""
+"""Standard deviation [rad/s] of the rate of turn of a random motion along a curve."""
 CORNER, CORNER_TIME = (0.9, 2.2), 0.5
-"""Range [rad] of the turn at a corner, and the time [s] that it takes."""
+"""Range [rad] of the turn at a corner of a random motion, and the time [s] that it takes."""
 STANDING, WALKING, BRAKING = (1.0, 3.0), (2.0, 6.0), 0.6
-"""Ranges [s] of a stop and of the way between two, and the time [s] to brake or set off."""
+"""Ranges [s] of a random motion's stops and of the time between two, and the time [s] to brake or set off."""
 SPIN = (1.0, 3.0)
-"""Range [rad] of a turn on the spot."""
+"""Range [rad] of a random motion's turn on the spot."""
 _STARTS, _SLOWER = 64, 0.8
 
 

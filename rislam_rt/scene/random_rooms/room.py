@@ -27,10 +27,11 @@ from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 SHAPE_SHARES = (0.4, 0.2, 0.2, 0.2)
 """Shares of the random rooms that have each of `SHAPES`."""
 REFLECTION, FURNITURE_REFLECTION = (0.2, 0.9), (0.2, 0.8)
-"""Ranges of the reflection coefficients of walls and of furniture."""
+"""Ranges of the reflection coefficients of a random room's walls and of its furniture."""
 ALIKE = 0.5
-"""Share of rooms whose walls are all of one coefficient; else each has its own."""
+"""Share of random rooms whose walls are all of one coefficient; else each has its own."""
 MAX_PIECES, MAX_SCATTERERS = 6, 6
+"""Most pieces of furniture and most scatterers of a random room."""
 PER_PIECE = 3.0
 """Area [m^2] of the floor plan for each piece of furniture."""
 PANEL, CEILING_PANEL = 0.7, 0.4

@@ -15,7 +15,8 @@ LOWEST = (2.2, 6.0)
 """Range [m] of the height at a random room's lowest wall, log-uniform; a small room is at most `SLENDER` times as high
 as wide."""
 SLENDER, RISE, STEEPEST = 1.3, (0.3, 5.0), 0.5
-"""Range [m] by which a sloped ceiling rises, log-uniform, and its largest slope."""
+"""Largest height of a small random room over its width; range [m] by which a sloped ceiling rises, log-uniform, and its
+largest slope."""
 
 
 class Roof(NamedTuple):

@@ -22,7 +22,7 @@ class XmlMaterial(NamedTuple):
     """Radio material as read from a Sionna scene file, and what could not be carried over."""
 
     material: Material | None
-    """None where nothing is reflected: an absorber."""
+    """The material; None where nothing is reflected: an absorber."""
     notes: tuple[str, ...]
     """What could not be carried over."""
 
@@ -96,7 +96,7 @@ def _number(values: dict[str, Element], name: str, default: float) -> float:
 
 
 def _made(**values: Any) -> Material:
-    """A material of an XML scene whose numbers are in range."""
+    """Material of an XML scene file from its numbers; an error where they are out of range."""
     try:
         return Material(**values)
     except SceneError as error:

@@ -13,7 +13,9 @@ from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader
 from rislam_rt.scene.xml.untrusted_xml import children
 
 FILES = {"ply": ".ply", "obj": ".obj"}
+"""Types of an XML scene's shapes that name a mesh file, and that file's ending."""
 SHAPES = ("ply", "obj", "rectangle", "cube")
+"""Types of an XML scene's shapes that can be read."""
 
 _RECTANGLE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=np.float64)
 _CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)

@@ -9,6 +9,7 @@ from rislam_rt.scene.write import mesh_file, scene_files, write_files
 from rislam_rt.scene.xml.materials import material_element
 
 XML_FILE = "scene.xml"
+"""Name of the XML scene file in the folder that is written for Sionna RT."""
 SHADE_OF = "shade-of-"
 """Prefix of the name of an XML shape that is a scatterer's occluder; the scatterer's name follows."""
 

@@ -20,14 +20,14 @@ class Edges(NamedTuple):
     a: Integers
     b: Integers
     turn: Floats
-    """(E,) [rad] angle at which they meet, zero in one plane, whichever way either is turned."""
+    """(E,) [rad] angle at which the two triangles meet, zero in one plane, whichever way either is turned."""
 
 
 class FlatRegions(NamedTuple):
     """R flat regions of a mesh whose triangles share their corners."""
 
     mesh: Welded
-    """Its triangles turned to their region's normal."""
+    """The mesh, its triangles turned to their region's normal."""
     region: Integers
     """(F,) region of each triangle."""
     normal: Floats
@@ -35,11 +35,11 @@ class FlatRegions(NamedTuple):
     offset: Floats
     """(R,) [m] of each region's plane: `normal . x = offset`."""
     area: Floats
-    """(R,) [m^2]."""
+    """(R,) [m^2] of each region."""
     width: Floats
     """(R,) [m] short side of the rectangle with the same second moments."""
     residual: Floats
-    """(R,) [m] farthest corner from the plane."""
+    """(R,) [m] distance of a region's farthest corner from its plane."""
     component: Integers
     """(R,) connected part of the mesh, by edges, that each region belongs to: a leg that stands on a corner of the
     floor is none of it."""

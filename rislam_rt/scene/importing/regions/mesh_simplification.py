@@ -1,4 +1,5 @@
-"""Simplification of meshes: flat regions by their outlines, clutter by cells, each with how far it is off [m]."""
+"""Simplification of imported meshes: flat regions by their outlines, clutter by cells, each with how far it is off
+[m]."""
 
 import numpy as np
 

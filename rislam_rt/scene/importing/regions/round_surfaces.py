@@ -29,9 +29,9 @@ class RoundPatch(NamedTuple):
     center: Floats
     """(3,) [m] a point of the axis."""
     radius: float
-    """[m], 0 for any other round shape."""
+    """[m] of the cylinder, 0 for any other round shape."""
     along: tuple[float, float]
-    """[m] from `center` along the axis."""
+    """[m] from where to where it reaches along the axis, from `center`."""
     arc: tuple[float, float]
     """[rad] from where to where it goes round; all the way if that is 2 pi."""
 

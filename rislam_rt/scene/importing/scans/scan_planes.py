@@ -24,6 +24,7 @@ ROUND = 1.3
 WIDTHS = 3.0
 """Standard deviations of the scan's noise within which a point belongs to a plane."""
 MAX_PLANES = 60
+"""Most planes that are fitted to a scan."""
 _SEEDS, _SCORED = 200, 6000
 
 
@@ -63,8 +64,8 @@ def find_planes(cloud: PointCloud) -> list[ScanPlane]:
 
 
 def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | None:
-    """The plane of a scan that holds the most area among the free points, fitted anew as it narrows; None if too
-    small."""
+    """Fit the plane to a scan that holds the most area among its free points, anew as it narrows; None if that is too
+    little."""
     rows = np.flatnonzero(free)
     if cloud.area[rows].sum() < LEAST_AREA:
         return None
@@ -97,7 +98,7 @@ def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | 
 
 
 def _connected_groups(cloud: PointCloud, rows: Integers) -> list[Integers]:
-    """Groups of a scan's points that hang together over gaps of up to `GAP`: the largest first, then others of at least
+    """Groups of a scan's points that are connected over gaps of up to `GAP`: the largest first, then others of at least
     `LEAST_AREA`."""
     cells, box = np.unique(np.floor(cloud.points[rows] / (0.5 * GAP)).astype(np.int64), axis=0, return_inverse=True)
     near = cKDTree(cells).query_pairs(1.8, output_type="ndarray")

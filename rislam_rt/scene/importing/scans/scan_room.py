@@ -21,7 +21,7 @@ sockets."""
 
 
 def looks_scanned(facets: FlatRegions, options: ImportOptions) -> bool:
-    """Whether a mesh has the noise of a scan: hardly any of it is flat."""
+    """Whether an imported mesh has the noise of a scan: hardly any of it is flat."""
     flat = facets.area[(facets.width >= options.narrow) & (facets.residual < 1e-3)].sum()
     return bool(flat < FLAT_SHARE * facets.area.sum())
 
