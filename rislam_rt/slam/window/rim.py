@@ -17,7 +17,7 @@ REACH = 4.0
 """Distance from the rim, in standard deviations, from which on noise puts nothing beyond it."""
 
 
-def bring_back(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
+def correct_horizon_bias(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
     """Correct residuals `left` (A, 3) and slopes (A, 3, D) of predictions `seen` (A, 3), length and cosines, in place
     for a receiver that brings cosines of noise `std` (A, 3) back into the unit disc.
 

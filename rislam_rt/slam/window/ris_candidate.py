@@ -43,7 +43,7 @@ def weigh_tracks(
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).converged()
+    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
