@@ -1,4 +1,5 @@
-"""A filter over a window that is re-linearised: planes, points and the panel in one map."""
+"""Window filter: sliding-window SLAM over the last K poses and a map of walls, points and RIS panels, re-linearised by
+Gauss-Newton."""
 
 from rislam_rt.slam.window.filter import init, smoothed, step
 from rislam_rt.slam.window.mapping import estimate, predict, revisit

@@ -131,7 +131,7 @@ def _window(rng):
 def test_after_a_jump_all_but_the_place_is_as_it_was():
     window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
     mean, covariance = window_gaussian.now(window)
-    after, spread = window_gaussian.now(divergence_monitor.landed(window, by))
+    after, spread = window_gaussian.now(divergence_monitor.after_jump(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
     wide[[0, 1], [0, 1]] += CONSTANTS.walk**2
