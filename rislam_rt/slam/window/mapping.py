@@ -17,7 +17,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, image_id
 from rislam_rt.slam.window.landmarks.same_wall import second_planes
 from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
 
