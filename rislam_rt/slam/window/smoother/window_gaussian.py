@@ -21,8 +21,8 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.factor import inverse, solution
 from rislam_rt.slam.window.smoother.motion_basis import (
     FIRST,
     HEAD,
