@@ -1,5 +1,4 @@
-"""Outputs of the window filter: pose and map estimates, the prediction for the phase design, and a start on an earlier
-map."""
+"""Estimates of the window filter: pose and map, the prediction for the phase design, and a start on an earlier map."""
 
 from dataclasses import replace
 
