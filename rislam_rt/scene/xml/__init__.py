@@ -1,5 +1,5 @@
-"""Scene files of Mitsuba 3 and Sionna RT, both ways: `read_scene.py` meshes and materials, `scene.py` a scene,
-`write.py`."""
+"""Scene files of Mitsuba 3 and Sionna RT (XML), both ways: `read_scene.py` reads meshes and materials, `scene.py` makes
+a scene of them, `write.py` writes one."""
 
 from rislam_rt.scene.xml.read_scene import read_xml, sionna_scenes
 from rislam_rt.scene.xml.scene import new_from_xml, scene_of_xml
