@@ -86,7 +86,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "half the deviations", "slam/window/mapping.py",
+        "half the deviations", "slam/window/estimates.py",
         "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
         (
             "pipeline/recordings/test_own_measurements.py",

@@ -10,9 +10,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
+from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD, POSE, TURN, basis, last_pose_matrix
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, basis, last_pose_matrix
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 

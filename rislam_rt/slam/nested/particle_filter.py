@@ -50,7 +50,7 @@ from rislam_rt.slam.window.cycle_explanation import (
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import REFRESH
 
 BROAD = 10.0

@@ -21,7 +21,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
 

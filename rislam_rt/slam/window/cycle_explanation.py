@@ -17,12 +17,12 @@ from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
-from rislam_rt.slam.window.rim import correct_horizon_bias
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH

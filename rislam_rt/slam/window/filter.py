@@ -30,7 +30,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironm
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH, STILL
 from rislam_rt.slam.window.state import WindowState

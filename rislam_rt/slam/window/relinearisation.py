@@ -5,10 +5,10 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import linearise_each, poses_of
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
-from rislam_rt.slam.window.rim import correct_horizon_bias
-from rislam_rt.slam.window.smoother.steps import POSE
+from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 from rislam_rt.slam.window.state import WindowState
 

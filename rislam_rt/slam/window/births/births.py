@@ -19,7 +19,7 @@ from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.measurement_prediction import UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED, MOST, NEAR, STRIDE
 from rislam_rt.slam.window.state import WindowState
 

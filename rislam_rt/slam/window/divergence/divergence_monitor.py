@@ -17,8 +17,8 @@ from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.cholesky import inverse
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
 

@@ -10,7 +10,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
 

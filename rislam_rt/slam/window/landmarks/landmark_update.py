@@ -17,7 +17,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 

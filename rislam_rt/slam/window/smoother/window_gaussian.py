@@ -21,9 +21,9 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.factor import inverse, solution
-from rislam_rt.slam.window.smoother.steps import (
+from rislam_rt.slam.window.smoother.motion_basis import (
     FIRST,
     HEAD,
     ONE,
@@ -124,7 +124,7 @@ def begin_with(
 
 
 def _basis(window: Window) -> Floats:
-    """Matrices (A, K, K + 1) that give the window's poses from its head and accelerations (see `steps.basis`)."""
+    """Matrices (A, K, K + 1) that give the window's poses from head and accelerations (see `motion_basis.basis`)."""
     return basis(window.step.tobytes(), window.turns)
 
 

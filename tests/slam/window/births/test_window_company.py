@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.window.births.births import _log_same_direction
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED
 
 HEADING = 0.7

@@ -10,7 +10,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
 

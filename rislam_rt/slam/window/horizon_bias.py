@@ -1,5 +1,4 @@
-"""Bias of direction cosines near the horizon, where a receiver brings those that noise puts beyond the unit disc back
-to its rim.
+"""Horizon bias of direction cosines: a receiver brings those that noise puts beyond the unit disc back to its rim.
 
 Directions lie within the unit disc, and a receiver that finds a pair of cosines beyond it brings them back to the rim.
 A ray of radius r (1 on the horizon), heard with noise of standard deviation s along it, is reported at `min(1, r + n)`:

@@ -1,5 +1,4 @@
-"""Noise-free motion model: the window's poses as a linear function of the first pose, its velocity and the steps'
-accelerations."""
+"""Motion basis: the window's poses as a linear function of the first one, its velocity and the steps' accelerations."""
 
 from functools import lru_cache
 
