@@ -90,7 +90,7 @@ class QueryBatch(NamedTuple):
 
     @property
     def all_sequences(self) -> Integers:
-        """(S, D) wall sequences of all queries."""
+        """Possible wall sequences (S, D) of all queries for legs, one query after the other."""
         return np.concatenate(self.sequences)
 
     def candidates(self, tracer_scene: "TracerScene") -> Iterator[CandidateIndices]:
