@@ -18,22 +18,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.specification.section import Choices
 from rislam_rt.pipeline.specification.spec import RECORDS
 from rislam_rt.spelling import did_you_mean, nearest
-
-UNITS = {
-    "_m_s2": "m/s^2",
-    "_m_s": "m/s",
-    "_bits_s": "bit/s",
-    "_ns_s": "ns/s",
-    "_ghz": "GHz",
-    "_db": "dB",
-    "_deg": "degrees",
-    "_ns": "ns",
-    "_s": "s",
-    "_m": "m",
-    "_j": "J",
-    "_wavelengths": "wavelengths",
-}
-"""Units by the suffix of a name; the longest that fits. A name without one has its unit in its meaning."""
+from rislam_rt.wanted import unit_of
 
 LARGEST = 2.0**40
 """Up to here the edge of a range is looked for; beyond, a number counts as unlimited."""
@@ -95,10 +80,11 @@ def _near(key: str, keys: list[str]) -> str:
 def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:
     owner, record = _owner(model, name)
     meaning = _meanings(record or owner).get(name, "")
-    unit = next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     allowed = _of_constraints(field) or (_of_record(record, name) if record else "")
-    return Setting(f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit, meaning)
+    return Setting(
+        f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit_of(name), meaning
+    )
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
