@@ -15,6 +15,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from convex_dual import dual_bound
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
@@ -25,7 +26,6 @@ from rislam_rt.design import (
     DesignProblem,
     build_objective,
     direct_only,
-    dual_bound,
     problem_from_belief,
     problem_from_paths,
 )

@@ -10,11 +10,10 @@ import argparse
 import time
 
 import numpy as np
+from known_paths import design_along, position_error_map
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.design import design_along
-from rislam_rt.information import position_error_map
 from rislam_rt.model import PathKind, RadioConfig, RisCode, Scene, Trajectory
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene

@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import Walls, build_walls
-from rislam_rt.design import design_along
+from rislam_rt.design import DESIGNERS, DesignConfig, problem_from_paths
 from rislam_rt.information import MotionPrior, build_landmark_model, posterior_bound
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
 from rislam_rt.ris import rephase
@@ -60,8 +60,13 @@ def cases(scene: Scene, paths: Paths, radio: RadioConfig) -> dict[str, Paths]:
     for name, method, least in (
         ("CRLB", "coordinate", 0.0), ("CRLB, detected paths", "coordinate", DETECTION), ("direct path", "exact", 0.0),
     ):  # fmt: skip
-        code = design_along(paths, tx, rx, radio, spec, method=method, rng=rng, prior=prior, least_snr=least)
-        found[name] = rephase(paths, code)
+        index = []
+        for cycle, child in enumerate(rng.spawn(paths.num_cycles)):
+            problem = problem_from_paths(
+                paths, tx[cycle], rx[cycle], radio, spec.levels, cycle=cycle, prior=prior, least_snr=least
+            )
+            index.append(DESIGNERS[method](problem, rng=child, config=DesignConfig(certify=False)).code.index)
+        found[name] = rephase(paths, RisCode(np.array(index), spec.levels))
     drawn = RisCode(rng.integers(spec.levels, size=(paths.num_cycles, spec.rows, spec.cols)), spec.levels)
     found["random"] = rephase(paths, drawn)
     panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))

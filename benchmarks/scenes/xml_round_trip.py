@@ -16,9 +16,9 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+from sionna_comparison import SAMPLES, RoundTrip, compare_with_path_solver
 
 from rislam_rt.channel.compare import random_poses
-from rislam_rt.channel.compare.path_solver import SAMPLES, RoundTrip, compare_with_path_solver
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene import load_scene

@@ -1,9 +1,8 @@
-"""Floor 5: which code to set the panel to. Designers, their bound, and the problem as the agent believes it."""
+"""Floor 5: design of the RIS panel's phase code. Designers, bounds, and the design problem on the agent's belief."""
 
 from rislam_rt.design.belief import design_code, problem_from_belief
-from rislam_rt.design.convex_dual import dual_bound
 from rislam_rt.design.designers import DESIGNERS, designer
-from rislam_rt.design.gain_curves import GainCurves, GainInterval, design_along, direct_only, gain_curves
+from rislam_rt.design.gain_curves import GainCurves, GainInterval, direct_only, gain_curves
 from rislam_rt.design.genie import focus_codes, panel_columns, problem_from_paths
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem, problem_from_arrays
@@ -23,11 +22,9 @@ __all__ = [
     "best_magnitudes",
     "build_objective",
     "continuous_phases",
-    "design_along",
     "design_code",
     "designer",
     "direct_only",
-    "dual_bound",
     "exact_code",
     "focus_codes",
     "gain_curves",

@@ -1,42 +1,39 @@
-"""Designs place by place along a path or over a grid: codes for maps, and the gain curves of Fig. 4(a)."""
+"""Gain curves over the distance of the direct panel path under designed, random and optimal codes (Fig. 4(a))."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Floats
 from rislam_rt.design.designers import designer
-from rislam_rt.design.genie import problem_from_paths
 from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single_path import exact_code
-from rislam_rt.errors import ConfigError
-from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
 
 class GainInterval(NamedTuple):
-    """A curve over K places with its spread."""
+    """Gain [dB] at K places: middle, and lower and upper end of an interval (K,)."""
 
     middle: Floats
-    """(K,)."""
+    """(K,) [dB] median or root mean square."""
     low: Floats
-    """(K,)."""
+    """(K,) [dB] lower quantile."""
     high: Floats
-    """(K,)."""
+    """(K,) [dB] upper quantile."""
 
 
 class GainCurves(NamedTuple):
-    """Gain of the direct panel path at K places [dB]."""
+    """Gain [dB] of the direct panel path at K places under designed, random and optimal codes."""
 
     optimized: GainInterval
-    """Under the designer's codes: median and quantiles over its seeds."""
+    """Gain under the designer's codes: median and quantiles over its seeds."""
     random: GainInterval
-    """Under random codes: root mean square (exact), and quantiles over draws."""
+    """Gain under random codes: root mean square (exact), and quantiles over draws."""
     exact: Floats
-    """(K,) largest gain that any code of the panel's levels reaches."""
+    """(K,) [dB] largest gain that any code of the panel's levels reaches."""
     continuous: Floats
-    """(K,) largest gain at all."""
+    """(K,) [dB] largest gain with continuous phases."""
 
 
 _SINGLE = DesignConfig(certify=False)
@@ -52,16 +49,18 @@ def gain_curves(
     coverage: float = 0.9,
     config: DesignConfig = _SINGLE,
 ) -> GainCurves:
-    """The panel's curves of Fig. 4(a) from one design problem a place (`problem_from_paths`, `direct_only`).
+    """Gain curves of the direct panel path under designed, random and optimal codes, as in Fig. 4(a).
 
     Parameters
     ----------
+    problems
+        One design problem a place (`problem_from_paths`, `direct_only`).
     seeds
-        How often the designer is run at each place.
+        Number of runs of the designer at each place.
     draws
-        How many random codes give the interval; their root mean square is `sqrt(sum |h_n|^2)`, no draw needed.
+        Number of random codes that give the interval; their root mean square is `sqrt(sum |h_n|^2)`, no draw needed.
     coverage
-        Of both intervals.
+        Probability of both intervals.
     """
     tail = np.array([0.5, (1.0 - coverage) / 2.0, (1.0 + coverage) / 2.0])
     run = designer(method)
@@ -80,49 +79,11 @@ def gain_curves(
 
 
 def direct_only(problem: DesignProblem) -> DesignProblem:
-    """The same design problem with the direct panel path alone: what Fig. 4(a) optimises."""
+    """The same design problem with the direct panel path alone, as Fig. 4(a) optimises it."""
     return DesignProblem(
         problem.response[:, :1], problem.static_gain[:, :0], problem.gradient[:, :1], problem.prior, problem.scale,
         problem.levels, least_power=problem.least_power,
     )  # fmt: skip
-
-
-def design_along(
-    paths: Paths,
-    tx: Floats,
-    rx: Floats,
-    radio: RadioConfig,
-    ris: DataSheet,
-    *,
-    method: str,
-    rng: np.random.Generator,
-    prior: Floats | None = None,
-    least_snr: float = 0.0,
-    config: DesignConfig = _SINGLE,
-) -> RisCode:
-    """The genie's codes (K, N, M), one for each cycle of known paths; for places of a grid as well.
-
-    `tx`, `rx` (K, 3) [m]. Where the panel is out of sight the code is a random one.
-
-    Raises
-    ------
-    ConfigError
-        The paths hold no panel.
-    """
-    if paths.ris is None:
-        raise ConfigError("design: the scene has no panel; add a [ris] section")
-    run = designer(method)
-    seen: Booleans = np.logical_or.reduce(paths.valid & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)), axis=1)
-    index = np.empty((paths.num_cycles, ris.rows, ris.cols), dtype=np.int64)
-    for cycle, child in enumerate(rng.spawn(paths.num_cycles)):
-        if not bool(seen[cycle]):
-            index[cycle] = child.integers(ris.levels, size=(ris.rows, ris.cols))
-            continue
-        problem = problem_from_paths(
-            paths, tx[cycle], rx[cycle], radio, ris.levels, cycle=cycle, prior=prior, least_snr=least_snr
-        )
-        index[cycle] = run(problem, rng=child, config=config).code.index
-    return RisCode(index, ris.levels)
 
 
 def _db(magnitude: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Floor 5: scores. Errors, distances between maps, consistency, confidence intervals, association."""
+"""Scores of estimates against the truth (floor 5): errors, map distances, consistency, association, intervals."""
 
 from rislam_rt.evaluate.association import AssociationScore, association_fractions, association_score, label_switches
 from rislam_rt.evaluate.confidence_intervals import (

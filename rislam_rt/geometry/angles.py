@@ -36,7 +36,8 @@ def rotation_about(axis: Floats, angle: float) -> Floats:
 
 
 def rotation_z(heading: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) about z: body frame (x forward) to room frame."""
+    """Rotation matrices (..., 3, 3) about z by headings (...,) [rad]: from the agent's body frame (x forward) to room
+    axes."""
     heading = np.asarray(heading, dtype=np.float64)
     rotation = np.zeros((*heading.shape, 3, 3))
     rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(heading)

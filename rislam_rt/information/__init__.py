@@ -1,4 +1,4 @@
-"""Floor 4: Fisher information of delays, gains and angles; what it says about positions; bounds over a trajectory."""
+"""Floor 4: Fisher information of delays, gains and angles, position bounds, and bounds over a trajectory."""
 
 from rislam_rt.information.accuracy import MeasurementStd, amplitude_std, cosine_information, measurement_std
 from rislam_rt.information.bound_outcome import Outcome
@@ -10,7 +10,6 @@ from rislam_rt.information.delay_gain import (
     map_to_position,
     steering,
 )
-from rislam_rt.information.dilution_maps import position_error_map
 from rislam_rt.information.gradient import GradientMode, vertex_gradient
 from rislam_rt.information.heard_paths import heard_paths
 from rislam_rt.information.landmark_model import (
@@ -50,7 +49,6 @@ __all__ = [
     "map_to_position",
     "measurement_std",
     "position_bound",
-    "position_error_map",
     "position_information",
     "posterior_bound",
     "prior_from_covariance",

@@ -1,4 +1,4 @@
-"""Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
+"""Floor 5: the receiver. Received signal, noise, hardware, and multipath components with their standard deviations."""
 
 from rislam_rt.measurement.calibrate import calibrate
 from rislam_rt.measurement.components import path_std

@@ -1,7 +1,7 @@
-"""Floor 3: physics of the panel, and amplitudes of believed points: pure functions that channel and belief call."""
+"""Floor 3: physics of the RIS panel, and predicted amplitudes of paths over landmarks: pure functions."""
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
-from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits, quantise
+from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits
 from rislam_rt.ris.narrowband_check import delay_spread, delay_spread_warnings
 from rislam_rt.ris.rephase import panel_gain, rephase
 from rislam_rt.ris.response import far_field_response, leg_response, zero_code
@@ -18,7 +18,6 @@ __all__ = [
     "flip_bits",
     "leg_response",
     "panel_gain",
-    "quantise",
     "rephase",
     "zero_code",
 ]

@@ -3,11 +3,12 @@
 import itertools
 from dataclasses import replace
 
+import convex_dual as dual_module
 import numpy as np
 import pytest
+from convex_dual import dual_bound
 
-from rislam_rt.design import DESIGNERS, build_objective, dual_bound
-from rislam_rt.design import convex_dual as dual_module
+from rislam_rt.design import DESIGNERS, build_objective
 
 
 @pytest.mark.parametrize("levels", [2, 4])

@@ -4,20 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from known_paths import design_along, position_error_map
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.design import (
     DESIGNERS,
     DesignConfig,
     DesignProblem,
-    design_along,
     direct_only,
     exact_code,
     gain_curves,
     problem_from_paths,
 )
 from rislam_rt.errors import ConfigError
-from rislam_rt.information import position_error_map
 from rislam_rt.model import Body, PathKind, RisCode, RisSpec, Trajectory
 from rislam_rt.ris import far_field_response, leg_response, rephase
 from rislam_rt.scene import load_scene

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from known_paths import position_error_map
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.information import Outcome, position_bound, position_error_map, position_information, vertex_gradient
+from rislam_rt.information import Outcome, position_bound, position_information, vertex_gradient
 from rislam_rt.model import Body, PathKind, RadioConfig, Trajectory
 from rislam_rt.scene import load_scene
 

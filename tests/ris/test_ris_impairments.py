@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.errors import ConfigError, GeometryError
 from rislam_rt.model import RisCode
-from rislam_rt.ris import PanelErrors, PanelTolerance, draw_panel, flip_bits, quantise
+from rislam_rt.ris import PanelErrors, PanelTolerance, draw_panel, flip_bits
 
 ROUGH = PanelTolerance(amplitude_std=0.2, phase_std=0.5, dead=0.1, stuck=0.2)
 
@@ -94,16 +94,6 @@ def test_stuck_elements_keep_their_level_in_every_cycle():
     errors = PanelErrors(np.ones((2, 2)), np.zeros((2, 2)), np.zeros((2, 2), dtype=bool), stuck)
     code = RisCode(np.full((5, 2, 2), 3), 4)
     np.testing.assert_array_equal(errors.applied(code).index, np.tile([[3, 2], [0, 3]], (5, 1, 1)))
-
-
-def test_quantising_is_exact_where_levels_agree_and_never_off_by_more_than_half_a_step():
-    code = RisCode(np.arange(16).reshape(4, 4), 16)
-    coarse = quantise(code, 4)
-    assert coarse.levels == 4
-    np.testing.assert_array_equal(coarse.index[:, 0], [0, 1, 2, 3])
-    off = np.angle(np.exp(1j * (coarse.xi - code.xi)))
-    assert np.abs(off).max() <= np.pi / 4 + 1e-12
-    np.testing.assert_array_equal(quantise(quantise(code, 32), 16).index, code.index)
 
 
 def test_bad_tolerances_are_named():

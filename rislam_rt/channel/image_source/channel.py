@@ -1,4 +1,4 @@
-"""The image-source channel behind the `Channel` protocol."""
+"""Channel by the image-source method: exact specular paths of a room of planar walls, as a `Channel`."""
 
 from dataclasses import dataclass, field
 
@@ -18,7 +18,8 @@ from rislam_rt.ris import rephase
 
 @dataclass(frozen=True, eq=False)
 class ImageSourceChannel:
-    """All paths of a room of planar facets, exact: wall sequences, images, facets, occlusion.
+    """Channel of a room of planar walls by the image-source method: all paths up to `depth` bounces, with exact
+    visibility tests in float64.
 
     `search` says how sequences are found: `exhaustive` tries all that the walls' sides allow, `beams` those that
     mirrored beams leave possible, which loses none; `auto` takes the first where sequences are few. `Paths.source`
@@ -57,7 +58,7 @@ class ImageSourceChannel:
         object.__setattr__(self, "looked", build_search(self.facets, self.depth, self.search))
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle by image sources, with the panel at level 0."""
+        """Paths of every cycle of a trajectory by the image-source method, with the panel's code at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
         ends = self.antennas or self.radio.antennas
@@ -83,11 +84,11 @@ class ImageSourceChannel:
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same image-source paths under another code."""
+        """The same paths with their gains under another panel code, without a new search."""
         return rephase(paths, code)
 
     def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
-        """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
+        """Specular legs from device positions (K, 3) [m] to one landmark; those to a panel arrive at its front."""
         panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]
         if panel < 0:

@@ -67,7 +67,7 @@ class TracedChannel:
         self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), occluders)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, traced, with the panel at level 0."""
+        """Ray-traced paths of every cycle of a trajectory, with the panel's code at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
         problems = [LegQuery(tx, rx, heading, to_rx=True)]
@@ -85,11 +85,14 @@ class TracedChannel:
         return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths under another code, without tracing again."""
+        """The same paths with their gains under another panel code, without tracing again."""
         return rephase(paths, code)
 
     def _trace(self, problems: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
-        """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""
+        """Trace the specular legs of several queries; also whether all possible wall sequences were tried.
+
+        Queries that leave the same occluder out are solved together, block by block.
+        """
         legs: dict[int, SpecularLegs] = {}
         complete = True
         for spared in dict.fromkeys(problem.spared for problem in problems):
@@ -103,7 +106,7 @@ class TracedChannel:
         return [legs[number] for number in range(len(problems))], complete
 
     def _solve(self, batch: QueryBatch, candidates: CandidateIndices, spared: int) -> FoundLegs:
-        """Ask the tracer which candidates exist, and what their walls do to the signal."""
+        """Legs that the tracer confirms among candidates, with their geometry and field coefficients."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 

@@ -1,4 +1,5 @@
-"""What is asked of the tracer, and what becomes of its answers: legs between many devices and their far ends."""
+"""Queries for specular legs between many devices and their far ends, batched for the tracer, and its answers as
+legs."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class LegQuery(NamedTuple):
-    """Legs sought: devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
+    """Query for the specular legs from devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
 
     device: Floats
     far: Floats
@@ -35,7 +36,8 @@ class LegQuery(NamedTuple):
     front: Floats | None = None
     """(3,) normal of that panel, which sees only what lies before it."""
     spared: int = -1
-    """Number of the scatterer at the far end, if it has a shade: that does not hide its own centre."""
+    """Number of the scatterer at the far end, if it has an occluding mesh, which does not hide its own centre; -1 for
+    none."""
 
     @property
     def paired(self) -> bool:
@@ -44,7 +46,7 @@ class LegQuery(NamedTuple):
 
 
 class LegEndpoints(NamedTuple):
-    """What the two ends of N legs are."""
+    """Positions of the two ends of N legs, the agent's heading, and which ends are the Rx."""
 
     device: Floats
     """(N, 3) [m]."""
@@ -53,36 +55,36 @@ class LegEndpoints(NamedTuple):
     heading: Floats
     """(N,) [rad]."""
     from_rx: Booleans
-    """(N,)."""
+    """(N,) whether the device is the Rx (else the Tx)."""
     to_rx: Booleans
-    """(N,)."""
+    """(N,) whether the far end is the Rx (else a landmark)."""
 
 
 class FoundLegs(NamedTuple):
-    """N legs that the tracer confirmed."""
+    """N specular legs that the tracer confirmed: candidate, geometry and field coefficient of each."""
 
     rows: CandidateIndices
     geometry: PathGeometry
     coefficient: Complexes
-    """(N,) field without spreading loss and carrier phase: the product of the reflections."""
+    """(N,) field without spreading loss and carrier phase: reflections and antenna patterns."""
 
     def only(self, keep: Integers) -> "FoundLegs":
-        """The legs chosen."""
+        """Select legs by row."""
         return FoundLegs(
             self.rows.only(keep), PathGeometry(*(part[keep] for part in self.geometry)), self.coefficient[keep]
         )
 
 
 class QueryBatch(NamedTuple):
-    """Several problems in one set of tables, so that one solve serves them all."""
+    """Several queries for legs in one set of tables, so that one solve of the tracer serves them all."""
 
     problems: Sequence[LegQuery]
     sequences: list[Integers]
-    """For each problem (S, D)."""
+    """Possible wall sequences (S, D) of each query."""
     device: Floats
-    """(N, 3) [m] of all problems."""
+    """(N, 3) [m] devices of all queries."""
     far: Floats
-    """(F, 3) [m] of all problems, for the tracer: lifted off host walls."""
+    """(F, 3) [m] far ends of all queries, for the tracer: lifted off host walls."""
     complete: bool
     """Whether the sequences are all that the walls' sides allow; else cones have ruled out some."""
 
@@ -92,7 +94,7 @@ class QueryBatch(NamedTuple):
         return np.concatenate(self.sequences)
 
     def candidates(self, tracer_scene: "TracerScene") -> Iterator[CandidateIndices]:
-        """All rows worth tracing."""
+        """Yield the candidates of all queries that survive culling."""
         from rislam_rt.channel.traced.culling import cull_candidates
 
         first_device = first_far = first_sequence = 0
@@ -105,7 +107,7 @@ class QueryBatch(NamedTuple):
             first_sequence += len(sequences)
 
     def ends(self, rows: CandidateIndices) -> LegEndpoints:
-        """The two ends of each queried leg, row by row."""
+        """Positions and antennas at the two ends of each candidate in `rows`."""
         sizes = [len(problem.device) for problem in self.problems]
         far = np.concatenate([problem.far for problem in self.problems])
         heading = np.concatenate([problem.heading for problem in self.problems])
@@ -114,11 +116,11 @@ class QueryBatch(NamedTuple):
         return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
 
     def _flags(self) -> tuple[list[bool], list[bool]]:
-        """Which queries start, and which end, at the Rx."""
+        """Which queries start at the Rx, and which end there."""
         return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
 
     def legs(self, found: FoundLegs) -> list[SpecularLegs]:
-        """The tracer's answers, problem by problem."""
+        """Split the legs that the tracer found by query."""
         result = []
         first_device = first_sequence = 0
         for problem, sequences in zip(self.problems, self.sequences, strict=True):
@@ -134,7 +136,7 @@ class QueryBatch(NamedTuple):
 
 
 def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
-    """Queries for legs: the wall sequences of every problem up to `depth` bounces."""
+    """Combine queries for legs into one batch, each with its possible wall sequences of up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 
     walls, sequences, complete = tracer_scene.walls, [], True
@@ -150,7 +152,7 @@ def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides
 
 
 def join_found(parts: list[FoundLegs]) -> FoundLegs:
-    """All legs, one part after the other."""
+    """Concatenate the legs found in several parts."""
     geometries = zip(*(part.geometry for part in parts), strict=True)
     return FoundLegs(
         join_indices([part.rows for part in parts]),
@@ -160,7 +162,7 @@ def join_found(parts: list[FoundLegs]) -> FoundLegs:
 
 
 def _lifted(problem: LegQuery, walls: Walls) -> Floats:
-    """Far ends (F, 3) of queried legs, a panel's at least `LIFT` in front of its host wall."""
+    """Far ends (F, 3) [m] of a query, a panel's moved to at least `LIFT` in front of its host wall."""
     if problem.host < 0 or problem.front is None:
         return problem.far
     outward = np.copysign(1.0, walls.normal[problem.host] @ problem.front)
@@ -171,7 +173,7 @@ def _lifted(problem: LegQuery, walls: Walls) -> Floats:
 def _as_legs(
     problem: LegQuery, sequences: Integers, device: Integers, column: Integers, found: FoundLegs
 ) -> SpecularLegs:
-    """Scatter found legs into dense arrays, one column a sequence that some device has."""
+    """Arrange the found legs of a query by device and wall sequence, one column for each that some device has."""
     geometry = found.geometry
     keep = np.ones(len(device), dtype=np.bool_)
     if problem.front is not None:

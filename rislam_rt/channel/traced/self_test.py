@@ -18,6 +18,7 @@ class SelfTest:
     """Outcome of `trace_small_box`."""
 
     num_paths: int
+    """Paths that the tracer found."""
     expected_paths: int
     """25: the mirror lattice of a box up to two bounces, 1 + 6 + 18."""
     los_error_db: float

@@ -1,4 +1,4 @@
-"""Exports of a run, in forms that others read: trajectories, maps, configuration, scores, and its room."""
+"""Exports of a run in common formats: trajectories (TUM), maps and scores (JSON), configuration (TOML), scene."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,7 @@ ROOM = "scene"
 
 
 def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Files that a run exports: trajectories, maps, room, configuration and summary, name -> content."""
+    """Exported files of a run by name: trajectories, maps, scene, configuration and scores."""
     motion = result.scene.agent
     files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
     for name, scheme in result.schemes.items():
@@ -25,7 +25,7 @@ def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, by
 
 
 def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Exported record of a result: maps, configuration, summary and its room, name -> content."""
+    """Exported files of a run by name that do not grow with its cycles: maps, configuration, scores and scene."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
     settings = _without_none({**result.config, "scene": ROOM})
     files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(settings)}
@@ -34,7 +34,7 @@ def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -
 
 
 def map_table(estimate: MapEstimate) -> dict[str, Any]:
-    """An exported map as plain lists: landmarks, their images, walls."""
+    """Table of an estimated map for JSON: landmarks, their mirror images, walls."""
     std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
     features = [
         {
@@ -56,7 +56,7 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    """Exported configuration without what is not set: TOML has no null."""
+    """Configuration without the settings that are None: TOML has no null."""
     return {
         key: _without_none(value) if isinstance(value, dict) else value
         for key, value in table.items()

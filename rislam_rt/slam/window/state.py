@@ -14,7 +14,8 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 class WindowState(NamedTuple):
-    """All that the filter knows."""
+    """State of the window filter: poses and map as one Gaussian, landmark table, measurement log, tracks, motion modes,
+    and the odds of being lost."""
 
     cycle: int
     config: SlamConfig
@@ -24,22 +25,22 @@ class WindowState(NamedTuple):
     tracks: WindowTracks
     visibility: VisibilityObservations
     motion_mode: Floats
-    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
-    the rate of turn, where the heading is not known."""
+    """(2, L) probabilities of the motion modes in the step before the window's first, horizontal and vertical; (3, L)
+    with the rate of turn, where the heading is not known."""
     level: Floats
-    """(2, L) or (3, L) of the last step's, filtered."""
+    """(2, L) or (3, L) filtered probabilities of the motion modes in the last step."""
     heading: Floats
-    """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
+    """(K,) [rad] headings of the poses as the compass told; without one, what the estimated offsets are relative to."""
     shift: Floats
-    """(3,) [m] standard deviation of the start's position: what no measurement tells."""
+    """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
     scene: KnownEnvironment
     lost_log_odds: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
-    asked: bool
-    """Whether the first tracks told that the start is another."""
+    start_was_wrong: bool
+    """Whether the first tracks have shown that the start's velocity or heading was told wrong."""
     turned: float
-    """[rad] by which the compass was found to be wrong."""
+    """[rad] correction of the compass since it was found to be wrong."""
     codes: tuple[RisCode | None, ...]
-    """(K,) as the agent believes they were applied."""
+    """(K,) phase codes of the window's cycles, as the agent believes they were applied."""
     passed: Floats
-    """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
+    """(P, 3) [m] smoothed positions of the poses that have left the window."""

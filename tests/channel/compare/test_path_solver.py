@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sionna_comparison import compare_with_path_solver
 
-from rislam_rt.channel.compare.path_solver import compare_with_path_solver
 from rislam_rt.channel.compare.poses import random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import TraceError
