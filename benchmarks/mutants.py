@@ -86,7 +86,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "half the deviations", "slam/window/mapping.py",
+        "half the deviations", "slam/window/estimates.py",
         "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
         (
             "pipeline/recordings/test_own_measurements.py",
@@ -129,8 +129,8 @@ MUTANTS = (
     ),
     Mutant(
         "every second birth of a wrong kind", "slam/window/births/births.py",
-        "    landmarks = enter(context.landmarks, verdict.is_wall,",
-        "    landmarks = enter(context.landmarks, verdict.is_wall != bool(new % 2),",
+        "    landmarks = enter(context.landmarks, decision.is_wall,",
+        "    landmarks = enter(context.landmarks, decision.is_wall != bool(new % 2),",
         (
             "slam/window/test_far_walls.py",
             "slam/window/landmarks/test_window_panel.py",

@@ -10,9 +10,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
+from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD, POSE, TURN, basis, latest
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, basis, last_pose_matrix
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
@@ -35,7 +35,7 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     head, accel = _motion(step, trail, mean, std, turns)
     size, count, slim = len(mean), len(heading), POSE + len(mean) - HEAD
     back = np.eye(size)
-    back[:HEAD, :HEAD] = np.linalg.inv(latest(step.tobytes(), turns)[:, :HEAD])
+    back[:HEAD, :HEAD] = np.linalg.inv(last_pose_matrix(step.tobytes(), turns)[:, :HEAD])
     whole = np.zeros((size + accel.size,) * 2)
     whole[:size, :size] = back @ covariance @ back.T
     prior = Quadratic(inverse(whole[:size, :size] + ROUNDING * np.eye(size)), np.zeros(size), head)

@@ -37,13 +37,20 @@ from rislam_rt.slam.step_info import REMOVED, StepInfo
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init
 from rislam_rt.slam.window import revisit as window_revisit
-from rislam_rt.slam.window.births.feature_removal import release
+from rislam_rt.slam.window.births.feature_removal import remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle
-from rislam_rt.slam.window.cycle_explanation import grow, learn_cycle, listen, outcome_of, take_in, unexplained
+from rislam_rt.slam.window.cycle_explanation import (
+    components_to_explain,
+    learn_cycle,
+    log_associations,
+    outcome_of,
+    remove_or_add_features,
+    unexplained,
+)
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.relinearisation import renew as renew_slots
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import REFRESH
 
 BROAD = 10.0
@@ -105,22 +112,22 @@ def step(
     turn = heading - float(state.front.heading[-1])
     front, belief = _move(state, dt, heading, code, config, rng=rng)
     scene, landmarks, engine = front.scene, front.landmarks, pick_engine(config.nested.engine)
-    heard = listen(measurement, scene)
+    heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
     view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers)
-    front, used = take_in(front, observed, view)
+    front, used = log_associations(front, observed, view)
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _refresh_view(front, told.belief, config)
-    left = renew_slots(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
+    left = relinearise(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED
 
-    grown = grow(front, left, view)
+    grown = remove_or_add_features(front, left, view)
     # a wall found by a point that it stands before is gone with it
     found = grown.landmarks.ident
-    grown = release(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
+    grown = remove_from_map(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
     belief = _follow_map(told.belief, front, grown, config, rng=rng)
     ess = effective_size(belief)
     belief, resampled = renew(belief, _spans(grown), config.nested, engine, rng=rng)

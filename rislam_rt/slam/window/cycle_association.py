@@ -21,7 +21,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
 
@@ -121,8 +121,8 @@ def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) ->
     """Covariance of the present with the height's variance widened by what the motion model may be off by, where wall
     returns are used.
 
-    Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
-    returns next to nothing measures the height: a gate as wide as it may be off holds anything.
+    Across, a livelier motion is looked at beside the one that is held (`filter._associate_over_motions`); upwards none
+    is. Without wall returns next to nothing measures the height: a gate as wide as it may be off holds anything.
     """
     if not scene.use_vt:
         return covariance

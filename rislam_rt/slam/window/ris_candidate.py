@@ -13,7 +13,7 @@ from rislam_rt.slam.returns import Poses, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import DRAWS
 from rislam_rt.slam.window.tracks import WindowTracks
 
@@ -43,7 +43,7 @@ def weigh_tracks(
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).converged()
+    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 

@@ -36,7 +36,7 @@ class WindowState(NamedTuple):
     scene: KnownEnvironment
     lost_log_odds: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
-    asked: bool
+    start_was_wrong: bool
     """Whether the first tracks have shown that the start's velocity or heading was told wrong."""
     turned: float
     """[rad] correction of the compass since it was found to be wrong."""

@@ -11,7 +11,7 @@ from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
 from rislam_rt.slam.nested.particles.landmark_cloud import HOPELESS, LEAST_STD, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 PRIMES = (7919, 5003, 3001, 1009, 409, 211, 101, 53, 29, 13, 7, 5, 3)
 """Strides of the permutation of resampled particles; the first that does not divide M is taken."""

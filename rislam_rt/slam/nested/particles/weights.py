@@ -11,7 +11,7 @@ from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, gaus
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
 from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.returns import NONE, Returns, linearise, poses_of
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 TAIL = 4.0
 """Degrees of freedom of Student's t, by which a return far off its prediction counts for less."""

@@ -9,7 +9,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_f
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals
-from rislam_rt.slam.window.relinearisation import renew
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
@@ -20,12 +20,12 @@ def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, R
     """Solve the whole window again by so many re-linearised Gauss-Newton steps; returns it and the residuals of the
     last one."""
     for _ in range(steps):
-        window, left = renew(context, 0)
+        window, left = relinearise(context, 0)
         context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
     return context.window, left
 
 
-def release(context: WindowState, keep: Booleans) -> WindowState:
+def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
     """Remove the features not marked in `keep` (F,) from the map; the measurements that they explained go on as
     tracks."""
     if keep.all():
@@ -71,7 +71,7 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
     return WindowTracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
+def features_to_remove(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
     """Which features (F,) to remove: those that probably do not exist, and those that their measurements' residuals
     contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))

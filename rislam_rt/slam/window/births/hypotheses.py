@@ -81,11 +81,11 @@ def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, mid
     return KnownFeatures(place, square_roots(blocks), turn, shift)
 
 
-def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
+def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
     """Every kind of hypothesis for every track with an initial value of its new feature; images of known points stand
     in `image_hypotheses`."""
-    (seen, tx, rx), ray, count = digest.mean, digest.direction, len(digest.seen)
-    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, digest.middle
+    (seen, tx, rx), ray, count = summary.mean, summary.direction, len(summary.seen)
+    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, summary.middle
     walls, once = landmarks.walls, np.array([NONE])
     turn, shift = known.turn[walls], known.shift[walls, None]
 

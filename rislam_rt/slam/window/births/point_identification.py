@@ -42,11 +42,13 @@ class Identified(NamedTuple):
     none."""
 
 
-def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
-    """Weigh every point that a track may be as RIS panel and as scatterer, by the components `ats` (rows of the log) of
-    each track, and return the gain in evidence."""
+def identify(
+    context: WindowState, track_rows: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats
+) -> Identified:
+    """Weigh every point that a track may be as RIS panel and as scatterer, by each track's components (`track_rows` of
+    the log), and return the gain in evidence."""
     scene, landmarks, panels = context.scene, context.landmarks, context.scene.num_panels
-    elsewhere = np.full((len(ats), panels), -CERTAIN)
+    elsewhere = np.full((len(track_rows), panels), -CERTAIN)
     found = Identified(np.zeros(len(evidence)), unknown(len(evidence), panels), elsewhere)
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
@@ -55,7 +57,7 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
     taken = -np.logaddexp.reduce(
         np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
     )  # but one
-    for track, at in enumerate(ats):
+    for track, at in enumerate(track_rows):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
             found.identity.log_ris[rows] = -CERTAIN
@@ -69,7 +71,7 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
     found.identity.hidden[table.kind != POINT] = 1.0
-    return found._replace(identity=found.identity.converged())
+    return found._replace(identity=found.identity.clipped())
 
 
 def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:

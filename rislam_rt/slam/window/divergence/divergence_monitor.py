@@ -17,8 +17,8 @@ from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.cholesky import inverse
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
 
@@ -64,7 +64,7 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
     found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
-    by = egomotion.agreed(found)
+    by = egomotion.agreed_velocity(found)
     return by if float(by @ by) > CELL**2 else np.zeros(3)
 
 
@@ -84,7 +84,7 @@ def shifted(window: Window, by: Floats) -> Window:
     return window._replace(accel=accel)
 
 
-def landed(window: Window, by: Floats) -> Window:
+def after_jump(window: Window, by: Floats) -> Window:
     """Window after a jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk; velocity and map as they
     were."""
     while window.num_poses > 1:
@@ -100,7 +100,7 @@ def landed(window: Window, by: Floats) -> Window:
     return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
 
 
-def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
+def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
     """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
@@ -113,7 +113,7 @@ def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> eg
     return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 
-def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
+def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
     """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
     from the rates at which path lengths changed.
 

@@ -119,7 +119,7 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     )  # fmt: skip
 
 
-def agreed(found: Rates) -> Floats:
+def agreed_velocity(found: Rates) -> Floats:
     """Horizontal velocity (3,), or displacement, on which most of the rates agree; near zero if it may be."""
     every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), CONSTANTS.walk**2 * np.eye(2))
     return np.append(every.velocity[int(np.argmax(every.evidence))], 0.0)

@@ -17,7 +17,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 
@@ -70,7 +70,7 @@ def recall_forms(
     return np.asarray(first * (1.0 - CONSTANTS.rare) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
-def seed(
+def add_clear_paths(
     visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
 ) -> VisibilityObservations:
     """Visibility observations with the paths (N, 5) by which a new feature was found: not occluded, and of mean squared
@@ -93,7 +93,7 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
     )
 
 
-def learn(
+def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
     groups: UnresolvedClusters, clear: Floats, scatter: Floats, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
@@ -185,5 +185,5 @@ def _identities(
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).converged()
+    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).clipped()
     return landmarks._replace(**landmarks.identity.put(points, fresh)._asdict())

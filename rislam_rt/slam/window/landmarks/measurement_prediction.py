@@ -17,7 +17,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import EDGE, FAINT
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))

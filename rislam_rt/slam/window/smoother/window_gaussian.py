@@ -21,9 +21,20 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.factor import inverse, solution
-from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, ONE, POSE, TURN, TWO, basis, carry_on, latest, starts
+from rislam_rt.slam.window.smoother.motion_basis import (
+    FIRST,
+    HEAD,
+    ONE,
+    POSE,
+    TURN,
+    TWO,
+    basis,
+    head_order,
+    last_pose_matrix,
+    step_transition,
+)
 
 
 class Quadratic(NamedTuple):
@@ -113,7 +124,7 @@ def begin_with(
 
 
 def _basis(window: Window) -> Floats:
-    """Matrices (A, K, K + 1) that give the window's poses from its head and accelerations (see `steps.basis`)."""
+    """Matrices (A, K, K + 1) that give the window's poses from head and accelerations (see `motion_basis.basis`)."""
     return basis(window.step.tobytes(), window.turns)
 
 
@@ -130,7 +141,7 @@ def poses(window: Window) -> Floats:
 def _carried(window: Window, rows: Floats) -> Floats:
     """Last pose, velocity and compass offset (7, ...), mapped linearly from rows (D, ...) of all the window's
     unknowns."""
-    size, design = len(window.head), latest(window.step.tobytes(), window.turns)
+    size, design = len(window.head), last_pose_matrix(window.step.tobytes(), window.turns)
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
@@ -223,7 +234,7 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = float(window.step[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = carry_on(-dt, free)
+    back = step_transition(-dt, free)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
@@ -232,7 +243,7 @@ def slide(window: Window) -> Window:
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(window.surplus[0])
-    carry = carry_on(dt, free)
+    carry = step_transition(dt, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -249,13 +260,13 @@ def slide(window: Window) -> Window:
         surplus=window.surplus[1:],
         step=window.step[1:],
         prior=prior,
-        noise=_without(shaken, size, gain),
+        noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=covariance,
     )
 
 
-def _without(noise: Floats, size: int, gain: Floats) -> Floats:
+def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
     """Covariance (size, size) of the gradient that is left when the other unknowns are eliminated by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
@@ -287,7 +298,7 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     slope, slots = window.slots.slope(spot), window.slots.hessian
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
-    along, start, edge = _basis(window), starts(free), 2 * free
+    along, start, edge = _basis(window), head_order(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
@@ -375,7 +386,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
         holds=holds,
         head=window.head[inside],
         prior=prior,
-        noise=_without(window.noise[np.ix_(order, order)], len(inside), gain),
+        noise=_eliminated_noise(window.noise[np.ix_(order, order)], len(inside), gain),
         slots=slots,
         covariance=window.covariance[np.ix_(kept, kept)],
     )
