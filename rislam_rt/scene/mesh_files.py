@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rislam_rt.scene.inside_folder import read_inside
-from rislam_rt.scene.mesh_containers import too_many_faces
+from rislam_rt.scene.mesh_file_checks import too_many_faces
 from rislam_rt.scene.mesh_placement import UNITS, place_points
 from rislam_rt.scene.meshes import MAX_COORDINATE, MAX_MESH_BYTES, Mesh, MeshReader
+from rislam_rt.scene.read_inside_folder import read_inside
 from rislam_rt.scene.schema import LimitsSection, MeshesSection, MeshSection
 
 

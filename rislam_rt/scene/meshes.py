@@ -14,7 +14,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.mesh_containers import check_glb, too_many_faces, without_comments
+from rislam_rt.scene.mesh_file_checks import check_glb, too_many_faces, without_comments
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""

@@ -1,4 +1,4 @@
-"""Reading of the files that a scene names, which must lie inside its folder and be no larger than a limit."""
+"""Reading of files that a scene names inside its folder: none outside, and none larger than a limit."""
 
 from pathlib import Path, PurePosixPath
 

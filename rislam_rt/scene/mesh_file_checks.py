@@ -1,4 +1,4 @@
-"""Checks of mesh files (GLB, PLY) as containers, before they are parsed: how much they hold, and what they refer to."""
+"""Checks of mesh files (GLB, PLY) before they are parsed: how much they hold, and what they refer to."""
 
 import json
 import re
