@@ -46,9 +46,11 @@ def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
                 f"{key}.normal", "the agent is never in front of the panel", "turn the panel or the path"
             )
         yield from _implausible(room, panel, key, radio)
+        yield from _beyond_room(room, panel, key)
         spread = _delay_spread(room, panel)
         if spread * radio.bandwidth > 1.0:
-            message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"
+            limit = f"1 / B = {1e9 / radio.bandwidth:g} ns"
+            message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than {limit}"
             yield room.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
 
 
@@ -87,6 +89,18 @@ def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioCon
             f"{radio.carrier / 1e9:g} GHz): whatever the code, another direction is met as strongly"
         )
         yield room.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
+
+
+def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
+    """Scene check: warning of a RIS panel that reaches beyond the bounds of the room."""
+    spec = panel.spec
+    sides = spec.spacing * [spec.cols, spec.rows]
+    half = 0.5 * (sides[0] * np.abs(spec.right) + sides[1] * np.abs(spec.up))
+    low, high = room.bounds
+    over = float(np.maximum(low - (panel.center - half), panel.center + half - high).max())
+    if over > MIN_CLEARANCE:
+        message = f"the panel of {sides[0]:.3g} m x {sides[1]:.3g} m reaches {over:.3g} m beyond the room"
+        yield room.warning(f"{key}.rows", message, "take fewer elements, put them closer, or move its center")
 
 
 def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:

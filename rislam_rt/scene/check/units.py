@@ -59,7 +59,7 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
     if room is not None:
         yield Finding("warning", file, "meshes.units", *room)
         return  # points in metres lie outside a room in millimetres, or in its corner
-    for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position")):
+    for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position"), ("agent", "waypoints")):
         for field, point in _points(table, path):
             yield from _far_point(file, field, point, bounds)
 
@@ -106,10 +106,13 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
-    """Points (3,) in a scene file's table: dotted field and value wherever a path of keys leads."""
+    """Points (3,) in a scene file's table: dotted field and value wherever a path of keys leads; of a list of points,
+    each."""
     for field, value in _places(table, path, ""):
-        if isinstance(value, list) and len(value) == 3 and all(_is_number(number) for number in value):
-            yield field, np.array(value, dtype=np.float64)
+        listed = isinstance(value, list) and value and isinstance(value[0], list)
+        for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:
+            if isinstance(point, list) and len(point) == 3 and all(_is_number(number) for number in point):
+                yield place, np.array(point, dtype=np.float64)
 
 
 def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:

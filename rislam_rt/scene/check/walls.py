@@ -75,8 +75,10 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
             worst[key] = pair
     for (upper, lower, seen), pair in worst.items():
         names = room.scene.reflectors[upper].name, room.scene.reflectors[lower].name
-        message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap:.1e} m apart"
-        mend = f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit:.1e} m"
+        message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap * 1e3:.3g} mm apart"
+        mend = (
+            f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit * 1e3:.2g} mm"
+        )
         yield (room.warning if seen else room.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
 
 

@@ -16,6 +16,7 @@ from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_li
 from rislam_rt.scene.meshes import Mesh, as_mesh
 from rislam_rt.scene.polygons import inside_loop, triangulate
 from rislam_rt.scene.shapes import joined, quad
+from rislam_rt.spelling import counted
 
 THICKEST = 0.6
 """Thickest wall [m]: an opening goes through all walls this near it that run along it, as both faces of a thick wall
@@ -74,8 +75,8 @@ def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> Roo
     palette.check_used(names)
     closed = sum(o.material is not None for o in plan.openings)
     remarks = [
-        f"floor plan of {len(plan.rooms)} rooms: {len(names)} reflectors, {len(plan.openings) - closed} openings, "
-        f"{closed} closed doors and windows"
+        f"floor plan of {counted(len(plan.rooms), 'room')}: {counted(len(names), 'reflector')}, "
+        f"{counted(len(plan.openings) - closed, 'opening')}, {closed} closed doors and windows"
     ]
     return RoomDraft(reflectors, {}, remarks + palette.remarks())
 
