@@ -45,6 +45,7 @@ class BpSlamState(NamedTuple):
     """State of BP-SLAM by delays: the agent, and the features' Gaussian sums."""
 
     agent: DelayAgent
+    """The agent: trajectory, height, heading, body and receiver."""
     sums: Sums
     """Potential features as Gaussian sums."""
     undetected: float

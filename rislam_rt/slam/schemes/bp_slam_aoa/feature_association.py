@@ -49,11 +49,13 @@ class View(NamedTuple):
     """Predicted returns of a cycle, their detection probabilities and candidate pairs, before the association."""
 
     predicted: PredictedReturns
+    """Predicted returns, moved by the mean pull of neighbours."""
     detection: Floats
     """Probability (C,) that a Gaussian's return is reported by itself."""
     disturbance: Floats
     """Covariance (C, 3, 3) of the pull of returns that cannot be resolved from it."""
     pairs: CandidatePairs
+    """Candidate pairs of a Gaussian and a component."""
 
 
 def expect_scan(

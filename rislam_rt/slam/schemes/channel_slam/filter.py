@@ -48,6 +48,7 @@ class ChannelSlamState(NamedTuple):
     """State of Channel-SLAM: the agent, the tracks of ranges, and the virtual transmitters."""
 
     agent: DelayAgent
+    """The agent: trajectory, height, heading, body and receiver."""
     sums: Sums
     """Gaussian sums of the virtual transmitters; `ident` is the label of the path."""
     tracks: RangeTracks
