@@ -14,7 +14,7 @@ from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
-from rislam_rt.slam.schemes.bp_slam_aoa.merging import unresolved_neighbours
+from rislam_rt.slam.schemes.bp_slam_aoa.unresolved_returns import unresolved_neighbours
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 
