@@ -181,8 +181,7 @@ def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
 
 
 def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
-    """Tracks not examined for births (young; wall returns, if thrown away), and the log entries that are wall
-    returns."""
+    """Tracks not examined for births (young; wall returns, if thrown away), and which log entries are wall returns."""
     tracks, scene = front.tracks, front.scene
     need = config.nested.birth_cycles if config.use_vt or not len(front.landmarks.ident) else WALL_CYCLES
     looked = np.maximum(tracks.looked, 2 * need // 3)  # looked at again when their measurements have grown by a half

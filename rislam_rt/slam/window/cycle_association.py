@@ -35,8 +35,11 @@ class CycleAssociation(NamedTuple):
     covariance: Floats
     """(7 + 3F, 7 + 3F) ...and their covariance."""
     poses: Poses
+    """Tx and Rx positions of the present pose."""
     expected: ExpectedComponents
+    """Predicted returns, R of them."""
     groups: UnresolvedClusters
+    """Their clusters, C of them."""
     clear: Floats
     """(R,) probability that nothing occludes each return..."""
     scatter: Floats

@@ -35,6 +35,7 @@ class HeardCycle(NamedTuple):
     alternated codes."""
 
     observed: Observations
+    """These components in the filter's units."""
     free: Integers
     """(M,) index of each in the measurement."""
     landmark: Integers

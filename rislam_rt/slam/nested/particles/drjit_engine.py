@@ -82,8 +82,7 @@ class DrJitEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=found.log_total), found
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a landmark's cloud to `size` equally weighted particles an agent, of mean 0 and covariance (N, 3,
-        3)."""
+        """Resample a landmark's cloud to `size` equally weighted particles an agent, mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         children = self._draw(cloud, self._ancestors(cloud, size, kernel.comb), size, kernel.stride)
         grain = cloud.points.step[cloud.block]

@@ -1,5 +1,4 @@
-"""Initialisation of a new landmark: every agent particle fits it to its own trail, and absorbs its past
-measurements."""
+"""Initialisation of a new landmark: every agent particle fits it to its own trail and absorbs its past measurements."""
 
 from typing import NamedTuple
 

@@ -25,7 +25,7 @@ class Association(NamedTuple):
 
 
 def associate(missed: Floats, pair: Floats, fresh: Floats, iterations: int, tolerance: float) -> Association:
-    """Approximate marginals of the one-to-one association.
+    """Approximate marginals of the one-to-one association of features with measurements, by loopy belief propagation.
 
     Parameters
     ----------

@@ -25,8 +25,8 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def births(context: WindowState, view: CycleAssociation) -> WindowState:
-    """Examine the tracks that are due: those explained by known features are associated with them, and of the others
-    the shortest whose decision is clear adds a feature to the map."""
+    """Examine the tracks that are due for a birth: those that known features explain are associated with these, and of
+    the others the shortest with a clear decision adds a feature to the map."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
         return context
@@ -116,8 +116,8 @@ def _bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> 
 def _log_same_direction(
     context: WindowState, rows: Integers, track_rows: list[Integers], histories: TrackSummary, mean: Floats
 ) -> Floats:
-    """Log odds (T,) by which a shorter path from the same direction speaks for each track being a path over unknown
-    walls on the Tx leg, and against all else.
+    """Log odds (T,) that tracks are paths over unknown walls on the Tx leg, against all else, as a shorter path arrives
+    from the same direction.
 
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
@@ -223,8 +223,8 @@ def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats
 def _enter(
     context: WindowState, at: Integers, decision: TrackDecision, histories: TrackSummary, row: int
 ) -> tuple[WindowState, bool]:
-    """Add a new feature with its track's history to the map and solve the window again; returns the state as it was,
-    and False, if they do not fit."""
+    """Add a new feature with its track's history to the map and solve the window again; if they do not fit, return the
+    state as it was, and False."""
     new = len(context.landmarks.ident)
     holds = decision.holds._replace(feature=np.full(len(decision.holds.std), new))
     window = window_gaussian.add_feature(context.window, decision.place, holds)

@@ -17,8 +17,8 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
-    """Solve the whole window again by so many re-linearised Gauss-Newton steps; returns it and the residuals of the
-    last one."""
+    """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns it and the last step's
+    residuals."""
     for _ in range(steps):
         window, left = relinearise(context, 0)
         context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
@@ -26,7 +26,7 @@ def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, R
 
 
 def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
-    """Remove the features not marked in `keep` (F,) from the map; the measurements that they explained go on as
+    """Remove features (those not marked in `keep`) from the map; the measurements that they explained go on as
     tracks."""
     if keep.all():
         return context
@@ -42,7 +42,7 @@ def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
 
 
 def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
-    """Begin a track for each path among the rows `lost` of the log that was detected lately."""
+    """Begin a track for each recently detected path among the rows `lost` of the measurement log."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
     fresh: list[tuple[object, ...]] = []
@@ -72,7 +72,7 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
 
 
 def features_to_remove(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
-    """Which features (F,) to remove: those that probably do not exist, and those that their measurements' residuals
+    """Which features (F,) of the map to remove: those that probably do not exist, and those that their residuals
     contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     form = log.form[left.row, 0]

@@ -47,8 +47,8 @@ more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
-    """Log prior (H,) of the hypotheses' kinds: each wall on the path costs power, and kinds over known features are
-    shared among all of these."""
+    """Log prior (H,) of the kinds of hypotheses: each wall on the path costs power, and kinds over a known feature
+    share their probability among all such features."""
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     rivals[IS_IMAGE[table.kind]] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
@@ -69,8 +69,8 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """Log probability (H,) that a new wall's return is resolved from, or comes out as one with, the return over its
-    edge with a known level or upright wall.
+    """Log probability (H,) that a new wall's return is resolved from the return over its edge with a known level or
+    upright wall, or is unresolved from it, as the hypothesis has it.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
     so does its edge.
@@ -94,7 +94,7 @@ def log_shared(
     table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats,
     concurrent: Booleans,
 ) -> Floats:  # fmt: skip
-    """Gain (H,) in log evidence of hypotheses whose new feature other tracks ask for as well.
+    """Gain (H,) in log evidence of hypotheses whose new feature other tracks' hypotheses ask for as well.
 
     A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
     that of one place given the other, against all else that it may be.
@@ -130,7 +130,7 @@ def log_shared(
 
 
 def concurrent(context: WindowState, track_rows: list[Integers]) -> Booleans:
-    """Whether each two of T tracks (T, T), rows of the log each, were detected in a common cycle."""
+    """Whether each pair of T tracks (T, T), given as rows of the log, were detected in a common cycle."""
     cycle = context.log.cycle - context.log.cycle.min()
     heard = np.zeros((len(track_rows), cycle.max() + 1))
     for row, at in enumerate(track_rows):
@@ -174,8 +174,8 @@ def log_amplitudes(
 def log_opacity(
     table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """Log prior (H,) of a new feature behind known walls, or of a new wall before known features: what stands between
-    occludes.
+    """Log prior (H,) of occlusion: against new features behind known walls, and against new walls in front of known
+    features.
 
     With wall returns a new wall that is heard over a known one stands where its path meets it.
     """
@@ -273,8 +273,8 @@ class HeldWalls(NamedTuple):
 def log_upright(
     table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> HeldWalls:
-    """Gain in evidence by the directions that walls have beforehand (upright, level, at right angles to another, or
-    any), and the new walls' places given these.
+    """Gain in log evidence of new walls by the directions that walls have beforehand (upright, level, at right angles
+    to another, or any), and their places given these.
 
     Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
     along each axis: rivals that are rarer let ghosts of points through.
@@ -319,6 +319,6 @@ def log_upright(
 
 
 def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
-    """Posterior log odds that a direction prior holds, from the prior ones and the wall image's offset [m] from it with
-    that variance [m^2]."""
+    """Posterior log odds that a direction prior holds of a wall, from the prior ones and the offset [m] of the wall's
+    image with its variance [m^2]."""
     return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))

@@ -19,8 +19,8 @@ from rislam_rt.slam.window.solver_limits import ASTRAY, HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):
-    """Inputs of the fits of H hypotheses: initial value of the new feature, and affine maps of the known walls on the
-    path."""
+    """Inputs of the fits of H hypotheses of what caused a track: initial value of the new feature, affine maps of known
+    walls."""
 
     track: Integers
     """(H,) row of the track summary."""
@@ -52,7 +52,8 @@ class Trials(NamedTuple):
 
 
 class Fits(NamedTuple):
-    """Fitted hypotheses, H of them: place of the new feature, its covariance, cost and log evidence."""
+    """Fitted hypotheses of what caused a track, H of them: place of the new feature, covariance, cost and log
+    evidence."""
 
     place: Floats
     """(H, 3) [m] of the new feature."""
@@ -70,8 +71,8 @@ class Fits(NamedTuple):
 
 
 def try_all(trials: Trials, summary: TrackSummary) -> Fits:
-    """Fit all hypotheses to their tracks by Gauss-Newton; those hopelessly behind after the first step are dropped, at
-    infinite cost."""
+    """Fit all hypotheses of what caused the tracks by Gauss-Newton; those hopelessly behind after the first step are
+    dropped, at infinite cost."""
     count = len(trials.track)
     active = np.arange(count)
     cost, log_det = np.full(count, np.inf), np.zeros(count)
@@ -127,8 +128,8 @@ class _Equations(NamedTuple):
 def _equations(
     trials: Trials, summary: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
 ) -> _Equations:
-    """Normal equations of the next Gauss-Newton step of the hypotheses `rows`, at places (H, 3) and errors of all else
-    (H, E), and their costs."""
+    """Normal equations of the next Gauss-Newton step of hypotheses `rows`, at places (H, 3) and errors (H, E) of poses
+    and maps, with their costs."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
     tx, rx = summary.tx[track], summary.rx[track]
@@ -191,8 +192,8 @@ def _equations(
 
 
 def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
-    """Slopes (H, B, 3, 3) of the predictions by the errors of the map on the new feature's near side, and of the map
-    behind it.
+    """Slopes (H, B, 3, 3) of predicted measurements by the errors of the known walls' affine maps before and behind the
+    new feature.
 
     What is seen moves by `by_image` (H, B, 3, 3) with the image that the Rx hears, its length by `toward` (H, B, 3)
     with what the Tx sees; `flip` (H, 3, 3) mirrors.
@@ -218,8 +219,8 @@ def _mix(
     trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, maps: tuple[Floats, Floats, Floats],
     seen: tuple[Floats, Floats, Floats],
 ) -> Floats:  # fmt: skip
-    """Move predictions, and their slopes by place and pose, towards the reflection in a known wall from which they are
-    unresolved, `seen` in place; returns the slope (H, B, 3, 1) by the share's error."""
+    """Move predictions, and their slopes by place and pose, in place towards the reflection in a known wall from which
+    they are unresolved; returns the slope (H, B, 3, 1) by the share's error."""
     (second, inside, by_tx), (value, new, pose) = maps, seen
     split = np.zeros((*value.shape, 1))
     both = trials.mixed[rows].nonzero()[0]
@@ -242,7 +243,7 @@ def _mix(
 
 
 def _by_image(arrival: Floats, reach: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of length and cosines by the apparent place from which a ray arrives."""
+    """Derivatives (..., 3, 3) of a path's length and cosines by the apparent place from which its ray arrives."""
     found = np.empty((*reach.shape, 3, 3))
     found[..., 0, :] = arrival
     found[..., 1:, :] = (AXES[:2] - arrival[..., :2, None] * arrival[..., None, :]) / reach[..., None, None]

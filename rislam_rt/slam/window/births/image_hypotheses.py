@@ -33,8 +33,7 @@ from rislam_rt.slam.window.solver_limits import APART, BEARINGS, REACH
 
 
 def with_images(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
-    """Hypotheses with those appended of every known point's image in a new wall that a track's length and direction
-    allow."""
+    """Append hypotheses of known points' images in new walls, as far as each track's length and direction allow."""
     ways = [(point, wall) for point in landmarks.points.tolist() for wall in (NONE, *landmarks.walls.tolist())]
     more = [_in_reach(_images(summary, known, point, wall), summary, known) for point, wall in ways]
     every = [table, *more]
@@ -44,7 +43,7 @@ def with_images(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, 
 
 
 def _images(summary: TrackSummary, known: KnownFeatures, point: int, wall: int) -> Hypotheses:
-    """Hypotheses of T tracks as images of one known point in a new wall, over a known wall besides, or none
+    """Hypotheses that T tracks are images of one known point in a new wall, over a known wall besides, or none
     (`NONE`)."""
     (seen, _, rx), count = summary.mean, len(summary.seen)
     spot, root, still = known.place[point], known.root[point], (AXES, np.zeros(3), np.zeros((3, 3)))
@@ -86,8 +85,8 @@ def _images(summary: TrackSummary, known: KnownFeatures, point: int, wall: int) 
 def _initial_values(
     summary: TrackSummary, kind: int, inner: Floats, other: Floats, outer: tuple[Floats, Floats, Floats]
 ) -> list[Floats]:
-    """Initial values of the new wall, a list of (T, 3): on the Rx leg one, on the Tx leg level walls below and above
-    and upright ones all around."""
+    """Initial values (T, 3) of the new wall of an image hypothesis: one on the Rx leg; on the Tx leg level walls below
+    and above, and upright ones all around."""
     seen, tx, rx = summary.mean
     if kind not in FAR:
         reach = np.maximum(seen[:, 0] - np.linalg.norm(other - tx, axis=1), 0.1)
@@ -141,8 +140,8 @@ def fitted_twice(table: Hypotheses, place: Floats, evidence: Floats) -> Integers
 def image_amplitudes(
     table: Hypotheses, summary: TrackSummary, landmarks: WindowTable, radio: RadioConfig
 ) -> tuple[Integers, Floats]:
-    """Rows (R,) of image hypotheses, and the log probability (R,) of their tracks' amplitudes; a panel's hangs on
-    codes, and has no misfit."""
+    """Rows (R,) of image hypotheses, and the log density (R,) of their tracks' amplitudes; of a panel, whose amplitude
+    hangs on codes, without the misfit."""
     rows = IS_IMAGE[table.kind].nonzero()[0]
     if not len(rows):
         return rows, np.zeros(0)

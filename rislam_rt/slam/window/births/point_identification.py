@@ -75,8 +75,8 @@ def identify(
 
 
 def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
-    """Panel identities of the points of hypotheses `rows` (R,) after a track's whole history, its components being the
-    log's rows `at`.
+    """Panel identities (scatterer or RIS panel) of the points of a track's hypotheses `rows` (R,) after its whole
+    history, its components being the log's rows `at`.
 
     The last row stands for a panel anywhere else: amplitudes scatter as they do.
     """
@@ -114,8 +114,8 @@ LOOKS = 60
 
 
 def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
-    """Slots of the window from the first on, in blocks of at most so many, within which a code is told for all or for
-    none."""
+    """Cycles of the window from `first` on, in blocks of at most `most` cycles within which a phase code is told for
+    all or for none."""
     slots = list(range(first, len(told)))
     while slots:
         count = next((at for at, slot in enumerate(slots) if told[slot] != told[slots[0]]), len(slots))
@@ -131,7 +131,7 @@ def _codes(codes: list[RisCode | None], count: int) -> RisCode | None:
 
 
 def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:
-    """Share (R,) of the amplitude that the known walls on hypotheses' paths leave."""
+    """Share (R,) of the amplitude that known walls on the paths of hypotheses `rows` leave."""
     if not len(landmarks.ident):
         return np.ones(len(rows))
     known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)

@@ -45,6 +45,7 @@ class TrackDecision(NamedTuple):
     kind: int
     """Number in `hypotheses.KINDS`; -1: a path of no kind there."""
     probability: float
+    """Posterior probability of the hypothesis, with all others that put the same feature in the same place."""
     known: int
     """Row of the known wall or point, -1 for none."""
     over: int
@@ -102,8 +103,8 @@ _TEMPLATES = (
 def _weigh(
     context: WindowState, track_rows: list[Integers], summary: TrackSummary, known: KnownFeatures, lonely: Floats
 ) -> tuple[Hypotheses, Fits, Floats, Floats]:
-    """Fit all hypotheses of what caused T tracks, and return them, their fits, log evidences (H,), and path lengths
-    (H,) [m]: as heard, or whole periods of the sounding more."""
+    """Fit all hypotheses of what caused T tracks; returns them, fits, log evidences (H,), and path lengths (H,) [m]: as
+    heard, or whole periods of the sounding more."""
     landmarks, scene, near = context.landmarks, context.scene, len(summary.seen)
     owner = np.arange(near)
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
@@ -202,7 +203,7 @@ def decide_tracks(
 
 
 def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
-    """Log prior density (T,) of tracks as paths of none of the listed kinds, from length [m] and two cosines (T, 3).
+    """Log prior density (T,) that tracks are paths of none of the listed kinds, from length [m] and two cosines (T, 3).
 
     They seem to come from anywhere in the ball of places, half as far off as they are long. With wall returns they run
     over walls that the map lacks; without, where most walls stay unknown, they are as frequent as points.
@@ -213,9 +214,8 @@ def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
 
 
 def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
-    """Which other hypotheses `own` of a track put the same kind of feature where hypothesis `at` has it: in question is
-    only over which known wall it is heard (before or after, where two stand at right angles), not whether it is
-    there."""
+    """Which of a track's other hypotheses `own` put the same kind of feature where hypothesis `at` has it, so that only
+    the known wall on the path is in question (before or after, where two stand at right angles)."""
     wall, pair = table.trials.is_wall, table.trials.is_pair | table.trials.far
     if pair[at]:
         return np.zeros(len(own), dtype=np.bool_)

@@ -74,8 +74,8 @@ def log_jump() -> float:
 
 
 def shifted(window: Window, by: Floats) -> Window:
-    """Window with its last position moved by `by` (3,) [m] and its velocity kept: for a trial association, not for a
-    solution."""
+    """Sliding window with its last position moved by `by` (3,) [m] and its velocity kept: for a trial association, not
+    for a solution."""
     accel, dt = window.accel.copy(), window.step[-2:]
     # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
@@ -85,8 +85,8 @@ def shifted(window: Window, by: Floats) -> Window:
 
 
 def after_jump(window: Window, by: Floats) -> Window:
-    """Window after a jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk; velocity and map as they
-    were."""
+    """Sliding window after the agent's jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk;
+    velocity and map as they were."""
     while window.num_poses > 1:
         window = window_gaussian.slide(window)
     head, size = window.head.copy(), len(window.head)
@@ -137,8 +137,8 @@ PAST = 10
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
-    """Window with another horizontal velocity at its start, before any birth, within `std` [m/s] or the told deviation,
-    whichever is larger."""
+    """Sliding window with another horizontal velocity at its start, before any birth, within `std` [m/s] or the told
+    deviation, whichever is larger."""
     head, hessian = window.head.copy(), window.prior.hessian.copy()
     # the tracks will be asked again, as features: their word is not to count twice
     head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], np.minimum(hessian[[3, 4], [3, 4]], std**-2.0)
@@ -146,8 +146,8 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
 
 
 def with_free_compass(window: Window, std: float) -> Window:
-    """Window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the least rate
-    of turn."""
+    """Sliding window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the
+    least rate of turn."""
     hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
@@ -156,7 +156,7 @@ def with_free_compass(window: Window, std: float) -> Window:
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
-    """Window with another head and Hessian of its prior, solved anew."""
+    """Sliding window with another head and Hessian of its prior, solved anew."""
     return window_gaussian.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
 
 

@@ -15,8 +15,8 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def check_motion(state: WindowState) -> tuple[WindowState, bool]:
-    """Check the motion against the rates of path lengths: before any birth a wrong start is corrected, later the odds
-    of being lost are updated; also returns whether it was corrected."""
+    """Check the agent's motion against the rates of path lengths: before any birth a wrong start is corrected, later
+    the odds of being lost are updated; also returns whether the start was corrected."""
     if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
@@ -46,8 +46,8 @@ def check_motion(state: WindowState) -> tuple[WindowState, bool]:
 
 
 def restart(state: WindowState) -> WindowState:
-    """State after a restart with an empty map: the pose is kept, its position's deviation grown by `walk` beside the
-    Gaussian."""
+    """State of the window filter restarted with an empty map: the pose is kept, its position's deviation grown by
+    `walk` beside the Gaussian."""
     window = state.window
     mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
@@ -69,8 +69,8 @@ def restart(state: WindowState) -> WindowState:
 
 
 def after_jump(state: WindowState, by: Floats) -> WindowState:
-    """State after a jump by `by` (3,) [m]: the last pose alone, with the map, and even odds of being lost until the
-    next cycle."""
+    """State of the window filter after the agent's jump by `by` (3,) [m]: the last pose alone, with the map, and even
+    odds of being lost until the next cycle."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
         window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level, heading=state.heading[-1:],

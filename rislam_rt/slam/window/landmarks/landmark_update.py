@@ -34,12 +34,12 @@ class VisibilityObservations(NamedTuple):
 
 
 def no_observations() -> VisibilityObservations:
-    """Visibility observations of no path."""
+    """Empty record of paths' occlusion and scatter."""
     return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
-    """One number (R,) for each of the forms (R, 5) of feature rows, by idents."""
+    """One integer (R,) that encodes each of the forms (R, 5) of feature rows, by idents."""
     return np.asarray((idents(landmarks, forms) + 1) @ DIGITS)
 
 
@@ -73,14 +73,14 @@ def recall_forms(
 def add_clear_paths(
     visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
 ) -> VisibilityObservations:
-    """Visibility observations with the paths (N, 5) by which a new feature was found: not occluded, and of mean squared
-    residual `scatter`."""
+    """Record of paths' occlusion and scatter with the forms (N, 5) by which a new feature was found: not occluded, and
+    of mean squared residual `scatter`."""
     count = len(forms)
     return _joined(visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter)))
 
 
 def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
-    """Visibility observations with others appended, sorted by code."""
+    """Two records of paths' occlusion and scatter as one, sorted by code."""
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
     return VisibilityObservations._make(field[order] for field in every)

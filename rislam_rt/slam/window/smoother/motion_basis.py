@@ -16,7 +16,7 @@ POSE = 4
 
 @lru_cache(maxsize=4)
 def basis(steps: bytes, turns: bool) -> Floats:
-    """Matrices (A, K, K + 1) that give the K poses along each axis from its first place, its first rate and the
+    """Matrices (A, K, K + 1) that give K poses along each axis from the first place, the first rate and the
     accelerations of the steps (a time [s] each, as bytes)."""
     step = np.frombuffer(steps)
     count = len(step) + 1
@@ -37,7 +37,8 @@ FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
 
 
 def head_order(free: int) -> Integers:
-    """Indices of the head's numbers that a basis of `free` axes multiplies: first places, then first rates."""
+    """Indices of the window's unknowns that a motion basis of so many axes multiplies: first places, then first
+    rates."""
     return FIRST if free > TURN else np.arange(6)
 
 
