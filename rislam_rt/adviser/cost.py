@@ -65,7 +65,7 @@ def cost_words(cost: TraceCost) -> str:
 def _count_sequences(channel: ImageSourceChannel, depth: int) -> int:
     """Number of wall sequences that tracing has to test: of all legs at the middle of the trajectory, those that the
     walls' sides leave possible, the empty sequence of each leg included."""
-    scene, facets, row = channel.scene, channel.looked.facets, len(channel.scene.agent) // 2
+    scene, facets, row = channel.scene, channel.sequence_search.facets, len(channel.scene.agent) // 2
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]
     for number, point in enumerate(scene.landmark_positions):

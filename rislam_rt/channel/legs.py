@@ -47,11 +47,11 @@ class SpecularLegs:
 
     @property
     def num_bounces(self) -> Integers:
-        """(S,) number of bounces of each wall sequence."""
+        """Number (S,) of bounces of each wall sequence."""
         return (self.walls >= 0).sum(axis=1)
 
     def gain(self, wavelength: float) -> Complexes:
-        """(K, S) complex gain of specular legs, carrier phase included, 0 where not valid."""
+        """Complex gain (K, S) of specular legs, carrier phase included, 0 where not valid."""
         length = np.where(self.valid, self.length, 1.0)
         gain = self.coefficient * wavelength / (4.0 * np.pi * length) * np.exp(-2j * np.pi / wavelength * length)
         return np.where(self.valid, gain, 0.0)

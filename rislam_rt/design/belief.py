@@ -99,8 +99,8 @@ def problem_from_belief(
     sheets, held = join_sheets(tuple(panel for _, panel in known)), [row for row, _ in known]
     position = np.concatenate([belief.position[None], belief.samples[: max(samples - 1, 0)]])
     tx, rx = (end[:, None, :] for end in belief.body.ends(position, np.array(belief.heading, dtype=np.float64)))
-    panel, static = _believed_paths(belief.map, held)
-    both = _Believed(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
+    panel, static = _predicted_paths(belief.map, held)
+    both = _PredictedPaths(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
     points = belief.map.position
     unit_snr = float(radio.integrated_snr(np.ones(())))
     return DesignProblem(
@@ -116,7 +116,7 @@ def problem_from_belief(
     )
 
 
-class _Believed(NamedTuple):
+class _PredictedPaths(NamedTuple):
     """Q paths predicted from a map: rows of the scattering point, and of the points that Tx and Rx see (it or its
     image)."""
 
@@ -125,7 +125,7 @@ class _Believed(NamedTuple):
     rx_point: Integers
 
 
-def _believed_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Believed, _Believed]:
+def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_PredictedPaths, _PredictedPaths]:
     """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others.
 
     Images of images are too weak to matter.
@@ -135,16 +135,18 @@ def _believed_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Believed,
     points = np.concatenate([held, points[~np.isin(points, held)]])
     images = rows[(landmarks.parent >= 0) & np.isin(landmarks.parent, points)]
     parents = landmarks.parent[images]
-    paths = _Believed(
+    paths = _PredictedPaths(
         np.concatenate([points, parents, parents]),
         np.concatenate([points, parents, images]),
         np.concatenate([points, images, parents]),
     )
     over_panel = np.isin(paths.source, held)
-    return _Believed(*(field[over_panel] for field in paths)), _Believed(*(field[~over_panel] for field in paths))
+    return _PredictedPaths(*(field[over_panel] for field in paths)), _PredictedPaths(
+        *(field[~over_panel] for field in paths)
+    )
 
 
-def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
+def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
     """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position.
 
     The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
@@ -162,7 +164,7 @@ def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: Gr
     return total
 
 
-def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:
+def _ratio(landmarks: MapEstimate, paths: _PredictedPaths) -> Floats:
     """Amplitude ratio (Q,) of the wall reflection on each predicted path, from the image's strength; 1 without a
     wall."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
@@ -170,20 +172,20 @@ def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:
 
 
 def _panel_responses(
-    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
+    landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
     radio: RadioConfig,
 ) -> Complexes:  # fmt: skip
     """Predicted element responses (B, Q, N, M) of the paths over all panels, whose rows in the map are `held`."""
     whole = np.zeros((len(tx), len(paths.source), ris.rows, ris.cols), dtype=np.complex128)
     for number, row in enumerate(held):
         mine = np.flatnonzero(paths.source == row)
-        one = _Believed(*(field[mine] for field in paths))
+        one = _PredictedPaths(*(field[mine] for field in paths))
         whole[:, mine] = ris.place(number, _responses_of(landmarks, one, tx, rx, row, ris.panels[number], radio))
     return whole
 
 
 def _responses_of(
-    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
+    landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
 ) -> Complexes:
     """Predicted element responses (B, Q, N, M) of the paths over the panel in one row of the map."""
     center, legs = landmarks.position[row], []
@@ -198,7 +200,9 @@ def _responses_of(
     return np.where(np.isfinite(response), response, 0.0)
 
 
-def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, radio: RadioConfig) -> Complexes:
+def _point_gains(
+    landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, radio: RadioConfig
+) -> Complexes:
     """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, from their strengths (root of the
     cross-section)."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
@@ -209,7 +213,7 @@ def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Float
     return point_amplitude(strength, first, second, radio) * phase
 
 
-def _length_variance(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats) -> Floats:
+def _length_variance(landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats) -> Floats:
     """Variance (B, Q) [m^2] of the lengths of predicted paths that follows from the landmarks' covariances."""
     first = unit(landmarks.position[paths.tx_point] - tx)
     second = unit(landmarks.position[paths.rx_point] - rx)

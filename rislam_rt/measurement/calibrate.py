@@ -78,13 +78,13 @@ def calibrate(
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
         plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, _inverse(matrix)
-        drawn = np.array([_as_drawn(inverse @ one, known, faintest) for one in plain])
+        drawn = np.array([_ideal_samples(inverse @ one, known, faintest) for one in plain])
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
         model = matrix @ drawn
         image = _image(heard - residue - model, heard)
         rest = heard - image[:, None] * image_spectrum(heard) - model
-        residue, spread = _standing(rest)
+        residue, spread = _constant_residue(rest)
     left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
     return Correction(_inverse(matrix), residue, image, direct, loudness, left)
 
@@ -105,7 +105,7 @@ def _chains(mean: Complexes, direct: Complexes) -> Complexes:
     return np.asarray(chains / np.mean(chains))
 
 
-def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
+def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
     """Samples (L, M) that an ideal array would receive of the strong paths estimated in calibrated samples, without
     ghosts."""
     scaled = samples / np.sqrt(known.noise)
@@ -147,7 +147,7 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
     return np.asarray(np.linalg.solve(right.T, left.T).T)
 
 
-def _standing(rest: Complexes) -> tuple[Complexes, float]:
+def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
     """Leakage residue (L, M) that stays the same over the cycles of unexplained samples (T, L, M), and the variance of
     the rest."""
     mean = rest.mean(axis=0)

@@ -1,4 +1,4 @@
-"""Configuration of the receiver."""
+"""Configuration of the receiver: detection, resolution, alternation of codes, leakage, sounding."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ LEAST_RATE = 1e-100
 
 @dataclass(frozen=True, slots=True)
 class ReceiverConfig:
-    """Everything that the receiver is free to choose. SI units; thresholds in dB refer to the SNR over all antennas."""
+    """Settings of the receiver. SI units; thresholds in dB refer to the SNR over all antennas."""
 
     estimator: str = "waveform"
     """`bound` draws errors from the Cramér-Rao bound; `waveform` makes the samples and estimates from them."""

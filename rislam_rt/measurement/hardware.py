@@ -106,7 +106,7 @@ class FrontEnd(NamedTuple):
     """Correction by calibration, None if the front end is not calibrated."""
 
 
-class Sent(NamedTuple):
+class SentSignal(NamedTuple):
     """Energy share, leakage and gain of one code's signal in a slot, for the front end that receives it."""
 
     unit: float
@@ -133,7 +133,7 @@ def build_front_end(
 
 
 def digitise(
-    clean: Complexes, sent: Sent, radio: RadioConfig, receiver: ReceiverConfig, front_end: FrontEnd | None,
+    clean: Complexes, sent: SentSignal, radio: RadioConfig, receiver: ReceiverConfig, front_end: FrontEnd | None,
     *, rng: np.random.Generator,
 ) -> tuple[Complexes, float]:  # fmt: skip
     """Received tones (L, M) after noise and hardware faults, from noiseless ones, and the noise variance [J] a tone
@@ -143,7 +143,7 @@ def digitise(
         return samples, radio.noise_psd + extra
     config, leakage = front_end.config, sent.leakage
     heard = front_end.matrix @ clean + leakage * front_end.residue
-    noisy = add_noise(_shaken(heard, config, radio, rng), radio.noise_psd, rng=rng)
+    noisy = add_noise(_with_phase_noise(heard, config, radio, rng), radio.noise_psd, rng=rng)
     mixed = sent.swing * (noisy + front_end.image[:, None] * image_spectrum(noisy))
     samples, extra = convert(mixed, receiver.converter_bits, radio, config.clip_rms)
     level = radio.noise_psd + extra
@@ -184,7 +184,9 @@ def image_spectrum(spectrum: Complexes) -> Complexes:
     return np.conj(spectrum[..., ::-1])
 
 
-def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator) -> Complexes:
+def _with_phase_noise(
+    spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator
+) -> Complexes:
     """Tones (L, M) with the oscillator's phase noise from sample to sample and its phase step from code to code."""
     if config.phase_step_deg:
         spectrum = spectrum * np.exp(1j * np.radians(config.phase_step_deg) * rng.standard_normal())

@@ -99,5 +99,5 @@ def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexe
 
 
 def _pick(found: ComponentSides, rows: Booleans) -> ComponentSides:
-    """Select components by row."""
+    """Select multipath components by row."""
     return ComponentSides._make(field[rows] for field in found)

@@ -20,7 +20,7 @@ from rislam_rt.model import Measurement
 
 @dataclass(frozen=True, slots=True)
 class TrackingConfig:
-    """Settings of the tracker. SI units."""
+    """Settings of the tracker of multipath components. SI units."""
 
     length_acceleration: float = 0.05
     """Standard deviation of the white acceleration of a path's length [m/s^2]."""

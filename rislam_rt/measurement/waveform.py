@@ -13,7 +13,7 @@ from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_gri
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.false_alarms import detection_threshold
-from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_gain_variation, scaled_to_fit
+from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
@@ -84,10 +84,10 @@ def capture(
     clean = [tones(one, radio, config, elements) for one in heard]
     direct = leakage * np.sqrt(radio.energy / num_tones(radio, config))
     if not config.alternation:
-        return [Capture(*digitise(clean[0], Sent(1.0, direct, swing), radio, config, front_end, rng=rng), 0)]
+        return [Capture(*digitise(clean[0], SentSignal(1.0, direct, swing), radio, config, front_end, rng=rng), 0)]
     signs = codes_in_turn(config.panels)
     share = np.sqrt(1.0 / len(signs))
-    sent = Sent(share, share * direct, swing)
+    sent = SentSignal(share, share * direct, swing)
     heard_under = [
         digitise(share * _signed_sum(clean, code), sent, radio, config, front_end, rng=rng) for code in signs.T
     ]

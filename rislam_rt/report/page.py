@@ -134,7 +134,8 @@ posterior bound of the same motion, codes and noise with landmarks and walls unk
 cut off at 1 m.</p>
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
-The folder's <code>config.toml</code> and <code>scene/</code> hold everything.</p>
+<code>rislam-rt run config.toml</code> in this folder does it again: all settings are there, the room in
+<code>scene/</code>.</p>
 <script>{view_script()}</script>
 </body></html>
 """

@@ -10,6 +10,7 @@ from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
+from rislam_rt.wanted import wanted
 
 MAX_SCENE_BYTES = 4_000_000
 """Most bytes of a scene file, which people write; anything larger is another file by mistake."""
@@ -300,8 +301,8 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
         lone = isinstance(table.get("ris"), dict)
-        remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
-    raise Faults([Fault(remark, "mend this field") for remark in remarks])
+        faults = [_fault(item, lone) for item in error.errors(include_url=False, include_context=False)]
+    raise Faults(faults)
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
@@ -324,24 +325,25 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     return parse_spec(content), content
 
 
-def _remark(item: Any, lone_panel: bool) -> str:
-    """Text on one bad field of a scene file: where, what was received, what is wanted."""
+def _fault(item: Any, lone_panel: bool) -> Fault:
+    """Fault of one bad field of a scene file: where, what was received, what is wanted."""
     where = item["loc"]
     if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
         where = ("ris", *where[2:])
     place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
     place = _short(place, 80)
     if item["type"] == "missing":
-        return f"{place}: missing"
+        return Fault(f"{place}: missing", "add it")
     if item["type"] == "extra_forbidden":
         hint = did_you_mean(nearest(str(item["loc"][-1]), _known_keys()))
-        return f"{place}: unknown key" + (f" ({hint})" if hint else "")
-    message = item["msg"].removeprefix("Value error, ")
+        return Fault(f"{place}: unknown key", hint or "remove it or mend its name")
+    message = wanted(item)
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
-        return f"{place}: {message}"
-    return f"{place}: {_short(repr(item['input']), 60)} received, {message[:1].lower()}{message[1:]}"
+        return Fault(f"{place}: {item['msg'].removeprefix('Value error, ')}", "mend this field")
+    received = f"{place}: {_short(repr(item['input']), 60)} received"
+    return Fault(received, message) if message.startswith("give ") else Fault(f"{received}, {message}", "mend it")
 
 
 def _known_keys() -> list[str]:
@@ -352,6 +354,6 @@ def _known_keys() -> list[str]:
 
 
 def _short(text: str, length: int) -> str:
-    """Text on one line, cut to a length."""
+    """Text of a message on one line, cut to a length."""
     text = one_line(text)
     return text if len(text) <= length else text[: length - 3] + "..."

@@ -187,12 +187,13 @@ class PathReport:
 
 
 def _largest(errors: Floats) -> float:
-    """Largest of some errors, 0 of none."""
+    """Largest of the errors (M,) of paths that two channels share, 0 of none."""
     return float(errors.max(initial=0.0))
 
 
 def _percentiles(errors: Floats) -> dict[str, float]:
-    """Median, 90th and 99th percentile and maximum of some errors; empty of none."""
+    """Median, 90th and 99th percentile and maximum of the errors (M,) of paths that two channels share; empty of
+    none."""
     if len(errors) == 0:
         return {}
     p50, p90, p99, top = np.percentile(errors, [50.0, 90.0, 99.0, 100.0])

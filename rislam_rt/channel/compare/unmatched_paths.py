@@ -242,9 +242,9 @@ class DifferenceExplainer:
                 found.append(ExistenceCondition("close surfaces", text, -crossed, reach))
             else:
                 found.append(ExistenceCondition("occluded", text, -min(solid, crossed), reach))
-        return found + self._unshaded(leg, number)
+        return found + self._unoccluded(leg, number)
 
-    def _unshaded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
+    def _unoccluded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
         """Conditions that no occluder stands across segment `number` of a leg; the far end's own does not hide it."""
         occluders, found = self.facets.occluders, []
         for shade, landmark in enumerate(occluders.landmark):

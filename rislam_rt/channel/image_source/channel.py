@@ -42,7 +42,7 @@ class ImageSourceChannel:
     walls: Walls = field(init=False)
     facets: WallFacets = field(init=False)
     coatings: Coatings = field(init=False)
-    looked: SequenceSearch = field(init=False)
+    sequence_search: SequenceSearch = field(init=False)
 
     def __post_init__(self) -> None:
         expect("scene", self.scene, Scene)
@@ -55,7 +55,7 @@ class ImageSourceChannel:
         object.__setattr__(self, "walls", build_walls(self.scene))
         object.__setattr__(self, "facets", build_facets(self.walls))
         object.__setattr__(self, "coatings", build_coatings(self.walls.material, self.radio.carrier))
-        object.__setattr__(self, "looked", build_search(self.facets, self.depth, self.search))
+        object.__setattr__(self, "sequence_search", build_search(self.facets, self.depth, self.search))
 
     def paths(self, trajectory: Trajectory) -> Paths:
         """Paths of every cycle of a trajectory by the image-source method, with the panel's code at level 0."""
@@ -70,7 +70,7 @@ class ImageSourceChannel:
                 ("rx", (ends.of_rx, ends.of_landmark)),
             )
         }
-        direct = find_legs(self.looked, self.coatings, tx, rx, self.depth, terminals=at["direct"])
+        direct = find_legs(self.sequence_search, self.coatings, tx, rx, self.depth, terminals=at["direct"])
         landmarks = range(len(self.scene.landmarks))
         return compose_paths(
             self.scene,
@@ -80,7 +80,7 @@ class ImageSourceChannel:
             direct,
             [self._landmark_legs(tx, number, at["tx"]) for number in landmarks],
             [self._landmark_legs(rx, number, at["rx"]) for number in landmarks],
-            f"image source, {self.looked.words}",
+            f"image source, {self.sequence_search.words}",
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
@@ -93,9 +93,9 @@ class ImageSourceChannel:
         point = self.scene.landmark_positions[number : number + 1]
         if panel < 0:
             return find_legs(
-                self.looked, self.coatings, device, point, self.depth, landmark=number, terminals=terminals
+                self.sequence_search, self.coatings, device, point, self.depth, landmark=number, terminals=terminals
             )
         front, host = self.scene.panels[panel].spec.normal, self.walls.hosts[panel]
         return find_legs(
-            self.looked, self.coatings, device, point, self.depth, host=host, front=front, terminals=terminals
+            self.sequence_search, self.coatings, device, point, self.depth, host=host, front=front, terminals=terminals
         )

@@ -73,10 +73,11 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
 
     def to_string(self) -> str:
-        """The material as text for people."""
+        """Description of a wall's material of constant R in words."""
         return f"ConstantReflection R={self._reflection[0]:.3f}"
 
     def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:
+        """Jones matrix of a reflection at a wall of constant R, as a real 4 x 4 matrix in Sionna's bases."""
         return kept_components(self._reflection, si.to_world(si.wi), wo)
 
 

@@ -60,7 +60,7 @@ class PolarisedReflection(rt.RadioMaterial):  # type: ignore[misc]
         )
 
 
-def slab_of_ones_own(name: str, material: Material, scattering: float) -> rt.RadioMaterial:
+def slab_material(name: str, material: Material, scattering: float) -> rt.RadioMaterial:
     """Sionna radio material of a slab of given thickness, permittivity and conductivity."""
     return rt.RadioMaterial(name, **_slab(material, scattering))
 
@@ -83,7 +83,7 @@ def rough_material(material: Material, number: int, scattering: float) -> rt.Rad
     if material.reflection_te is not None:
         return PolarisedReflection(f"rough-{number}", material, scattering)
     if material.permittivity is not None:
-        return slab_of_ones_own(f"slab-{number}", material, scattering)
+        return slab_material(f"slab-{number}", material, scattering)
     try:
         return rt.ITURadioMaterial(f"itu-{number}", material.itu, material.thickness, scattering_coefficient=scattering)
     except ValueError as error:

@@ -19,7 +19,7 @@ FRONT, BACK = 1, 2
 """Sides of a plane, as bits: a wall may have parts on both."""
 
 NO_WALL = -1
-"""Padding of sequences."""
+"""Padding of wall sequences."""
 
 MANY = 100_000
 """Number of wall sequences of one bounce count up to which all are tried at every position, without cones."""

@@ -11,7 +11,7 @@ import sionna.rt as rt
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_of_ones_own
+from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_material
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -230,7 +230,7 @@ def _material(material: Material, number: int) -> rt.RadioMaterialBase:
     if material.reflection_te is not None:
         return PolarisedReflection(f"polarised-{number}", material, material.scattering)
     if material.permittivity is not None:
-        return slab_of_ones_own(f"slab-{number}", material, material.scattering)
+        return slab_material(f"slab-{number}", material, material.scattering)
     try:
         return rt.ITURadioMaterial(
             f"itu-{number}", material.itu, material.thickness, scattering_coefficient=material.scattering

@@ -40,7 +40,7 @@ class SingleRays:
         return getattr(self._scene, name)
 
     def ray_intersect(self, *args: Any, **options: Any) -> Any:
-        """`mi.Scene.ray_intersect` without packets."""
+        """Intersect rays with the scene like `mi.Scene.ray_intersect`, each ray by itself."""
         return self._scene.ray_intersect(*args, **{**options, "coherent": False})
 
 
