@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.predicted_returns import Poses
 
 
 def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:

@@ -9,7 +9,7 @@ from rislam_rt.slam.arrival_rays import places
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER
-from rislam_rt.slam.returns import Poses, reflect
+from rislam_rt.slam.predicted_returns import Poses, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
