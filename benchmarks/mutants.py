@@ -204,7 +204,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "errors drawn from the bound are half of it", "measurement/bound.py",
+        "errors drawn from the bound are half of it", "measurement/bound_receiver.py",
         "parts.cosines]) + errors.error", "parts.cosines]) + 0.5 * errors.error",
         (
             "measurement/test_measurement_panels.py",

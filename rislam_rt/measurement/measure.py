@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement.bound import measure_bound
+from rislam_rt.measurement.bound_receiver import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.hardware import FrontEnd
 from rislam_rt.measurement.received import Clutter, direct_gain, receive
