@@ -183,7 +183,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "the receiver is twice as sure as it may be", "measurement/waveform.py",
+        "the receiver is twice as sure as it may be", "measurement/waveform_receiver.py",
         "        np.sqrt(variance[:, 0]) / radio.bandwidth,",
         "        0.5 * np.sqrt(variance[:, 0]) / radio.bandwidth,",
         (
@@ -193,7 +193,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "the receiver mirrors a cosine", "measurement/waveform.py",
+        "the receiver mirrors a cosine", "measurement/waveform_receiver.py",
         "clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))",
         "clip_to_unit_disc(unmirrored(parameters[:, 1:] * [1.0, -1.0], radio))",
         (
