@@ -172,7 +172,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "descent never steps", "design/coordinate.py",
+        "descent never steps", "design/coordinate_descent.py",
         "    found = [coordinate_descent(objective, codes[row], problem.levels, max_steps) for row in rank]",
         "    found = [coordinate_descent(objective, codes[row], problem.levels, 0) for row in rank]",
         (
