@@ -26,15 +26,15 @@ class Returns(NamedTuple):
     """R paths (returns) over the map's features, each of a Tx leg and an Rx leg among G legs."""
 
     legs: Integers
-    """(G, 3) feature row of the point (or `TX`), of the wall next to it, and of the wall next to the device."""
+    """Feature rows (G, 3) of each leg's point (or `TX`), of the wall next to it, and of the wall next to the device."""
     tx: Integers
-    """(R,) row of the Tx leg."""
+    """Row (R,) of each return's Tx leg."""
     rx: Integers
-    """(R,) row of the Rx leg."""
+    """Row (R,) of each return's Rx leg."""
 
     @property
     def point(self) -> Integers:
-        """(R,) feature row of each return's point."""
+        """Feature row (R,) of each return's point."""
         return self.legs[self.rx, 0]
 
 
@@ -42,13 +42,13 @@ class PredictedReturn(NamedTuple):
     """Predicted length and direction of R returns, as seen from the agent's poses."""
 
     seen: Floats
-    """(..., R, 3) length [m] and the two direction cosines in the body frame."""
+    """Lengths [m] and the two direction cosines in the body frame (..., R, 3)."""
     tx_length: Floats
     """Unfolded lengths (..., R) [m] of the Tx legs."""
     rx_length: Floats
     """Unfolded lengths (..., R) [m] of the Rx legs."""
     up: Floats
-    """(..., R) third direction cosine; the array is blind where it is negative."""
+    """Third direction cosine (..., R) of the arrival; the array is blind where it is negative."""
 
 
 class Poses(NamedTuple):

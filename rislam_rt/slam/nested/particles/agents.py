@@ -35,7 +35,7 @@ class Whitened(NamedTuple):
     mean: Floats
     """Weighted mean (D,) of the samples."""
     factor: Floats
-    """(D, K): `sample = mean + factor @ value`."""
+    """Factor (D, K) back to the samples: `sample = mean + factor @ value`."""
 
 
 def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:

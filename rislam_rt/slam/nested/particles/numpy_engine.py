@@ -31,6 +31,7 @@ class NumpyEngine:
     """Engine of landmark particles in plain numpy, a few agent particles at a time."""
 
     name = "numpy"
+    """Name of the engine."""
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
         """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""

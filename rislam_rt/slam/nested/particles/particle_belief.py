@@ -33,7 +33,7 @@ class Nested(NamedTuple):
     log_weight: Floats
     """Log weights (N,) of the agent particles, normalised."""
     trail: Floats
-    """(K, N, 4) positions [m] and headings [rad] of the last K cycles, the present one last."""
+    """Positions [m] and headings [rad] (K, N, 4) of the agent particles in the last K cycles, the present one last."""
     clouds: tuple[Cloud, ...]
     """Landmark particles, a cloud for each of F landmarks."""
     centre: Floats

@@ -60,7 +60,7 @@ class GaussianFeatures(NamedTuple):
     strength_variance: Floats
     """Variance (C,) of that log amplitude."""
     log_scatter: Floats
-    """(C,) logarithm of the mean square of its residuals in reported deviations."""
+    """Logarithm (C,) of the mean square of the feature's residuals in reported deviations."""
 
 
 class PredictedReturns(NamedTuple):

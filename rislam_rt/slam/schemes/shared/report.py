@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import SlamEstimate
-from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
+from rislam_rt.slam.schemes.shared.gaussian_sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
 
 STEP = 1e-6
