@@ -86,7 +86,7 @@ class CloudEngine(Protocol):
         """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a landmark's cloud to `size` equally weighted particles an agent, mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
 
     def compact(self, cloud: Cloud) -> Cloud:
         """Copy a cloud without the blocks and rows that no agent particle points at."""

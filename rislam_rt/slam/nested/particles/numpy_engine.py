@@ -63,7 +63,7 @@ class NumpyEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=sums.log_total), sums
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a landmark's cloud to `size` equally weighted particles an agent, mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         fresh = np.empty((count, 3, size), dtype=np.float32)
         child = np.arange(size)

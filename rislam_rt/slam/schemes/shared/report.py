@@ -38,7 +38,7 @@ class Points(NamedTuple):
     """Covariances (V, 3, 3) [m^2] of the positions."""
 
     def keep(self, rows: Booleans) -> "Points":
-        """Some of the points to report."""
+        """Some of the points to report, by a mask (V,)."""
         return Points._make(column[rows] for column in self)
 
 
