@@ -14,7 +14,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, reflect
 
 
 class Leg(IntEnum):

@@ -10,7 +10,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.returns import NONE, Returns, linearise, poses_of
+from rislam_rt.slam.predicted_returns import NONE, Returns, linearise, poses_of
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 TAIL = 4.0
