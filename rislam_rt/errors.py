@@ -88,7 +88,7 @@ def _printable(text: str) -> str:
 
 
 def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """Check the type of an argument of a public function.
+    """Check the type of an argument of a public function, and raise an error for another.
 
     Raises
     ------

@@ -51,5 +51,5 @@ def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator) -> Adv
 
 
 def _finite(margin: float) -> float | None:
-    """Margin [dB] as a number, None where it stands for no path."""
+    """Margin of a link budget [dB] as a number, None where it stands for no path."""
     return float(margin) if margin > NOTHING_DB else None

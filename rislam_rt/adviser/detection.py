@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.measurement import Received, receive
-from rislam_rt.measurement.bound import NEGLIGIBLE
+from rislam_rt.measurement.bound_receiver import NEGLIGIBLE
 from rislam_rt.measurement.components import NoiselessComponents, merge, select_paths, single
 from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Paths, SensorModel

@@ -18,8 +18,8 @@ CLEARANCE = 1e-6
 
 
 class Reasons(NamedTuple):
-    """What the reasons for a landmark's not being detected are found from: a room, its paths at K positions, and all
-    that hides."""
+    """Room with its paths at K positions of the agent and all surfaces that hide, from which reasons for missed
+    detections of landmarks are found."""
 
     scene: Scene
     paths: Paths
@@ -64,7 +64,7 @@ class Reasons(NamedTuple):
 
 
 def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
-    """Collect the walls and occluders of a room that may be reasons for a landmark's not being detected."""
+    """Collect a room's walls and occluders, which may hide a landmark, for the reasons why it is not detected."""
     meshes = [(r.name, r.triangles) for r in scene.reflectors]
     meshes += [(shade.name, shade.triangles) for shade in scene.occluders]
     meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]

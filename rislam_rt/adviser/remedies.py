@@ -122,7 +122,7 @@ def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[st
 
 
 def _way_round(why: str) -> str:
-    """Remedy for a reason other than too weak a path."""
+    """Remedy for a reason why a landmark is not detected, other than too weak a path."""
     if "behind the panel" in why:
         return "turn the panel, or lead the way before it"
     if "shaded" in why:

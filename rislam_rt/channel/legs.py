@@ -16,7 +16,7 @@ class SpecularLegs:
     """
 
     walls: Integers
-    """(S, D) in the order from device to far end, padded with -1."""
+    """(S, D) wall sequences in the order from device to far end, padded with -1."""
     valid: Booleans
     """(K, S) whether the leg exists."""
     length: Floats

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.design.coordinate import coordinate_search, exact_codes
+from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem

@@ -12,7 +12,7 @@ from rislam_rt.evaluate.confidence_intervals import (
 )
 from rislam_rt.evaluate.consistency import normalised_squares
 from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
-from rislam_rt.evaluate.planes import (
+from rislam_rt.evaluate.plane_matching import (
     NEAR_ANGLE,
     NEAR_WALL,
     Surfaces,

@@ -12,6 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 
 Statistic = Callable[[Floats], Floats]
+"""Statistic of samples (R, B, ...) that works along the first axis, the runs, and gives values (B,)."""
 
 
 class Interval(NamedTuple):

@@ -12,7 +12,7 @@ from rislam_rt.measurement.received import Clutter, Received, phase_reversed, re
 from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
 from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import Capture, DetectedComponents, capture, find_components
+from rislam_rt.measurement.waveform_receiver import Capture, DetectedComponents, capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [

@@ -36,7 +36,7 @@ class ReceiverConfig:
     clutter_rate: float = 0.5
     """Mean number of false components a cycle (`bound`)."""
     leakage_cancellation_db: float = 0.0
-    """By how much the Tx-Rx leakage (LOS) is attenuated before sampling."""
+    """Attenuation [dB] of the Tx-Rx leakage (LOS) before sampling."""
     merge: bool = True
     """Whether paths that cannot be resolved come out as one (`bound`)."""
     resolution: str = "cell"

@@ -11,7 +11,13 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import DetectedComponents, capture, find_components, to_measurement, true_paths
+from rislam_rt.measurement.waveform_receiver import (
+    DetectedComponents,
+    capture,
+    find_components,
+    to_measurement,
+    true_paths,
+)
 from rislam_rt.model import Paths, RadioConfig, Trajectory
 from rislam_rt.storage.netcdf import Entry, padded, read_dataset, variables
 from rislam_rt.waveform import subcarrier_frequencies

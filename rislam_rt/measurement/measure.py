@@ -3,11 +3,11 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement.bound import measure_bound
+from rislam_rt.measurement.bound_receiver import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.hardware import FrontEnd
 from rislam_rt.measurement.received import Clutter, direct_gain, receive
-from rislam_rt.measurement.waveform import measure_waveform
+from rislam_rt.measurement.waveform_receiver import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
 

@@ -34,12 +34,8 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     schemes = list(summary["schemes"].values())
     first = schemes[0]
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
-    rows.append(
-        [
-            "agent, path aligned",
-            *("-" if s["rmse_aligned_m"] is None else _metres(s["rmse_aligned_m"]) for s in schemes),
-        ]
-    )
+    aligned = [s["rmse_aligned_m"] for s in schemes]
+    rows.append(["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)])
     for name in first["landmarks"]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
     known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it

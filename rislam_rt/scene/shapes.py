@@ -41,7 +41,7 @@ def block(low: Sequence[float], high: Sequence[float], without: Sequence[str] = 
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Join several meshes into one, in order."""
+    """Join several meshes into one, their vertices and faces in order."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))

@@ -88,7 +88,8 @@ def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
 
 
 def _levels(plan: Floats, triangles: Floats) -> Floats:
-    """Heights [m], ascending, at which the vertical line through a point (2,) of the plan meets triangles."""
+    """Heights [m], ascending, at which the vertical line through a point (2,) of the plan meets a room's triangles, to
+    find floors and what is above them."""
     corners = triangles[:, :, :2] - plan
     after = np.roll(corners, -1, axis=1)
     turn = corners[..., 0] * after[..., 1] - corners[..., 1] * after[..., 0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt import load_scene
-from rislam_rt.channel.compare.both_channels import compare_channels
+from rislam_rt.channel.compare.channel_comparison import compare_channels
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import SceneError

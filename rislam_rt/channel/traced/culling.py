@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.buffer import as_indices
+from rislam_rt.channel.traced.path_buffer import as_indices
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 

@@ -22,9 +22,9 @@ class SelfTest:
     expected_paths: int
     """25: the mirror lattice of a box up to two bounces, 1 + 6 + 18."""
     los_error_db: float
-    """Gain of the direct path against lambda / (4 pi d)."""
+    """Error [dB] of the direct path's gain against lambda / (4 pi d)."""
     wall_error_db: float
-    """Largest gain error of the single bounces against R lambda / (4 pi d), d from the six mirror images."""
+    """Largest error [dB] of the single bounces' gains against R lambda / (4 pi d), d from the six mirror images."""
     seconds: float
     """Time [s] that the test took."""
 

@@ -19,9 +19,9 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_vertices
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
+from rislam_rt.channel.traced.path_buffer import fill_buffer, read_vertices, turned_vertices
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_points
 

@@ -94,7 +94,8 @@ def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> 
 
 
 def _blocks(rows: int, columns: int) -> Iterator[slice]:
-    """Slices of the rows of a table that are worked out in one go, so that each has no more than `_CHUNK` entries."""
+    """Slices of the rows of a point-triangle table that are worked out in one go, each of no more than `_CHUNK`
+    pairs."""
     step = max(1, _CHUNK // max(columns, 1))
     return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 

@@ -65,7 +65,7 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
 
 
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
-    """What is odd about the unit of the room's size, and how to mend it; None if nothing is."""
+    """Message that the room's size looks as if in a wrong unit, and how to mend it; None if it does not."""
     size = bounds[1] - bounds[0]
     longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
     if longest > LARGEST_ROOM:
@@ -97,8 +97,8 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Lengths in a scene file's table: dotted field and largest value wherever a path of keys leads; in lists of
-    tables, of each."""
+    """Numbers in a scene file's table, for the check of units: dotted field and largest value wherever a path of keys
+    leads; in lists of tables, of each."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):
@@ -106,8 +106,8 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
-    """Points (3,) in a scene file's table: dotted field and value wherever a path of keys leads; of a list of points,
-    each."""
+    """Points (3,) in a scene file's table, for the check of units: dotted field and value wherever a path of keys
+    leads; of a list of points, each."""
     for field, value in _places(table, path, ""):
         listed = isinstance(value, list) and value and isinstance(value[0], list)
         for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:

@@ -100,7 +100,7 @@ def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
 
 
 def _reach(opening: Opening, line: Line) -> tuple[float, float]:
-    """From where to where [m] along a wall's line an opening reaches."""
+    """Interval [m] along a wall's line that a door or window of the floor plan takes."""
     low, high = sorted(float(x) for x in (opening.ends - line.start) @ line.along)
     return low, high
 
@@ -122,7 +122,7 @@ def _cells(line: Line, holes: list[tuple[float, float, float, float]], height: f
 
 
 def _rectangle(line: Line, low: float, high: float, bottom: float, top: float) -> Mesh:
-    """Upright rectangle of a wall's line between two places along it [m] and two heights [m]."""
+    """Mesh of an upright rectangle of an extruded wall, between two places along its line [m] and two heights [m]."""
     return quad([line.at(low, bottom), line.at(high, bottom), line.at(high, top), line.at(low, top)])
 
 

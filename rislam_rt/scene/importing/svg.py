@@ -95,7 +95,7 @@ def _kind(element: Tree.Element) -> str:
 
 
 def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
-    """Points of an SVG shape, and whether it is closed."""
+    """Points (n, 2) of an SVG shape of a floor plan, and whether it is closed."""
     if tag == "path":
         yield from _path(element.get("d", ""))
         return
@@ -126,7 +126,7 @@ def _length(element: Tree.Element, key: str) -> float:
 
 
 def _path(text: str) -> Iterator[tuple[Floats, bool]]:
-    """Straight parts of an SVG path: (points (n, 2), closed)."""
+    """Straight parts of an SVG path of a floor plan: (points (n, 2), closed)."""
     here = np.zeros(2)
     points: list[Floats] = []
     for letter, rest in _STEP.findall(text):

@@ -77,7 +77,7 @@ def halve(outline: Floats, point: Floats, normal: Floats) -> Floats:
 
 
 def _convex(sides: Floats, rng: np.random.Generator) -> Floats:
-    """Draw the corners of a convex floor plan of given sides: a rectangle, or 4 to 7 corners on an ellipse."""
+    """Draw the corners of a random convex floor plan of given sides: a rectangle, or 4 to 7 corners on an ellipse."""
     if rng.uniform() < RECTANGLES:
         return np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * sides
     count = int(rng.integers(4, 8))
@@ -88,13 +88,13 @@ def _convex(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _ell(sides: Floats, rng: np.random.Generator) -> Floats:
-    """Draw the corners of an L-shaped floor plan of given sides."""
+    """Draw the corners of a random L-shaped floor plan of given sides."""
     (a, b), (u, v) = sides, rng.uniform(*ARM, size=2) * sides
     return np.array([[0, 0], [a, 0], [a, v], [u, v], [u, b], [0, b]], dtype=np.float64)
 
 
 def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
-    """Draw the corners of a T-shaped floor plan of given sides."""
+    """Draw the corners of a random T-shaped floor plan of given sides."""
     (a, b), (u, v) = sides, rng.uniform(*ARM, size=2) * sides
     left = rng.uniform(0.3, 0.7) * (a - u)
     right = left + u
@@ -104,7 +104,7 @@ def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
-    """Draw the corners of a U-shaped floor plan of given sides."""
+    """Draw the corners of a random U-shaped floor plan of given sides."""
     (a, b), floor = sides, rng.uniform(*ARM) * sides[1]
     left, right = rng.uniform(ARM[0], 0.38, size=2) * a
     return np.array(

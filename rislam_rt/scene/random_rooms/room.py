@@ -41,7 +41,7 @@ _TRIES = 200
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomRoom:
-    """A random room, and the classes that it belongs to."""
+    """A random room, and the classes that it belongs to, by which results are grouped."""
 
     scene: Scene
     seed: int

@@ -108,5 +108,5 @@ def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
 
 
 def _lifted(points: Floats, height: Floats) -> Floats:
-    """Points (n, 2) of a floor plan at heights (n,): (n, 3)."""
+    """Points (n, 3) of a random room's shell: points (n, 2) of its floor plan at heights (n,)."""
     return np.column_stack([points, height])

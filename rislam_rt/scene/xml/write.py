@@ -71,7 +71,7 @@ def xml_bytes(scene: Scene) -> bytes:
 
 
 def left_behind(scene: Scene) -> list[str]:
-    """Remarks, one line each, on what of a scene a Sionna scene file has no place for."""
+    """Remarks, one line each, on what a scene has that a Sionna scene file (XML) cannot hold."""
     constant = [r.name for r in scene.reflectors if r.material.level is not None]
     notes = []
     if constant:

@@ -30,7 +30,8 @@ class Echo(NamedTuple):
 
 
 def echo_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats) -> Echo:
-    """Misfit of each of T tracks to the double bounce (echo) over the two walls that best other tracks may come from.
+    """Misfit of each of T tracks to the double bounce (echo) over the best two walls whose own returns are other
+    tracks.
 
     `seen` (T, 3): length [m] and two cosines in the room's axes; `strength` (T,): log amplitude over that of free
     space of the same length; `offset` (3,) [m]: from Rx to Tx, in the room's axes.

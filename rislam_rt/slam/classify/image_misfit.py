@@ -48,7 +48,7 @@ class _Mirrors(NamedTuple):
     bounces: Integers
     """Number (N,) of walls."""
     walls: Integers
-    """(N, 2) tracks that show the walls, -1 for none."""
+    """Tracks (N, 2) whose returns show the walls, -1 for none."""
 
 
 def image_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats, still: Floats, echo: Floats) -> Image:

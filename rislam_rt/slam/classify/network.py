@@ -25,9 +25,9 @@ class Network(NamedTuple):
     """Weights of F features, two hidden layers of H and one output: F x H, H x H, H x 1, each with its bias."""
 
     mean: Floats
-    """(F,) taken off the features."""
+    """Means (F,) that are taken off the features."""
     scale: Floats
-    """(F,) by which they are then divided."""
+    """Scales (F,) by which the features are then divided."""
     weight: tuple[Floats, ...]
     """Three matrices (inputs, outputs)."""
     bias: tuple[Floats, ...]

@@ -183,11 +183,13 @@ class _Fitted(NamedTuple):
     """Fitted P parameters of T tracks, and the squared residuals (T,) of the two simple cases."""
 
     value: Floats
-    """(T, P)."""
+    """Fitted parameters (T, P)."""
     std: Floats
-    """(T, P)."""
+    """Standard deviations (T, P) of the parameters."""
     static: Floats
+    """Squared residuals (T,) of a scatterer."""
     moving: Floats
+    """Squared residuals (T,) of one wall's return."""
 
 
 def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> _Fitted:

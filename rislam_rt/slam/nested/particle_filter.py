@@ -30,7 +30,7 @@ from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
 from rislam_rt.slam.nested.wall_return_removal import wall_returns
 from rislam_rt.slam.observations import stranger_density
-from rislam_rt.slam.returns import AXES, observe, poses_of
+from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, StepInfo

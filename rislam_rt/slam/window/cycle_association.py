@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_reach
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses, poses_of
+from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (

@@ -10,7 +10,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Measurement, RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, is_los, observations_of
-from rislam_rt.slam.returns import TX
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births

@@ -26,7 +26,7 @@ from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
     returns_of,
 )
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.sums import prune
+from rislam_rt.slam.schemes.shared.gaussian_sums import prune
 from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)

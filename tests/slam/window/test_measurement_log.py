@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.model import Body, RadioConfig, SensorModel
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window import filter as window_filter
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment

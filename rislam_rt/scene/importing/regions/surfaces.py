@@ -70,7 +70,8 @@ class SortedSurfaces(NamedTuple):
 def sort_regions(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
 ) -> SortedSurfaces:
-    """Sort the flat regions of an imported mesh: decide for each whether it reflects, hides or goes."""
+    """Sort the flat regions of an imported mesh: decide for each whether it reflects, hides what lies behind, or is
+    left out."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
         owner[piece.regions] = number
@@ -211,7 +212,7 @@ def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
 
 
 def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
-    """Triangles (T, 3, 3) without those that lie flat on a wall of an imported room's shell."""
+    """Clutter triangles (T, 3, 3) without those that lie flat on a wall of an imported room's shell."""
     keep = has_area(triangles)
     for normal, offset in planes:
         keep &= np.abs(triangles @ normal - offset).max(axis=1) > RESTING

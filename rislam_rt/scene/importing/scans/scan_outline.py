@@ -120,8 +120,8 @@ def _meeting_cells(
 
 
 def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Booleans) -> Booleans:
-    """Whether (S,) points (S, 2) on the line where two scanned planes meet lie between its end and its crossing with
-    another such line, if both lines end near there."""
+    """Whether (S,) points (S, 2) on the line where two scanned planes meet lie between the line's end and its crossing
+    with another such line, if both lines end near there."""
     distance, at = cKDTree(other_flat).query(flat)
     meet = int(np.argmin(distance))
     steps = int(BREAK / (0.5 * CELL))

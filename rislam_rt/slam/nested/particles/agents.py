@@ -35,7 +35,7 @@ class Whitened(NamedTuple):
     mean: Floats
     """Weighted mean (D,) of the samples."""
     factor: Floats
-    """(D, K): `sample = mean + factor @ value`."""
+    """Factor (D, K) back to the samples: `sample = mean + factor @ value`."""
 
 
 def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -68,7 +68,7 @@ def standardise(weight: Floats, values: Floats) -> Floats:
 
 
 def exact_noise(values: Floats, dims: int, *, rng: np.random.Generator) -> Floats:
-    """(N, dims) motion noise for agent particles (N, D): uncorrelated with them, with exact moments in this sample.
+    """Motion noise (N, dims) for agent particles (N, D): uncorrelated with them, with exact moments in this sample.
 
     Weights do not count here: `posterior` corrects for what they do.
     """

@@ -82,7 +82,7 @@ class DrJitEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=found.log_total), found
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a landmark's cloud to `size` equally weighted particles an agent, mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         children = self._draw(cloud, self._ancestors(cloud, size, kernel.comb), size, kernel.stride)
         grain = cloud.points.step[cloud.block]
@@ -131,7 +131,8 @@ class DrJitEngine:
         return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
-        """Ancestors (N * size,) by systematic resampling: each survivor marks its first child, a maximum fills in."""
+        """Ancestors (N * size,) by systematic resampling: survivors mark their first child, a running maximum fills
+        in."""
         dr, count, old = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, old)
         packets = old // PACKET

@@ -21,7 +21,7 @@ make denormal numbers, which are slow."""
 LEAST_STD = 1e-4
 """Least standard deviation [m] of a cloud that is resampled: a collapsed one must not stay so."""
 LARGEST_WIDTH = 0.9
-"""Largest kernel width."""
+"""Largest kernel width of resampling, in standard deviations."""
 
 SECOND = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 """Index (3, 3) of the second moments xx, xy, ... among sums in the order xx, yy, zz, xy, xz, yz."""
@@ -50,7 +50,7 @@ class CloudSums(NamedTuple):
     log_total: Floats
     """Logarithm (N,) of the sum of the new weights."""
     ess: Floats
-    """(N,) effective sample size, 1 to M."""
+    """Effective sample size (N,) of the landmark particles, 1 to M."""
     mean: Floats
     """Weighted mean (N, 3) [m] of the offsets."""
     covariance: Floats
@@ -61,7 +61,7 @@ class Kernel(NamedTuple):
     """Random numbers and smoothing with which a cloud is resampled, drawn by the caller so that engines agree."""
 
     comb: Floats
-    """(N,) in [0, 1): where systematic resampling of each agent particle starts."""
+    """Starts (N,) in [0, 1) of systematic resampling for each agent particle."""
     stride: int
     """Multiplier, coprime to M, of the permutation that takes children of one parent apart."""
     offset: int
@@ -74,6 +74,7 @@ class CloudEngine(Protocol):
     """Protocol of the engines that weigh and resample clouds of landmark particles, on CPU or GPU."""
 
     name: str
+    """Name of the engine: `numpy`, or Dr.Jit's `llvm` or `cuda`."""
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
         """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
@@ -85,7 +86,7 @@ class CloudEngine(Protocol):
         """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a landmark's cloud to `size` equally weighted particles an agent, mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
 
     def compact(self, cloud: Cloud) -> Cloud:
         """Copy a cloud without the blocks and rows that no agent particle points at."""

@@ -11,7 +11,7 @@ from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, mean
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.weights import FLOOR, trusted
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.returns import Returns, linearise, poses_of
+from rislam_rt.slam.predicted_returns import Returns, linearise, poses_of
 
 ITERATIONS = 4
 """Gauss-Newton steps of each agent particle's fit."""

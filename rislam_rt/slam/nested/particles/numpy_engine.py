@@ -31,6 +31,7 @@ class NumpyEngine:
     """Engine of landmark particles in plain numpy, a few agent particles at a time."""
 
     name = "numpy"
+    """Name of the engine."""
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
         """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
@@ -62,7 +63,7 @@ class NumpyEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=sums.log_total), sums
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a landmark's cloud to `size` equally weighted particles an agent, mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         fresh = np.empty((count, 3, size), dtype=np.float32)
         child = np.arange(size)

@@ -33,7 +33,7 @@ class Nested(NamedTuple):
     log_weight: Floats
     """Log weights (N,) of the agent particles, normalised."""
     trail: Floats
-    """(K, N, 4) positions [m] and headings [rad] of the last K cycles, the present one last."""
+    """Positions [m] and headings [rad] (K, N, 4) of the agent particles in the last K cycles, the present one last."""
     clouds: tuple[Cloud, ...]
     """Landmark particles, a cloud for each of F landmarks."""
     centre: Floats
@@ -254,7 +254,7 @@ def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
 
 
 def _normalised(log_weight: Floats) -> tuple[Floats, float]:
-    """Log weights that sum to one, and the logarithm of what they summed to; hopeless weights become equal ones."""
+    """Normalised log weights of agent particles, and the logarithm of their former sum; hopeless ones become equal."""
     top = float(np.max(log_weight))
     if not np.isfinite(top):
         return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
@@ -263,5 +263,5 @@ def _normalised(log_weight: Floats) -> tuple[Floats, float]:
 
 
 def _root(covariance: Floats) -> Floats:
-    """Lower Cholesky factor, of a matrix that may be singular by a hair."""
+    """Lower Cholesky factor of a new landmark's covariance (3, 3), which may be singular by rounding."""
     return np.linalg.cholesky(covariance + 1e-12 * (np.trace(covariance) + 1e-12) * np.eye(3))

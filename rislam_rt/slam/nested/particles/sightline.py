@@ -14,7 +14,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, reflect
 
 
 class Leg(IntEnum):
@@ -34,7 +34,9 @@ class Kind(NamedTuple):
     """Kinds of a path's Tx leg and Rx leg; engines compile one kernel for each tuple of returns."""
 
     tx: Leg
+    """Kind of the Tx leg."""
     rx: Leg
+    """Kind of the Rx leg."""
 
 
 Kinds = tuple[Kind, ...]
@@ -45,6 +47,7 @@ class Sightline(NamedTuple):
     """A return's path as constants of each of N agent particles, which give a landmark particle's predicted return."""
 
     kind: Kind
+    """Kinds of the two legs."""
     tx: Floats
     """Constants [m] of the Tx leg: (N, 1) length if fixed, (N, 3) the cloud's centre off the Tx, (N, 9) of a wall."""
     rx: Floats
@@ -57,8 +60,9 @@ class Sighting(NamedTuple):
     """A measured return, the path that made it, and the error that is expected of it."""
 
     line: Sightline
+    """Path that made the measurement."""
     seen: Floats
-    """(3,) length [m] and two cosines."""
+    """Measured length [m] and two cosines (3,)."""
     covariance: Floats
     """Covariance (3, 3) of the measurement's expected error."""
     power: float = 1.0

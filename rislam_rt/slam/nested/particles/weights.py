@@ -10,7 +10,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.returns import NONE, Returns, linearise, poses_of
+from rislam_rt.slam.predicted_returns import NONE, Returns, linearise, poses_of
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 TAIL = 4.0
@@ -25,9 +25,11 @@ class Seen(NamedTuple):
     """The A observed returns of a cycle by which the particles are weighed."""
 
     returns: Returns
+    """Paths of the A returns over the map's features."""
     anchor: Floats
     """Anchors (F, 3) [m] of walls."""
     body: Body
+    """Places of Tx and Rx on the agent."""
     seen: Floats
     """Measured lengths [m] and cosines (A, 3)."""
     noise: Floats
@@ -38,6 +40,7 @@ class WeightUpdate(NamedTuple):
     """Particles after a cycle's measurements, with their evidence."""
 
     belief: Nested
+    """The reweighted particles."""
     log_evidence: float
     """Log density of the measurements given all before, of those that the belief could explain."""
     nis: float

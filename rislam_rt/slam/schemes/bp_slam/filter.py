@@ -13,11 +13,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
-from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
-from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
-from rislam_rt.slam.schemes.shared.sums import (
+from rislam_rt.slam.schemes.shared.gaussian_sums import (
     PredictedRanges,
     Sums,
     born,
@@ -29,6 +25,10 @@ from rislam_rt.slam.schemes.shared.sums import (
     prune,
     range_moments,
 )
+from rislam_rt.slam.schemes.shared.loopy_association import Association
+from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
+from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
@@ -45,6 +45,7 @@ class BpSlamState(NamedTuple):
     """State of BP-SLAM by delays: the agent, and the features' Gaussian sums."""
 
     agent: DelayAgent
+    """The agent: trajectory, height, heading, body and receiver."""
     sums: Sums
     """Potential features as Gaussian sums."""
     undetected: float

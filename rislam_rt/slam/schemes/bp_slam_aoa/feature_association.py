@@ -14,7 +14,7 @@ from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
-from rislam_rt.slam.schemes.bp_slam_aoa.merging import unresolved_neighbours
+from rislam_rt.slam.schemes.bp_slam_aoa.unresolved_returns import unresolved_neighbours
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 
@@ -49,11 +49,13 @@ class View(NamedTuple):
     """Predicted returns of a cycle, their detection probabilities and candidate pairs, before the association."""
 
     predicted: PredictedReturns
+    """Predicted returns, moved by the mean pull of neighbours."""
     detection: Floats
     """Probability (C,) that a Gaussian's return is reported by itself."""
     disturbance: Floats
     """Covariance (C, 3, 3) of the pull of returns that cannot be resolved from it."""
     pairs: CandidatePairs
+    """Candidate pairs of a Gaussian and a component."""
 
 
 def expect_scan(

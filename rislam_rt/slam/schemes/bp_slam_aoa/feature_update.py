@@ -86,7 +86,9 @@ class Heard(NamedTuple):
     """Components that one feature may have made, with their messages."""
 
     view: View
+    """Predicted returns of the cycle."""
     scan: ComponentScan
+    """Components of the cycle."""
     part: slice
     """Rows of the feature's Gaussians."""
     pairs: slice

@@ -22,10 +22,10 @@ from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
 )
 from rislam_rt.slam.schemes.bp_slam_aoa.pose_and_map import known_map, pose_moments
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
+from rislam_rt.slam.schemes.shared.gaussian_sums import join, prune
 from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
 from rislam_rt.slam.schemes.shared.sum_correction import is_strong
-from rislam_rt.slam.schemes.shared.sums import join, prune
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo

@@ -60,7 +60,7 @@ class GaussianFeatures(NamedTuple):
     strength_variance: Floats
     """Variance (C,) of that log amplitude."""
     log_scatter: Floats
-    """(C,) logarithm of the mean square of its residuals in reported deviations."""
+    """Logarithm (C,) of the mean square of the feature's residuals in reported deviations."""
 
 
 class PredictedReturns(NamedTuple):
@@ -83,7 +83,7 @@ class PredictedReturns(NamedTuple):
 
 
 def no_features(size: int) -> GaussianFeatures:
-    """Gaussian sums of no features yet, of BP-SLAM with angles, for a trajectory of `size` numbers."""
+    """Empty set of features' Gaussian sums of BP-SLAM with angles, for a trajectory of `size` numbers."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     return GaussianFeatures(
         none, whole, whole, whole, none, np.zeros((0, 3)), np.zeros((0, 3, size)), np.zeros((0, 3, 3)), none, none, none

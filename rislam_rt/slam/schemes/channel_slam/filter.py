@@ -20,11 +20,7 @@ from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, fol
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
-from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Scan
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
-from rislam_rt.slam.schemes.shared.sum_correction import absorb
-from rislam_rt.slam.schemes.shared.sums import (
+from rislam_rt.slam.schemes.shared.gaussian_sums import (
     PredictedRanges,
     Sums,
     born,
@@ -36,6 +32,10 @@ from rislam_rt.slam.schemes.shared.sums import (
     prune,
     range_moments,
 )
+from rislam_rt.slam.schemes.shared.loopy_association import Association
+from rislam_rt.slam.schemes.shared.range_scan import Scan
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
+from rislam_rt.slam.schemes.shared.sum_correction import absorb
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
@@ -48,6 +48,7 @@ class ChannelSlamState(NamedTuple):
     """State of Channel-SLAM: the agent, the tracks of ranges, and the virtual transmitters."""
 
     agent: DelayAgent
+    """The agent: trajectory, height, heading, body and receiver."""
     sums: Sums
     """Gaussian sums of the virtual transmitters; `ident` is the label of the path."""
     tracks: RangeTracks

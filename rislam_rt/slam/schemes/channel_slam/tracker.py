@@ -35,7 +35,7 @@ class RangeTracks(NamedTuple):
 
 
 def no_tracks() -> RangeTracks:
-    """No tracks of ranges yet."""
+    """Empty set of range tracks."""
     whole = np.zeros(0, dtype=np.int64)
     return RangeTracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), whole, whole, whole)
 

@@ -108,7 +108,7 @@ def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive semidefinite matrix, on what is not rounding."""
+    """Pseudo-inverse of a positive semidefinite matrix (D, D), directions of mere rounding left out."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-24))
     unit = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(matrix / unit, rcond=1e-9, hermitian=True)) / unit

@@ -19,7 +19,7 @@ from rislam_rt.slam.start_prior import StartPrior
 
 
 class DelayAgent(NamedTuple):
-    """State of the agent in a rival filter by delay alone."""
+    """State of the agent in a rival filter by delay alone: trajectory, height, heading, body and receiver."""
 
     course: AgentTrajectory
     """The agent's trajectory."""

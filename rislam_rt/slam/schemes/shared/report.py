@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import SlamEstimate
-from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
+from rislam_rt.slam.schemes.shared.gaussian_sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
 
 STEP = 1e-6
@@ -38,7 +38,7 @@ class Points(NamedTuple):
     """Covariances (V, 3, 3) [m^2] of the positions."""
 
     def keep(self, rows: Booleans) -> "Points":
-        """Some of the points to report."""
+        """Some of the points to report, by a mask (V,)."""
         return Points._make(column[rows] for column in self)
 
 

@@ -7,7 +7,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.returns import TX, Poses, linearise
+from rislam_rt.slam.predicted_returns import TX, Poses, linearise
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features

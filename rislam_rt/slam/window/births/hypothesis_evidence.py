@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, NONE, TX
+from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     ALIGNED_TURN,
     BESIDE,

@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.returns import poses_of
+from rislam_rt.slam.predicted_returns import poses_of
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable

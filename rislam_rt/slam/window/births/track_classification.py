@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, NONE, TX
+from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     IS_IMAGE,
     TWO_WALLS,

@@ -10,7 +10,7 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
-from rislam_rt.slam.returns import poses_of, reflect
+from rislam_rt.slam.predicted_returns import poses_of, reflect
 from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known

@@ -7,7 +7,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import squared_distance
 from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, by_wall, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses
+from rislam_rt.slam.predicted_returns import TX, Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,

@@ -14,7 +14,7 @@ from rislam_rt.model.sensor import detection_probability as detection_probabilit
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.smoother.motion_basis import HEAD

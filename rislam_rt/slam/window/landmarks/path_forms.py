@@ -3,7 +3,7 @@ leg.
 
 A form is five feature rows: the base (a point, or `TX` where the Tx itself is mirrored), two walls on the Tx leg and
 two on the Rx leg, the one next to the base first, `NONE` where there is none. What a form looks like from a pose, and
-how that moves with pose and features, is `slam.returns`.
+how that moves with pose and features, is `slam.predicted_returns`.
 """
 
 from functools import lru_cache
@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns
 from rislam_rt.slam.window.solver_limits import STEP
 
 UNKNOWN = -9

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births.feature_removal import features_to_remove
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.predicted_returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL, WALL_KNOWN
 from rislam_rt.slam.window.births.hypothesis_evidence import log_upright
 from rislam_rt.slam.window.births.hypothesis_fits import Fits

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
 from rislam_rt.slam.window.births.hypotheses import BESIDE, KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN, known_features
 from rislam_rt.slam.window.births.hypothesis_fits import Fits

@@ -88,7 +88,7 @@ class PredictedRanges(NamedTuple):
 
 
 def no_sums(size: int) -> Sums:
-    """Gaussian sums of no features yet, for a trajectory of `size` numbers."""
+    """Empty set of features' Gaussian sums, for a trajectory of `size` numbers."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     rows, slopes = np.zeros((0, 3)), np.zeros((0, 3, size))
     return Sums(
@@ -212,7 +212,7 @@ def born(
 
 
 def join(one: Features, other: Features) -> Features:
-    """Both sets of features with their Gaussians as one set."""
+    """Two sets of features with their Gaussians, concatenated."""
     moved = other._replace(owner=other.owner + len(one.ident))
     return type(one)._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
 

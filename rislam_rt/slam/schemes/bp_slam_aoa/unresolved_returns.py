@@ -1,4 +1,4 @@
-"""Merging of features' returns that the receiver cannot resolve, and how they pull each other."""
+"""Unresolved returns of features: the probability that one merges into a louder one, and how neighbours pull it."""
 
 import numpy as np
 
