@@ -74,6 +74,10 @@ def explain(settings: list[Setting], key: str) -> Setting:
 
 def _near(key: str, keys: list[str]) -> str:
     """Hint at settings with a key like an unknown one."""
+    inside = [one for one in keys if key and key in one]
+    if inside:
+        more = f" and {len(inside) - 6} more" if len(inside) > 6 else ""
+        return f"there are {', '.join(inside[:6])}{more}"
     ends = [one for one in keys if nearest(key.rpartition(".")[2], [one.rpartition(".")[2]])]
     return did_you_mean(nearest(key, keys, 3) or ends[:3]) or "`rislam-rt config` lists them all"
 

@@ -76,6 +76,8 @@ def test_one_setting_is_found_by_its_last_name() -> None:
         explain(list(SETTINGS.values()), "sigma_a")
     with pytest.raises(ConfigError, match=r"did you mean 'radio\.carrier_ghz'"):
         explain(list(SETTINGS.values()), "carier_ghz")
+    with pytest.raises(ConfigError, match=r"there are .*radio\.reference_snr_db"):
+        explain(list(SETTINGS.values()), "snr")
 
 
 def _leaves(section: BaseModel, prefix: str) -> list[str]:
