@@ -240,7 +240,7 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     code, _, err = run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)
     signal.signal(signal.SIGINT, before)
     assert code == 130
-    assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
+    assert err.splitlines()[-1] == "interrupted: 1 scheme kept; the same command goes on from there"
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
     assert sorted(path.name for path in folder.iterdir()) == [
