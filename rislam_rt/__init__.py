@@ -47,7 +47,8 @@ _HOMES = {
     "rislam_rt.sweeps": ("Axis", "Sweep", "SweepOptions", "run_sweep"),
 }
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names}
-"""All that is public, and where it lives: docs/reference/api.md is this list, and says what it promises."""
+"""Module of each public name of the package; docs/reference/api.md lists the same names and says what it promises of
+them."""
 
 __all__ = ["__version__", *_PUBLIC]
 

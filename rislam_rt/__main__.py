@@ -1,4 +1,4 @@
-"""`python -m rislam_rt`."""
+"""Entry point of `python -m rislam_rt`: it runs the command line."""
 
 from rislam_rt.cli import main
 

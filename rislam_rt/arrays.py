@@ -1,4 +1,5 @@
-"""Array types, and the checks that every frozen record makes once, on construction."""
+"""Array types, and the checks of dtype, shape and NaN that frozen dataclasses make of their array fields on
+construction."""
 
 from typing import Any
 
@@ -14,7 +15,7 @@ Booleans = NDArray[np.bool_]
 
 
 def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
-    """A read-only array of the given type and shape (`None` matches any length).
+    """Return a value as a read-only array of the given type and shape (`None` matches any length).
 
     A copy, unless the value is such an array already and owns its memory: then nobody can change it.
 
@@ -52,11 +53,12 @@ def phasor(phase: ArrayLike) -> Complexes:
 
 
 def show_point(point: ArrayLike) -> str:
-    """A point for people: `(0.5, 0.7, 0.5)`."""
+    """Text of a point's coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
     return f"({', '.join(f'{value:.4g}' for value in np.asarray(point))})"
 
 
 def _fits(have: tuple[int, ...], want: tuple[int | None, ...]) -> bool:
+    """Whether an array's shape is the wanted one, in which `None` matches any length."""
     return len(have) == len(want) and all(w in (None, h) for w, h in zip(want, have, strict=True))
 
 

@@ -48,19 +48,22 @@ _HOW_TO_GET = (
 
 @dataclass(frozen=True, slots=True)
 class BackendInfo:
-    """What was chosen."""
+    """Backend chosen for the ray tracer on this machine: Mitsuba variant, number of threads, and libLLVM."""
 
     variant: str
-    """Mitsuba variant of the tracer."""
+    """Mitsuba variant that the ray tracer runs on."""
     threads: int
+    """Number of Dr.Jit threads."""
     llvm_path: str
-    """Empty on CUDA."""
+    """Path of libLLVM; empty on CUDA."""
     llvm_version: str
+    """Version `major.minor.patch` of libLLVM; empty on CUDA."""
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """One row of the doctor's report."""
+    """One row of the report of `rislam-rt doctor`: a component of the machine, what was found, and whether it will
+    do."""
 
     name: str
     value: str
@@ -69,7 +72,8 @@ class Diagnosis:
 
 @cache
 def prepare_backend() -> BackendInfo:
-    """Check the machine, choose libLLVM, device and threads, and import Dr.Jit with them; later calls cost nothing.
+    """Check the machine, choose libLLVM, device and threads of the ray tracer, and import Dr.Jit with them; later calls
+    cost nothing.
 
     Raises
     ------
@@ -89,8 +93,8 @@ def prepare_backend() -> BackendInfo:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold interrupts back while the libraries behind the tracer are loaded: their extensions take an exception in the
-    middle for a fault of theirs, and some abort the process at it. What came meanwhile comes at the end."""
+    """Delay interrupts (SIGINT, SIGTERM) while the ray tracer's libraries are loaded, whose extensions may abort the
+    process at an exception; the first signal that came meanwhile is raised at the end."""
     came: list[int] = []
     kept = {}
     if current_thread() is main_thread():  # no other is interrupted
@@ -107,14 +111,15 @@ def uninterrupted() -> Iterator[None]:
 
 
 def check_python(version: tuple[int, ...]) -> None:
-    """Refuse a Python that the tracer does not run on."""
+    """Raise a `SetupError` for a version of Python that the ray tracer does not run on."""
     if not PYTHONS[0] <= tuple(version[:2]) <= PYTHONS[1]:
         found, (low, high) = ".".join(map(str, version[:2])), [".".join(map(str, v)) for v in PYTHONS]
         raise SetupError(f"Python {found} found, {low} to {high} needed: build the environment anew with one of them")
 
 
 def check_libatomic(name: str = "libatomic.so.1") -> None:
-    """Refuse a Linux machine without libatomic: Dr.Jit would fail with a misleading NameError."""
+    """Raise a `SetupError` on a Linux machine without libatomic, where Dr.Jit would fail with a misleading
+    NameError."""
     if platform.system() != "Linux":
         return
     try:
@@ -126,7 +131,7 @@ def check_libatomic(name: str = "libatomic.so.1") -> None:
 
 
 def llvm_version(path: str) -> str:
-    """Version `major.minor.patch` of a libLLVM.
+    """Version `major.minor.patch` of the libLLVM file at a path.
 
     Raises
     ------
@@ -149,7 +154,8 @@ def llvm_version(path: str) -> str:
 
 
 def diagnose() -> tuple[Diagnosis, ...]:
-    """What the machine has, for the doctor. Raises nothing; a row that is not `ok` says what is missing."""
+    """Rows of `rislam-rt doctor`: versions of Python and of the packages, libLLVM, Mitsuba variant, threads, and GPUs
+    of this machine. Raises nothing; a row that is not `ok` says what is missing."""
     rows = [Diagnosis("python", f"{platform.python_version()} ({sys.executable})")]
     rows += [_package(name) for name in _PACKAGES]
     try:
@@ -176,7 +182,7 @@ def count_gpus() -> int:
 
 
 def _device() -> str:
-    """Device of the backend, `llvm` or `cuda`, as the user wants."""
+    """Device of the ray tracer, `llvm` or `cuda`, from the environment variable RISLAM_RT_DEVICE."""
     device = os.environ.get("RISLAM_RT_DEVICE", "llvm").lower()
     if device not in ("llvm", "cuda"):
         raise SetupError(f"RISLAM_RT_DEVICE: '{device}' received; give 'llvm' or 'cuda'")
@@ -186,7 +192,7 @@ def _device() -> str:
 
 
 def _threads() -> int:
-    """Number of Dr.Jit threads of the backend."""
+    """Number of Dr.Jit threads, from the environment variable RISLAM_RT_THREADS; by default 1."""
     text = os.environ.get("RISLAM_RT_THREADS", "1")
     if not text.isdecimal() or int(text) < 1:
         raise SetupError(f"RISLAM_RT_THREADS: '{text}' received; give a whole number from 1 on")
@@ -194,7 +200,8 @@ def _threads() -> int:
 
 
 def _choose_llvm() -> tuple[str, str]:
-    """Path and version: the user's own, else the wheel's, else the newest that the system has."""
+    """Path and version of the libLLVM to use: the one that DRJIT_LIBLLVM_PATH names, else that of the installed wheel,
+    else the newest of the system."""
     own = os.environ.get("DRJIT_LIBLLVM_PATH")
     if own:
         if not Path(own).is_file():
@@ -211,7 +218,8 @@ def _choose_llvm() -> tuple[str, str]:
 
 
 def _wheel_llvm() -> Iterator[str]:
-    """The real library of the installed wheel (its links may be missing in a read-only environment)."""
+    """Path of the libLLVM of the installed karellen-llvm-core wheel: the file itself, as links to it may be missing in
+    a read-only environment."""
     try:
         files = metadata.distribution("karellen-llvm-core").files or []
     except metadata.PackageNotFoundError:
@@ -222,20 +230,20 @@ def _wheel_llvm() -> Iterator[str]:
 
 
 def _system_llvm() -> list[str]:
-    """The system's libLLVM files for the backend, newest first by what their names say."""
+    """Paths of the libLLVM files that the system has, newest first by the version in their names."""
     paths = {str(Path(p).resolve()) for pattern in _SYSTEM_LLVM for p in glob(pattern)}
     return sorted(paths, key=lambda p: (_named_version(p), p), reverse=True)
 
 
 def _named_version(path: str) -> tuple[int, ...]:
-    """Version in a library's file name, e.g. (15,) of `libLLVM-15.so.1`, (19, 1) of `libLLVM.so.19.1`."""
+    """Version in the name of a libLLVM file, e.g. (15,) of `libLLVM-15.so.1`, (19, 1) of `libLLVM.so.19.1`."""
     name = Path(path).resolve().name
     match = re.search(r"libLLVM-(\d+(?:\.\d+)*)", name) or re.search(r"libLLVM\.so\.(\d+(?:\.\d+)*)", name)
     return tuple(int(n) for n in match.group(1).split(".")) if match else ()
 
 
 def _load(path: str) -> ctypes.CDLL:
-    """Open a libLLVM; the wheel's C++ runtime is opened by its full name first where its links are missing."""
+    """Open a libLLVM, the wheel's C++ runtime first, by its full name, where its links are missing."""
     try:
         return ctypes.CDLL(path)
     except OSError:
@@ -249,7 +257,7 @@ def _load(path: str) -> ctypes.CDLL:
 
 
 def _package(name: str) -> Diagnosis:
-    """A package's version; only the LLVM wheel may be missing."""
+    """Row of `rislam-rt doctor` with the version of an installed package; only the LLVM wheel may be missing."""
     try:
         return Diagnosis(name, metadata.version(name))
     except metadata.PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Physical constants and the few numbers that several rooms of the house must agree on."""
+"""Physical constants, and geometric tolerances that several folders must agree on."""
 
 SPEED_OF_LIGHT = 299_792_458.0
 """Speed of light in vacuum [m/s] (exact, SI)."""

@@ -1,20 +1,21 @@
-"""Errors, each with the exit code that the command line ends with.
+"""Errors of this package, each with the exit code that the command line ends with.
 
 A message is one line: what was wrong, the value received, and what to do about it. An error may hold several, one for
 each fault.
 """
 
 MOST_LINES = 20
-"""Faults that are told one by one."""
+"""Faults of one error that are printed one by one; of the others only the number is."""
 
 
 class RislamError(Exception):
-    """Any failure that this package raises on purpose; exit code 1.
+    """Base of all errors that this package raises on purpose; exit code 1.
 
     Its text is one printable line, the first of its arguments, and says how many more there are.
     """
 
     exit_code = 1
+    """Exit code of the command line."""
 
     def __str__(self) -> str:
         more = f" (and {len(self.args) - 1} more)" if len(self.args) > 1 else ""
@@ -22,56 +23,59 @@ class RislamError(Exception):
 
     @property
     def lines(self) -> list[str]:
-        """The error, every fault on one printable line."""
+        """Lines of an error's message: one printable line for each fault, and the number of those beyond
+        `MOST_LINES`."""
         told = [_printable(str(text)) for text in self.args[:MOST_LINES]]
         more = len(self.args) - len(told)
         return [*told, f"{more} more of this kind"] if more else told
 
 
 class ConfigError(RislamError):
-    """A pipeline, radio or command-line setting is unusable."""
+    """Error raised for an unusable setting of a pipeline, of the radio or on the command line; exit code 2."""
 
     exit_code = 2
 
 
 class SceneError(RislamError):
-    """A scene file or one of its meshes is unusable."""
+    """Error raised for an unusable scene file or mesh; exit code 2."""
 
     exit_code = 2
 
 
 class ResultError(RislamError):
-    """A result file is not as it was written: damaged, changed, or of another run."""
+    """Error raised for a result file that is not as it was written: damaged, changed, or of another run; exit code
+    2."""
 
     exit_code = 2
 
 
 class GeometryError(RislamError):
-    """Points, directions or planes that have no answer (zero length, wrong shape)."""
+    """Error raised for points, directions or planes that have no answer (zero length, wrong shape); exit code 2."""
 
     exit_code = 2
 
 
 class TraceError(RislamError):
-    """The tracer failed on a valid scene."""
+    """Error raised where the ray tracer failed on a valid scene; exit code 1."""
 
     exit_code = 1
 
 
 class SetupError(RislamError):
-    """The machine lacks something: a library, a version, a device."""
+    """Error raised where the machine lacks something (a library, a version, a device); exit code 3."""
 
     exit_code = 3
 
 
 class StoreError(RislamError):
-    """A result could not be written or read back."""
+    """Error raised where a result could not be written to disk or read back; exit code 4."""
 
     exit_code = 4
 
 
 def disk_error(error: OSError) -> RislamError:
-    """What the disk answered, as one line: of a file that was named, or of where the output goes."""
+    """Error of this package for an `OSError` of the disk: `ConfigError` for a file that was named, `StoreError` where
+    the output cannot be written."""
     said = error.strerror or type(error).__name__
     if error.filename is None:
         return StoreError(f"output: cannot be written ({said}); check where it goes, and the free space")
@@ -79,11 +83,12 @@ def disk_error(error: OSError) -> RislamError:
 
 
 def _printable(text: str) -> str:
+    """Text with every unprintable character as a space."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
 def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """Raise an error unless an argument of a public function is of its kind.
+    """Check the type of an argument of a public function, and raise an error for another.
 
     Raises
     ------

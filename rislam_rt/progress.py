@@ -1,10 +1,10 @@
-"""Progress of work that takes a while."""
+"""Callbacks that report the progress of long computations."""
 
 from collections.abc import Callable
 
 Tell = Callable[[str, int, int], None]
-"""`at` of `total` steps of a stage are done."""
+"""Callback to which a computation reports its progress: a stage's name, the steps done, and their total."""
 
 
 def tell_nobody(stage: str, at: int, total: int) -> None:
-    """Nobody wants to know."""
+    """Ignore a report of progress: the callback for computations whose progress nobody shows."""

@@ -1,4 +1,5 @@
-"""TOML from people who may be mistaken, or mean harm (one kind of exception, no text that takes minutes), and back."""
+"""Reading of TOML from users who may be mistaken or mean harm (one kind of exception, bounded time), and writing of
+TOML."""
 
 import json
 import re
@@ -10,17 +11,18 @@ from typing import Any
 from rislam_rt.errors import ConfigError
 
 MAX_LEVELS = 100
-"""Tables within tables that a dotted key may name; the time that a longer one takes grows with its square."""
+"""Most parts of a dotted key; the time to read a longer one grows with its square."""
 
 MAX_DIGITS = 100
-"""Of a whole number to another base than ten, where Python sets no limit when it reads and one when it prints."""
+"""Most digits of a hexadecimal, octal or binary number, for which Python sets no limit when it reads and one when it
+prints."""
 
 _LONG_NUMBER = re.compile(r"0[xob][0-9A-Fa-f_]{" + str(MAX_DIGITS + 1) + "}")
 _LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+)""" + f"{{{MAX_LEVELS}}}")
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The table of a TOML text.
+    """Parse a TOML text into a table; numbers beyond 64 bits and keys of very many parts are refused.
 
     Raises
     ------
@@ -44,7 +46,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def _too_long(value: Any, place: str) -> Iterator[str]:
-    """Places of whole numbers in a TOML table that 64 bits do not hold."""
+    """Places in a parsed TOML table of whole numbers that 64 bits do not hold."""
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         yield place
     for name, part in value.items() if isinstance(value, dict) else ():
@@ -54,7 +56,8 @@ def _too_long(value: Any, place: str) -> Iterator[str]:
 
 
 def parse_value(text: str) -> Any:
-    """The TOML value that a text stands for, or the text itself, so that strings need no quotes."""
+    """Value of a setting that is given as text: parsed as TOML, or the text itself if it is no TOML, so that strings
+    need no quotes."""
     try:
         return parse_toml(f"value = {text}")["value"]
     except (ValueError, KeyError):
@@ -62,7 +65,7 @@ def parse_value(text: str) -> Any:
 
 
 def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """The settings with one dotted key replaced; tables on the way are copied, or made.
+    """Copy of nested settings with the value at one dotted key (`a.b.c`) replaced; missing tables on the way are made.
 
     Raises
     ------
@@ -79,7 +82,7 @@ def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, A
 
 
 def toml_bytes(table: Mapping[str, Any]) -> bytes:
-    """A table as TOML: plain keys first, then (lists of) tables; text and numbers so that they read back equal."""
+    """Write a table as TOML: plain keys first, then (lists of) tables; text and numbers read back equal."""
     lines = [f"{_toml_key(key)} = {toml_value(value)}" for key, value in table.items() if not _is_table(value)]
     for key, value in table.items():
         for section in value if isinstance(value, list) and _is_table(value) else [value]:
@@ -90,7 +93,7 @@ def toml_bytes(table: Mapping[str, Any]) -> bytes:
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML; tables inline, numbers so that they read back equal."""
+    """Write one value as TOML text, tables inline; text and numbers read back equal."""
     if isinstance(value, str):
         # TOML's strings are JSON's, but for DEL.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
@@ -104,8 +107,10 @@ def toml_value(value: Any) -> str:
 
 
 def _is_table(value: Any) -> bool:
+    """Whether a value is written to TOML as a section: a table, or a list of tables."""
     return isinstance(value, Mapping) or (isinstance(value, list) and bool(value) and isinstance(value[0], Mapping))
 
 
 def _toml_key(key: str) -> str:
+    """Key of a TOML table as it is written: bare where TOML allows it, else quoted."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else str(toml_value(key))

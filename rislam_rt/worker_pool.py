@@ -1,8 +1,9 @@
-"""Interpreters of their own that do pieces of work, so that one which aborts or hangs takes nothing else with it.
+"""A pool of worker processes, each a Python interpreter of its own, so that a task which aborts or hangs takes nothing
+else with it.
 
-Each is started fresh, never forked (numerical libraries keep threads), and does one piece after the other: functions
-that are importable by name, called with what they are given and a function that tells of their progress. It ends with
-the process that started it, in the middle of a piece if need be: nobody is left to hear the result.
+Workers are started fresh, never forked (numerical libraries keep threads), and do one task after the other: a function
+that is importable by name, called with its arguments and a callback for its progress. A worker ends with the process
+that started it, in the middle of a task if need be: nobody is left to hear the result.
 """
 
 import os
@@ -25,22 +26,24 @@ from rislam_rt.errors import RislamError
 from rislam_rt.progress import Tell, tell_nobody
 
 Work = Callable[..., Any]
-"""`work(*arguments, tell)`; a `RislamError` is a result, any other exception the end of the interpreter."""
+"""Function of a task, called as `work(*arguments, tell)`; a `RislamError` that it raises is its result, any other
+exception the end of the worker process."""
 
 LOOK_SECONDS = 1.0
-"""Longest time between two looks at whether a worker lives."""
+"""Longest time [s] between two checks whether a worker process lives."""
 
 
 class Lost(NamedTuple):
-    """What became of a piece that was not done."""
+    """Result of a task whose worker process died or was stopped at the time limit."""
 
     code: int | None
-    """Exit code of its interpreter, negative for a signal; None where the time limit stopped it."""
+    """Exit code of the worker process, negative for a signal; None where the time limit stopped it."""
     seconds: float
+    """Time [s] that the task had run."""
 
 
 class Worker:
-    """One interpreter."""
+    """One worker process: a fresh Python interpreter that does tasks sent to it through a pipe."""
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         path = os.pathsep.join(os.path.abspath(part) for part in sys.path)
@@ -56,7 +59,8 @@ class Worker:
         self.fresh = True
 
     def do(self, work: Work, arguments: tuple[Any, ...], limit: float | None, tell: Tell) -> Any:
-        """What a piece returns, its `RislamError`, or `Lost`; the start of the interpreter does not count."""
+        """Do a task in this worker process within a time limit [s]: its result, the `RislamError` that it raised, or
+        `Lost`. Starting the interpreter does not count."""
         begin = monotonic()
         try:
             if self.fresh:
@@ -77,7 +81,7 @@ class Worker:
             return Lost(code, monotonic() - begin)
 
     def _hear(self, end: float | None) -> Any:
-        """The next message of a worker in the pool.
+        """Receive the next message of a worker process before the time `end` (of `monotonic`; None: no limit).
 
         Raises
         ------
@@ -94,19 +98,19 @@ class Worker:
         return self.channel.recv()
 
     def stop(self) -> None:
-        """End a worker of the pool at once."""
+        """Kill a worker process and close the pipe to it."""
         self.process.kill()
         self.process.wait()
         self.channel.close()
 
     @property
     def alive(self) -> bool:
-        """Whether a worker of the pool can do another piece."""
+        """Whether a worker process still runs and can do another task."""
         return self.process.poll() is None
 
 
 class Pool:
-    """Workers of this process; as many as pieces are done at a time."""
+    """The worker processes of this process, started as they are needed and used again."""
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
         self.environment = environment or {}
@@ -115,7 +119,7 @@ class Pool:
         self.over = False
 
     def do(self, work: Work, arguments: tuple[Any, ...], limit: float | None = None, tell: Tell = tell_nobody) -> Any:
-        """One piece (see `Worker.do`), by an idle worker or a new one."""
+        """Do one task (see `Worker.do`) in an idle worker process, or in a new one."""
         worker = self.idle.pop() if self.idle else Worker(self.environment)
         if not worker.alive:
             worker.stop()
@@ -131,19 +135,20 @@ class Pool:
                 self.idle.append(worker)
 
     def dismiss(self) -> None:
-        """End the idle workers."""
+        """Kill the idle worker processes."""
         while self.idle:
             self.idle.pop().stop()
 
     def break_off(self) -> None:
-        """End the busy workers, and all that come; their threads hear of it, and clean up."""
+        """Kill the busy worker processes and all that are started later; the threads that wait for them get `Lost`, and
+        clean up."""
         self.over = True
         for worker in list(self.busy):
             worker.process.kill()
 
 
 Run = Callable[[Iterable[tuple[str, tuple[Any, ...]]]], Iterator[tuple[str, Any]]]
-"""Does pieces, each a name and arguments, and gives what became of them as they are done, each with its name."""
+"""Function that does tasks, each a name and its arguments, and yields (name, result) as they are done."""
 
 
 @contextmanager
@@ -151,7 +156,8 @@ def open_pool(
     work: Work, jobs: int, *, limit: float | None = None, environment: Mapping[str, str] | None = None,
     tell: Tell = tell_nobody,
 ) -> Iterator[Run]:  # fmt: skip
-    """Workers on this machine, `jobs` at a time. Leaving ends them, in the middle of their pieces if need be.
+    """Open a pool of worker processes that does `jobs` tasks at a time; leaving the context kills them, in the middle
+    of their tasks if need be.
 
     Parameters
     ----------
@@ -197,10 +203,11 @@ def open_pool(
 def run_side_by_side(
     work: Work, names: Iterable[str], common: tuple[Any, ...], jobs: int, tell: Tell
 ) -> Iterator[tuple[str, Any]]:
-    """Do `work(name, *common, tell)` for each name, `jobs` at a time, and give (name, result) as they are done.
+    """Run `work(name, *common, tell)` for each name in worker processes, `jobs` at a time, and yield (name, result) as
+    they are done.
 
-    What failed gives its `RislamError` as the result; so does a process that died without a word. With one job, or one
-    name, all happens in this process. Leaving the loop early ends the processes.
+    The result of what failed is its `RislamError`; so is that of a process that died without a word. With one job, or
+    one name, all happens in this process. Leaving the loop early ends the processes.
     """
     names = list(names)
     if jobs <= 1 or len(names) <= 1:
@@ -218,13 +225,13 @@ def run_side_by_side(
 
 
 def leave_interrupts() -> None:
-    """An interrupt from the keyboard reaches the whole group; workers started from here on inherit that it is not for
-    them."""
+    """Block SIGINT in this thread and in the worker processes started from it: an interrupt from the keyboard reaches
+    the whole process group."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def serve(handle: int) -> None:
-    """The life of a worker: do pieces that come over a channel until that ends."""
+    """Main loop of a worker process: do the tasks that come through a pipe until it closes."""
     channel: Any = Connection(handle)
     pieces = SimpleQueue[bytes]()
     Thread(target=_listen, args=(channel, pieces), daemon=True).start()
@@ -239,6 +246,7 @@ def serve(handle: int) -> None:
 
 
 def _listen(channel: Any, pieces: "SimpleQueue[bytes]") -> None:
+    """Put the messages of a worker's pipe into a queue, and end the process when the pipe closes."""
     try:
         while True:
             pieces.put(channel.recv_bytes())

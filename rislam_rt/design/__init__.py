@@ -1,4 +1,4 @@
-"""Floor 5: which code to set the panel to. Designers, their bound, and the problem as the agent believes it."""
+"""Floor 5: design of the RIS panel's phase code. Designers, bounds, and the design problem on the agent's belief."""
 
 from rislam_rt.design.belief import design_code, problem_from_belief
 from rislam_rt.design.designers import DESIGNERS, designer

@@ -1,4 +1,4 @@
-"""Floor 5: scores. Errors, distances between maps, consistency, confidence intervals, association."""
+"""Scores of estimates against the truth (floor 5): errors, map distances, consistency, association, intervals."""
 
 from rislam_rt.evaluate.association import association_fractions, association_score, label_switches
 from rislam_rt.evaluate.confidence_intervals import (
@@ -11,7 +11,7 @@ from rislam_rt.evaluate.confidence_intervals import (
 )
 from rislam_rt.evaluate.consistency import normalised_squares
 from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
-from rislam_rt.evaluate.planes import (
+from rislam_rt.evaluate.plane_matching import (
     NEAR_ANGLE,
     NEAR_WALL,
     Surfaces,

@@ -1,4 +1,5 @@
-"""Scores of association: how well measurements were told apart, by identities that only the scorer sees."""
+"""Scores of data association: how well a filter assigned measurements to landmarks, by true identities that only the
+scorer sees."""
 
 from typing import NamedTuple
 
@@ -8,23 +9,25 @@ import scipy
 from rislam_rt.arrays import Integers
 
 NONE = -1
-"""Label of clutter in the truth, and of "no landmark" in an answer."""
+"""Identity of clutter in the truth, and label of "no landmark" in the filter's answer."""
 
 
 class AssociationScore(NamedTuple):
-    """Fractions of measurements; `accuracy` counts clutter that was left alone as right."""
+    """Scores of a run's data association: fractions of its measurements, and label switches."""
 
     accuracy: float
+    """Fraction of the measurements whose label is right; clutter that was left alone counts as right."""
     precision: float
-    """Of those associated, how many with the right identity."""
+    """Fraction of the measurements with a label whose label stands for their true identity."""
     recall: float
-    """Of those with an identity, how many associated with it."""
+    """Fraction of the measurements with a true identity whose label stands for it."""
     switches: int
-    """How often an identity changed its label from one of its measurements to the next."""
+    """Number of times that an identity's label changes from one of its measurements to the next."""
 
 
 def association_score(label: Integers, truth: Integers) -> AssociationScore:
-    """Score labels (T,) given by the agent against identities (T,), both -1 for none, in the order of time.
+    """Score the labels (T,) that a filter gave measurements against their true identities (T,), in the order of time;
+    -1 is none.
 
     Labels are numbers of the agent's own. Each is first given the identity with which it agrees most often, one to one
     (the assignment that gets the most measurements right), so a split or merged track costs what it loses.
@@ -40,7 +43,8 @@ def association_score(label: Integers, truth: Integers) -> AssociationScore:
 
 
 def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> tuple[float, float, float]:
-    """Accuracy, precision and recall from how often (L, I) each label (L,) met each identity (I,); -1 for none."""
+    """Accuracy, precision and recall of data association, from counts (L, I) of how often label (L,) met identity (I,);
+    -1 is none."""
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[scipy.optimize.linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
@@ -57,7 +61,8 @@ def association_fractions(labels: Integers, identities: Integers, counts: Intege
 
 
 def label_switches(label: Integers, truth: Integers) -> int:
-    """Times at which an identity's label differs from the label it last had; -1 on either side does not count."""
+    """Number of times that a true identity's label differs from the label it last had; a -1 on either side does not
+    count."""
     switches = 0
     both = (np.asarray(label) != NONE) & (np.asarray(truth) != NONE)
     for identity in np.unique(np.asarray(truth)[both]):

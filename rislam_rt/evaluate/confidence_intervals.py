@@ -1,4 +1,4 @@
-"""Confidence intervals by the bootstrap: what a difference between schemes is worth after so many seeds."""
+"""Confidence intervals of scores over independent runs (seeds): the bootstrap, and Wilson's for shares."""
 
 import warnings
 from collections.abc import Callable
@@ -12,6 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 
 Statistic = Callable[[Floats], Floats]
+"""Statistic of samples (R, B, ...) that works along the first axis, the runs, and gives values (B,)."""
 
 
 class Interval(NamedTuple):
@@ -38,7 +39,7 @@ def median_over_runs(samples: Floats) -> Floats:
 
 
 def share_interval(count: int, runs: int) -> Interval:
-    """A share `count / runs` with Wilson's interval at 95 % (Wilson 1927), which holds at shares of 0 and 1 too."""
+    """Share `count / runs` with its 95 % confidence interval by Wilson (1927), which holds at shares of 0 and 1 too."""
     if not 0 <= count <= runs or runs < 1:
         raise ConfigError(f"count, runs: {count} of {runs} received; give a part of at least one run")
     z, share = float(scipy.special.ndtri(0.975)), count / runs
@@ -55,9 +56,10 @@ def bootstrap(
     level: float = 0.95,
     resamples: int = 2000,
 ) -> Interval:
-    """Bias-corrected and accelerated interval (Efron 1987) of a statistic of samples (R, ...), R independent runs.
+    """Bias-corrected and accelerated bootstrap interval (Efron 1987) of a statistic of samples (R, ...) from R
+    independent runs.
 
-    Of quantiles alone where that is not defined: where leaving out any one run changes nothing.
+    Where that is not defined, because leaving out any one run changes nothing, the interval of quantiles alone.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def bootstrap(
 def bootstrap_ratio(
     numerator: Floats, denominator: Floats, *, rng: np.random.Generator, level: float = 0.95
 ) -> Interval:
-    """Interval of the ratio of two schemes' root mean squares, both run on the same R seeds.
+    """Bootstrap interval of the ratio of two schemes' root mean squares, both run on the same R seeds.
 
     Seeds are drawn in pairs, so that what both schemes share (room, noise) does not widen the interval. 1 minus this is
     the gain over the denominator's scheme.

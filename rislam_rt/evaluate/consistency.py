@@ -1,4 +1,5 @@
-"""Consistency, whether a filter knows how wrong it is: normalised squared errors, for chi-square bounds."""
+"""Consistency of a filter: its errors normalised by its own covariances (NEES, NIS), to be held against chi-square
+bounds."""
 
 import numpy as np
 
@@ -6,7 +7,7 @@ from rislam_rt.arrays import Floats
 
 
 def normalised_squares(errors: Floats, covariances: Floats) -> Floats:
-    """Squares for consistency (NEES, NIS): `e^T P^-1 e` (...,) of errors (..., D), covariances (..., D, D).
+    """Normalised squared errors `e^T P^-1 e` (...,), NEES or NIS, of errors (..., D) with covariances (..., D, D).
 
     NEES of state errors, NIS of innovations; chi-square with D degrees of freedom when the filter is consistent.
     Infinite where a covariance is not positive definite.

@@ -1,4 +1,5 @@
-"""Errors of positions, and trajectories aligned. Plain arrays in, plain values out."""
+"""Position errors of an estimated trajectory, and its alignment with the true one. Plain arrays in, plain values
+out."""
 
 import numpy as np
 
@@ -7,12 +8,12 @@ from rislam_rt.errors import GeometryError
 
 
 def position_errors(estimate: Floats, truth: Floats) -> Floats:
-    """Position errors (...,) [m], distances between positions (..., D)."""
+    """Position errors (...,) [m]: distances between estimated and true positions (..., D)."""
     return np.asarray(np.linalg.norm(np.asarray(estimate) - np.asarray(truth), axis=-1))
 
 
 def rmse(estimate: Floats, truth: Floats) -> float:
-    """Root mean squared error [m] over all positions (..., D)."""
+    """Root mean square [m] of the position errors over all positions (..., D)."""
     return root_mean_square(position_errors(estimate, truth))
 
 
@@ -31,8 +32,8 @@ def root_mean_square(errors: Floats) -> float:
 
 
 def align(estimate: Floats, truth: Floats) -> Floats:
-    """Estimated positions (K, 3) aligned: turned about z and shifted so that they fit the true ones best (least
-    squares)."""
+    """Estimated positions (K, 3) aligned with the true ones: turned about z and shifted to the least squared
+    distances."""
     centred, target = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
     # The angle that maximises sum target . R centred, with complex numbers for the plane.
     overlap = np.sum(np.conj(centred[:, 0] + 1j * centred[:, 1]) * (target[:, 0] + 1j * target[:, 1]))

@@ -13,9 +13,13 @@ class Gospa(NamedTuple):
     """GOSPA distance [m] (alpha = 2) and its parts, `distance^p = localisation^p + c^p / 2 (missed + false)`."""
 
     distance: float
+    """GOSPA distance [m]."""
     localisation: float
+    """Part [m] of the pairs that were matched."""
     missed: int
+    """Number of true points without an estimate."""
     false: int
+    """Number of estimates without a true point."""
 
 
 def gospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float = 2.0) -> Gospa:
@@ -52,7 +56,8 @@ def match_points(estimate: Floats, truth: Floats, *, cutoff: float = np.inf) -> 
 
 
 def match_nearest(distance: Floats, limit: float) -> Integers:
-    """Column (N,) of the partner of each row of distances (N, M), -1 for none within the limit; one to one.
+    """One-to-one assignment of rows to columns of distances (N, M): column (N,) of each row, -1 for none within the
+    limit.
 
     The pairs with the least sum of distances, where one beyond ten limits costs no more than that.
     """
@@ -64,6 +69,8 @@ def match_nearest(distance: Floats, limit: float) -> Integers:
 
 
 def _distances(estimate: Floats, truth: Floats, cutoff: float, order: float) -> Floats:
+    """Distances (N, M) between estimated and true points, at most the cut-off; ConfigError for a bad cut-off or
+    order."""
     if not (cutoff > 0.0 and order >= 1.0):
         raise ConfigError(
             f"cutoff, order: {cutoff}, {order} received; give a positive cut-off and an order of 1 or more"
@@ -72,7 +79,7 @@ def _distances(estimate: Floats, truth: Floats, cutoff: float, order: float) -> 
 
 
 def _pairwise(estimate: Floats, truth: Floats) -> Floats:
-    """Distances (N, M); an empty set may come without its dimension."""
+    """Distances (N, M) between two sets of points (N, D) and (M, D); an empty set may come without its dimension."""
     first, second = (np.asarray(points, dtype=np.float64) for points in (estimate, truth))
     if not first.size or not second.size:
         return np.zeros((len(first), len(second)))

@@ -29,14 +29,15 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 
 
 def rotation_about(axis: Floats, angle: float) -> Floats:
-    """(3, 3) rotation by an angle [rad] about an axis that is a unit vector (3,) (Rodrigues)."""
+    """Rotation matrix (3, 3) by an angle [rad] about an axis, a unit vector (3,) (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
 
 def rotation_z(heading: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) about z: body frame (x forward) to room frame."""
+    """Rotation matrices (..., 3, 3) about z by headings (...,) [rad]: from the agent's body frame (x forward) to room
+    axes."""
     heading = np.asarray(heading, dtype=np.float64)
     rotation = np.zeros((*heading.shape, 3, 3))
     rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(heading)

@@ -1,4 +1,4 @@
-"""Connected parts: of a graph, and of a mesh whose triangles share corners."""
+"""Connected parts of a graph, and of a triangle mesh whose triangles share corners."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats, Integers
 
 
 def connected(pairs: Integers, count: int) -> Integers:
-    """Number (count,) of the group that each belongs to, pairs (P, 2) being joined."""
+    """Number (count,) of the connected component to which each node of a graph with edges (P, 2) belongs."""
     # half a second of imports that a list of settings does without
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -17,7 +17,8 @@ def connected(pairs: Integers, count: int) -> Integers:
 
 
 def connected_triangles(triangles: Floats, tolerance: float = 1e-6) -> Integers:
-    """Number (T,) of the connected piece each triangle belongs to; corners within `tolerance` [m] are one."""
+    """Number (T,) of the connected part of a mesh to which each triangle (T, 3, 3) belongs; corners within `tolerance`
+    [m] count as one."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3) / tolerance), axis=0, return_inverse=True)
     faces = corner.reshape(-1, 3)
     label = connected(np.concatenate([faces[:, :2], faces[:, 1:]]), int(faces.max(initial=-1)) + 1)

@@ -1,4 +1,4 @@
-"""Coplanar surfaces: which walls lie on which, within what a tracer in float32 can tell apart."""
+"""Coplanar walls of a room: which lies in the plane of which, as far as a float32 ray tracer can tell apart."""
 
 from typing import NamedTuple
 
@@ -10,29 +10,32 @@ from rislam_rt.geometry.planes import signed_distance
 from rislam_rt.geometry.triangles import triangle_areas
 
 ALIKE = 1e-6
-"""Two areas that differ by less than this share are the same: corners in float32 say no more."""
+"""Relative difference below which the areas of two walls count as equal: corners in float32 say no more."""
 
 _BLOCK = 200_000
-"""Pairs of triangles looked at in one go."""
+"""Number of pairs of triangles that are tested for overlap in one go."""
 
 
 class CoplanarPair(NamedTuple):
-    """Wall `upper` lies on wall `lower`."""
+    """Two coplanar walls that overlap: wall `upper` lies on the larger wall `lower`."""
 
     upper: int
+    """Number of the smaller wall."""
     lower: int
+    """Number of the larger wall."""
     gap: float
-    """[m] Largest distance of the upper's corners from the lower's plane."""
+    """Largest distance [m] of the upper wall's corners from the lower wall's plane."""
 
 
 class CoplanarStack(NamedTuple):
-    """What lies on what among W walls."""
+    """Coplanar walls among W walls: the pairs that overlap, and the plane that all in one stack share."""
 
     pairs: list[CoplanarPair]
+    """All pairs of coplanar walls that overlap."""
     plane: Integers
-    """(W,) the wall whose plane each has: its own number where it lies on nothing and nothing lies on it."""
+    """Number (W,) of the wall whose plane each wall shares: its own where it overlaps no other wall of its plane."""
     over: tuple[Integers, ...]
-    """(W,) for each wall those that lie on it."""
+    """For each of W walls, the numbers of the walls that lie on it."""
 
 
 def tracer_gap(bounds: Floats) -> float:
@@ -45,7 +48,7 @@ def tracer_gap(bounds: Floats) -> float:
 
 
 def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floats, gap: float) -> CoplanarStack:
-    """Find walls that overlap in one plane.
+    """Find the pairs of a room's W walls that overlap in one plane.
 
     Two walls lie on each other when their normals (W, 3) agree within `COPLANAR_ANGLE`, all corners of the smaller are
     within `gap` [m] of the larger's plane, and they overlap by more than `gap`. The smaller lies on the larger; of two
@@ -86,7 +89,7 @@ def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
 
 
 def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
-    """Whether any pair of flat triangles (A, 3, 2) and (B, 3, 2) overlaps by more than `depth`."""
+    """Whether any pair of two-dimensional triangles (A, 3, 2) and (B, 3, 2) overlaps by more than `depth` [m]."""
     boxed = np.minimum(a.max(axis=1)[:, None], b.max(axis=1)) - np.maximum(a.min(axis=1)[:, None], b.min(axis=1))
     i, j = np.nonzero((boxed > depth).all(axis=-1))
     pair_a, pair_b = a[i], b[j]
@@ -123,25 +126,25 @@ def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) 
 
 
 def _lies_on(area: Floats, i: int, j: int) -> bool:
-    """Whether wall i, the lower number, lies on wall j where they overlap: it is smaller, or alike."""
+    """Whether wall i, of the lower number, lies on the coplanar wall j: its area (W,) is smaller, or alike."""
     return bool(area[i] <= area[j] * (1.0 + ALIKE))
 
 
 def _areas(triangles: Floats, owner: Integers, count: int) -> Floats:
-    """(W,) [m^2] of walls that may be coplanar."""
+    """Areas (W,) [m^2] of walls, each the sum over its triangles (T, 3, 3)."""
     area = np.zeros(count)
     np.add.at(area, owner, triangle_areas(triangles))
     return area
 
 
 def _members(owner: Integers, count: int) -> list[Integers]:
-    """Triangles of each wall that may be coplanar."""
+    """Numbers of the triangles that belong to each wall."""
     order = np.argsort(owner, kind="stable")
     return np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
 
 
 def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:
-    """(W,) the largest wall of all coplanar ones that hang together with each."""
+    """Number (W,) of the largest wall among all coplanar walls that overlapping pairs connect with each wall."""
     plane = np.arange(len(area))
     for _ in pairs:  # a chain of n pairs settles within n rounds
         before = plane.copy()

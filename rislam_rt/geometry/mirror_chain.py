@@ -9,18 +9,20 @@ from rislam_rt.geometry.planes import mirror, plane_tangents
 
 
 class MirrorChain(NamedTuple):
-    """A point mirrored in D walls, one after the other."""
+    """Mirror image of a point in D walls, one after the other, with its derivatives by the point and by the walls."""
 
     image: Floats
-    """(..., 3) [m]."""
+    """Mirror image (..., 3) [m] after all D walls."""
     linear: Floats
-    """(3, 3) derivative of the image with respect to the point."""
+    """Derivative (3, 3) of the image with respect to the point."""
     planes: Floats
-    """(..., D, 3, 3): wall, coordinate, and two tilts [1/rad] and the offset [1] of that wall."""
+    """Derivatives (..., D, 3, 3) by wall and coordinate of the image with respect to that wall's two tilts [m/rad] and
+    offset [1]."""
 
 
 def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> MirrorChain:
-    """Mirror points (..., 3) in planes (D, 3), (D,) in turn, with derivatives by the chain rule."""
+    """Mirror points (..., 3) in D planes, normals (D, 3) and offsets (D,) [m], one after the other, with derivatives by
+    the chain rule."""
     depth = len(offset)
     linear = np.eye(3)
     planes = np.zeros((*point.shape[:-1], depth, 3, 3))

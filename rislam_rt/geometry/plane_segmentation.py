@@ -1,4 +1,4 @@
-"""Flat parts of a mesh: which triangles lie in one plane, and the plane that fits all their corners."""
+"""Plane segmentation of a triangle mesh: which triangles lie in one plane, and the plane that fits their corners."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,34 +12,35 @@ FLOAT32_ROUNDING = 2.0**-24
 """Largest relative error of a coordinate held in float32, as mesh files hold them."""
 
 EXACT = 16.0 * 2.0**-52
-"""A plane that all corners keep to this (relative to the coordinates) is exact: a fit could only add rounding."""
+"""Distance from a plane, relative to the corners' coordinates, within which it is exact: a fit would add rounding."""
 
 _GENERIC = np.array([0.36, 0.48, 0.80])
 """A unit vector in no special direction, along which normals are sorted."""
 
 
 class PlanarRegions(NamedTuple):
-    """G planes of T triangles, numbered in the order of first appearance."""
+    """Segmentation of T triangles into G planes, numbered in the order of first appearance."""
 
     group: Integers
-    """(T,)."""
+    """Number (T,) of each triangle's plane."""
     normal: Floats
-    """(G, 3) unit normals, on the side of the group's first triangle."""
+    """Unit normals (G, 3) of the planes, on the side of the group's first triangle."""
     offset: Floats
-    """(G,) [m]."""
+    """Offsets (G,) [m] of the planes along their normals."""
 
 
 class _Mesh(NamedTuple):
-    """T triangles sorted by the component of their normals along `_GENERIC`, sign dropped."""
+    """Mesh of T triangles, sorted by the component of their normals along `_GENERIC`, sign dropped."""
 
     triangles: Floats
     normal: Floats
     key: Floats
     slack: Floats
-    """(T,) [rad] how far a triangle's normal may be from that of its plane."""
+    """Angle (T,) [rad] by which a triangle's normal may differ from that of its plane."""
 
     def in_plane(self, normal: Floats, distance: float, turn: float, offset: float) -> Integers:
-        """Triangles whose normals agree with a plane's within `slack + turn`, all corners within `offset` [m]."""
+        """Rows of the triangles that lie in a plane: normals that agree within `slack + turn`, and all corners within
+        `offset` [m]."""
         here, widest = abs(float(_GENERIC @ normal)), float(self.slack.max()) + turn
         low, high = np.searchsorted(self.key, [here - widest, here + widest])
         angle = np.linalg.norm(np.cross(self.normal[low:high], normal), axis=-1)
@@ -48,7 +49,7 @@ class _Mesh(NamedTuple):
 
 
 def planar_regions(triangles: Floats, angle: float, offset: float) -> PlanarRegions:
-    """Part a mesh (T, 3, 3) into planes, and fit each to all its corners.
+    """Segment a triangle mesh (T, 3, 3) into planes, each fitted to all the corners of its triangles.
 
     A triangle belongs to a plane when its normal agrees up to sign within `angle` [rad], and what float32 corners do to
     the normal of so small a triangle besides, and when all its corners lie within `offset` [m]. Planes grow from the
@@ -79,14 +80,14 @@ def fit_plane(points: Floats, side: Floats) -> tuple[Floats, float]:
 
 
 def _seeds(slack: Floats, group: Integers) -> Iterator[int]:
-    """Triangles without a group, the surest normal first; looks at `group` as it fills."""
+    """Rows of the triangles from which planes are grown: those without a group yet, the most accurate normal first."""
     for seed in np.argsort(slack, kind="stable"):
         if group[seed] < 0:
             yield int(seed)
 
 
 def _sorted_mesh(triangles: Floats, angle: float) -> tuple[Integers, _Mesh]:
-    """The order, and the mesh in that order."""
+    """Order (T,) of a mesh's triangles by their normals along `_GENERIC`, and the mesh in that order."""
     normal, _ = triangle_planes(triangles)
     key = np.abs(normal @ _GENERIC)
     order = np.argsort(key, kind="stable")
@@ -97,7 +98,7 @@ def _sorted_mesh(triangles: Floats, angle: float) -> tuple[Integers, _Mesh]:
 
 
 def _grown(mesh: _Mesh, seed: int, free: Booleans, angle: float, offset: float) -> Integers:
-    """The free triangles of the plane that grows from a seed."""
+    """Rows of the free triangles that lie in the plane grown from a seed triangle."""
     normal = mesh.normal[seed]
     distance, turn = float(normal @ mesh.triangles[seed].mean(axis=0)), float(mesh.slack[seed]) - angle
     members = np.array([seed])
@@ -111,7 +112,8 @@ def _grown(mesh: _Mesh, seed: int, free: Booleans, angle: float, offset: float) 
 
 
 def _fitted(triangles: Floats, group: Integers) -> PlanarRegions:
-    """The plane of every group: that of its first triangle where it is exact, else the fit to all corners."""
+    """Planes of groups (T,) of triangles: that of a group's first triangle where it is exact, else the least-squares
+    fit to all corners."""
     normal, offset = triangle_planes(triangles)
     _, first = np.unique(group, return_index=True)
     normal, offset = normal[first], offset[first]

@@ -34,6 +34,6 @@ def plane_between(point: Floats, image: Floats) -> tuple[Floats, Floats]:
 
 
 def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors at right angles to a unit vector and to each other."""
+    """Two orthogonal unit vectors (3,) that span the plane of a unit normal (3,)."""
     first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
     return first, np.cross(normal, first)

@@ -7,7 +7,8 @@ from rislam_rt.geometry.angles import unit
 
 
 def triangle_cross(triangles: Floats) -> Floats:
-    """Normals (T, 3) [m^2] of triangles (T, 3, 3), each twice as long as its triangle is large."""
+    """Cross products (T, 3) [m^2] of two edges of triangles (T, 3, 3): normals, as long as twice the triangle's
+    area."""
     return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
@@ -42,7 +43,8 @@ def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
 
 
 def outline_edges(triangles: Floats, wall: Integers | None = None) -> Floats:
-    """Edges (E, 2, 3) [m] that only one of the triangles (T, 3, 3), or of those of its wall (T,), has: outlines.
+    """Outline edges (E, 2, 3) [m] of a mesh: those of one triangle (T, 3, 3) alone, or of one alone of its wall
+    (T,).
 
     Corners count as the same when they agree to a nanometre.
     """

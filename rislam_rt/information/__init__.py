@@ -1,4 +1,4 @@
-"""Floor 4: Fisher information of delays, gains and angles; what it says about positions; bounds over a trajectory."""
+"""Floor 4: Fisher information of delays, gains and angles, position bounds, and bounds over a trajectory."""
 
 from rislam_rt.information.accuracy import amplitude_std, cosine_information, measurement_std
 from rislam_rt.information.bound_outcome import Outcome

@@ -1,4 +1,4 @@
-"""Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
+"""Floor 5: the receiver. Received signal, noise, hardware, and multipath components with their standard deviations."""
 
 from rislam_rt.measurement.calibrate import calibrate
 from rislam_rt.measurement.components import path_std
@@ -11,7 +11,7 @@ from rislam_rt.measurement.received import Clutter, Received, phase_reversed, re
 from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, to_samples
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import capture, find_components
+from rislam_rt.measurement.waveform_receiver import capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [

@@ -1,4 +1,5 @@
-"""Floor 2: frozen data, checked once on construction. No behaviour beyond what a field's name promises."""
+"""Floor 2: frozen dataclasses of scene, radio, paths, measurement, estimate and result, checked once on construction.
+No behaviour beyond what a field's name promises."""
 
 from rislam_rt.model.antennas import Antennas
 from rislam_rt.model.estimate import MapEstimate, PanelCandidate, SlamEstimate, empty_map, pose_estimate

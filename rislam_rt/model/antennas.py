@@ -1,27 +1,31 @@
-"""Antennas of the agent: pattern and polarisation of either end."""
+"""Antennas of the agent: pattern and polarisation of Tx and Rx."""
 
 from dataclasses import dataclass
 
 from rislam_rt.errors import ConfigError
 
 PATTERNS = ("iso", "dipole", "hw_dipole", "tr38901")
-"""Isotropic, short dipole, half-wave dipole (both along z), and the sector of 3GPP TR 38.901 (8 dBi, along body x)."""
+"""Antenna patterns: isotropic, short dipole, half-wave dipole (both along z), and the sector of 3GPP TR 38.901 (8 dBi,
+along body x)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Antennas:
-    """Patterns of Tx and Rx, turned with the agent's heading, and their polarisation.
+    """Antenna patterns of Tx and Rx, turned with the agent's heading, and their polarisation.
 
     Landmarks are isotropic and re-radiate the polarisation of the Tx; what walls have turned into another one than the
     Rx has is lost.
     """
 
     tx: str = "iso"
+    """Pattern of the Tx, one of `PATTERNS`."""
     rx: str = "iso"
+    """Pattern of the Rx, one of `PATTERNS`."""
     polarization: str = "V"
-    """`V` or `H`, of the Tx,"""
+    """Polarisation of the Tx, `V` or `H`."""
     rx_polarization: str = ""
-    """...and of the Rx, where it is another: a crossed link hears only what walls have turned."""
+    """Polarisation of the Rx, `V` or `H`; empty: that of the Tx. A crossed link receives only what walls have
+    turned."""
 
     def __post_init__(self) -> None:
         for name in ("tx", "rx"):
@@ -36,20 +40,21 @@ class Antennas:
 
     @property
     def of_tx(self) -> tuple[str, str]:
-        """Pattern and polarisation of the Tx."""
+        """Pattern and polarisation of the agent's Tx antenna."""
         return self.tx, self.polarization
 
     @property
     def of_rx(self) -> tuple[str, str]:
-        """Pattern and polarisation of the Rx."""
+        """Pattern and polarisation of the agent's Rx antenna."""
         return self.rx, self.rx_polarization or self.polarization
 
     @property
     def of_landmark(self) -> tuple[str, str]:
-        """Pattern and polarisation of what re-radiates."""
+        """Pattern and polarisation with which a landmark (scatterer or RIS panel) re-radiates: isotropic, polarised as
+        the Tx."""
         return "iso", self.polarization
 
     @property
     def plain(self) -> bool:
-        """Whether both ends are isotropic and vertical."""
+        """Whether the antennas of Tx and Rx are both isotropic and vertically polarised."""
         return self.of_tx == self.of_rx == ("iso", "V")

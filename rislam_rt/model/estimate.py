@@ -11,32 +11,32 @@ from rislam_rt.model.trajectory import Body
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapEstimate:
-    """N landmarks and W walls.
+    """A filter's estimated map: N landmarks (points and mirror images) and W walls.
 
     A landmark without a parent is a point that scatters from where it is (a scatterer or the panel). One with a parent
     is the parent's mirror image in a wall: its paths run Tx, parent, image, Rx, and the reciprocal.
     """
 
     ident: Integers
-    """(N,) number of the landmark, the same for all its life."""
+    """(N,) number of the landmark, the same as long as the map holds it."""
     position: Floats
-    """(N, 3) [m]."""
+    """(N, 3) [m] estimated positions."""
     covariance: Floats
-    """(N, 3, 3) [m^2]."""
+    """(N, 3, 3) [m^2] of the positions."""
     parent: Integers
-    """(N,) row of the parent, -1 for a point."""
+    """(N,) row of the landmark whose mirror image this is, -1 for a point."""
     ris_probability: Floats
-    """(N,) probability of being the panel, of several the likeliest; 0 for images."""
+    """(N,) probability that the landmark is a RIS panel, of several panels the likeliest; 0 for images."""
     strength: Floats
     """(N,) estimated square root of the cross-section [m]; for an image, amplitude ratio to the parent's law."""
     wall_normal: Floats
-    """(W, 3) unit normals, from the room's inside outwards as seen by the agent."""
+    """(W, 3) unit normals of the walls, from the room's inside outwards as seen by the agent."""
     wall_offset: Floats
-    """(W,) [m]: `normal . x = offset`."""
+    """(W,) [m] offset of each wall's plane: `normal . x = offset`."""
     wall_std: Floats
     """(W, 2) standard deviations of angle [rad] and offset [m]."""
     panel: Any = None
-    """(N,) number of the panel that `ris_probability` is about; None: 0, the only one."""
+    """(N,) number of the RIS panel that `ris_probability` is about; None: 0, the only panel."""
 
     def __post_init__(self) -> None:
         count, walls = len(np.asarray(self.ident)), len(np.asarray(self.wall_offset))
@@ -64,11 +64,12 @@ class MapEstimate:
 
     @property
     def ris(self) -> int:
-        """Row of the landmark held for the panel, of several for the first: see `panel_row`."""
+        """Row of the landmark that is identified as the RIS panel, of several panels as the first; -1 if none is. See
+        `panel_row`."""
         return self.panel_row(0)
 
     def panel_row(self, panel: int) -> int:
-        """Row of the landmark held for a panel (probability above one half), -1 if none is."""
+        """Row of the map's landmark that is identified as a RIS panel (probability above one half), -1 if none is."""
         number = np.zeros(len(self.ident)) if self.panel is None else self.panel
         probability = np.where(number == panel, self.ris_probability, 0.0)
         best = int(np.argmax(probability)) if len(probability) else -1
@@ -76,35 +77,35 @@ class MapEstimate:
 
 
 class PanelCandidate(NamedTuple):
-    """Something that may be the panel."""
+    """Position that may be that of a RIS panel which the map does not hold yet; the search code is aimed at it."""
 
     position: Floats
     """(3,) [m]."""
     hits: int
-    """How often it was measured."""
+    """Number of measurements that support it."""
     panel: int = 0
-    """Number of the panel that it may be."""
+    """Number of the RIS panel that it may be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamEstimate:
-    """Pose and map after a cycle (or predicted for the next)."""
+    """Estimated pose and map of a SLAM filter after a cycle, or predicted for the next."""
 
     position: Floats
-    """(3,) [m]."""
+    """(3,) [m] of the agent."""
     velocity: Floats
-    """(3,) [m/s]."""
+    """(3,) [m/s] of the agent."""
     heading: float
     """[rad]."""
     covariance: Floats
-    """(6, 6) of position and velocity."""
+    """(6, 6) covariance of position and velocity."""
     samples: Floats
-    """(S, 3) positions drawn from the belief [m], equally likely; design averages over them."""
+    """(S, 3) [m] agent positions drawn from the belief, equally likely; design averages over them."""
     body: Body
     map: MapEstimate
     suspects: tuple[PanelCandidate, ...] = ()
-    """What may be a panel, for each that the map holds no landmark for, if anything may; empty where no design is to
-    follow (see `slam.predict`)."""
+    """Panel candidates: at most one for each RIS panel that the map holds no landmark for; empty where no code is to be
+    designed (see `slam.predict`)."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))
@@ -120,12 +121,13 @@ class SlamEstimate:
 def pose_estimate(
     position: Floats, velocity: Floats, heading: float, covariance: Floats, body: Body, known: MapEstimate | None = None
 ) -> SlamEstimate:
-    """The estimate of a pose: position, velocity (3,) [m, m/s] covariance (6, 6); an empty map if none is given."""
+    """`SlamEstimate` of a pose without a filter: position (3,) [m], velocity (3,) [m/s], heading [rad] and covariance
+    (6, 6); an empty map if none is given."""
     return SlamEstimate(position, velocity, heading, covariance, np.asarray(position)[None], body, known or empty_map())
 
 
 def empty_map() -> MapEstimate:
-    """An estimated map of nothing."""
+    """Estimated map without landmarks and walls."""
     none: list[Any] = []
     return MapEstimate(
         np.array(none), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.array(none), np.array(none), np.array(none),

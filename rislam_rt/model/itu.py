@@ -22,11 +22,13 @@ ITU_MATERIALS: dict[str, tuple[tuple[float, float, float, float, float, float], 
     "medium_dry_ground": ((1.0, 10.0, 15.0, -0.1, 0.035, 1.63),),
     "wet_ground": ((1.0, 10.0, 30.0, -0.4, 0.15, 1.3),),
 }
-"""ITU-R P.2040-4, table 3: lowest and highest frequency [GHz], a, b, c, d."""
+"""Building materials of ITU-R P.2040-4, table 3: lowest and highest frequency [GHz] and the constants a, b, c, d of
+each range."""
 
 
 def itu_parameters(name: str, carrier: float) -> tuple[float, float, float, float]:
-    """a, b, c, d of an ITU material at the carrier [Hz].
+    """Constants a, b, c, d of an ITU-R P.2040 material at the carrier [Hz]: with f in GHz, the relative permittivity is
+    `a f^b` and the conductivity `c f^d` [S/m].
 
     Raises
     ------

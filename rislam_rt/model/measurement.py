@@ -1,4 +1,5 @@
-"""The measurement of one cycle that the receiver reports, and, kept apart, what it was."""
+"""Measurement of one cycle: the multipath components that the receiver reports, and, kept apart for scoring, the true
+path of each."""
 
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from rislam_rt.geometry.angles import angles_from_direction
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """M multipath components of one cycle, in no particular order. All that the agent gets to see.
+    """Measurement of one cycle: M multipath components, in no particular order. All that the agent gets to see.
 
     The angle of arrival is held as direction cosines along the array's axes (body frame): the errors of a planar array
     are Gaussian in them, the same at every angle, and do not wrap. The third cosine is not negative (array looks up).
@@ -21,18 +22,19 @@ class Measurement:
     cosines: Floats
     """(M, 2) direction cosines of the arriving ray along body x and y."""
     amplitude: Floats
-    """(M,) |alpha|."""
+    """(M,) magnitude |alpha| of the estimated path gain."""
     tau_std: Floats
-    """(M,) standard deviation [s], from the measured amplitude through the bound."""
+    """(M,) standard deviation [s] of the delay, from the measured amplitude through the bound."""
     cosines_std: Floats
-    """(M, 2) standard deviations, likewise."""
+    """(M, 2) standard deviations of the direction cosines, likewise."""
     amplitude_std: Floats
-    """(M,)."""
+    """(M,) standard deviation of the amplitude."""
     from_panel: Floats | None = None
-    """(M,) probability that it ran over the panel, if a path made it: what is found in the difference of a code and its
-    phase-reversed twin did, unless motion within the slot left it there. None where the receiver does not alternate."""
+    """(M,) probability that a component ran over a RIS panel, given that a path made it: what is found in the
+    difference of a code and its phase-reversed partner did, unless motion within the slot left it there. None where the
+    receiver does not alternate."""
     panel: Integers | None = None
-    """(M,) number of the panel that `from_panel` is about, the likeliest of several; None where there is one."""
+    """(M,) number of the RIS panel that `from_panel` is about, the likeliest of several; None where there is one."""
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.tau))
@@ -59,7 +61,7 @@ class Measurement:
 
     @property
     def arrival(self) -> Floats:
-        """(M, 3) unit vectors in the body frame, from the Rx towards the arriving ray."""
+        """Unit vectors (M, 3) of a measurement's components in the body frame, from the Rx towards the arriving ray."""
         z = np.sqrt(np.clip(1.0 - np.sum(self.cosines**2, axis=-1), 0.0, None))
         vector = np.concatenate([self.cosines, z[:, None]], axis=-1)
         return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
@@ -72,7 +74,8 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathTruth:
-    """For scoring only: which path column each measurement came from (M,), -1 for clutter. Never shown to the agent."""
+    """True path of each component of a measurement: its column among the paths (M,), -1 for clutter. For scoring only,
+    never shown to the agent."""
 
     path: Integers
 

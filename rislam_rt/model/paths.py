@@ -1,4 +1,4 @@
-"""Propagation paths over a trajectory: one column an identity, one row a cycle."""
+"""Propagation paths over a trajectory: one column for each path identity, one row for each cycle."""
 
 from copy import copy
 from dataclasses import dataclass
@@ -12,7 +12,9 @@ from rislam_rt.geometry.angles import angles_from_direction
 
 
 class PathKind(IntEnum):
-    """Path classes. VS and VRIS hold the reciprocal (walls on the Tx leg) and the class with walls on both legs."""
+    """Kinds of propagation paths: direct (LOS), over walls alone (VT), over a point scatterer (PS) or a RIS panel
+    (RIS), and the last two with walls as well (VS, VRIS). VS and VRIS hold the reciprocal (walls on the Tx leg) and the
+    class with walls on both legs."""
 
     LOS = 0
     VT = 1
@@ -24,22 +26,23 @@ class PathKind(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisLegs:
-    """Per-element response of the legs between the agent's ends and the panels, 0 at elements of other panels.
+    """Response of each RIS element on the legs of paths over a panel, from the Tx and to the Rx; 0 at elements of other
+    panels.
 
     With the code's phases xi the gain of the path over Tx leg i and Rx leg j is
     `sum_nm tx[k, i, n, m] exp(-j xi[n, m]) rx[k, j, n, m]`: linear in exp(-j xi), so a new code needs no new trace.
     """
 
     tx: Complexes
-    """(K, I, N, M)."""
+    """(K, I, N, M) of the I legs between Tx and panel."""
     rx: Complexes
-    """(K, J, N, M)."""
+    """(K, J, N, M) of the J legs between panel and Rx."""
     tx_leg: Integers
-    """(P,) Tx leg of each path, -1 where the path does not meet the panel."""
+    """(P,) Tx leg of each path, -1 where the path does not meet a panel."""
     rx_leg: Integers
-    """(P,) Rx leg of each path, -1 where the path does not meet the panel."""
+    """(P,) Rx leg of each path, -1 where the path does not meet a panel."""
     spans: tuple[slice, ...] = (slice(None),)
-    """Where the elements of each panel stand among all, row by row."""
+    """Slice of each RIS panel's elements among the elements of all panels, counted row by row."""
 
     def __post_init__(self) -> None:
         freeze(self, "tx", np.complex128, (None, None, None, None))
@@ -50,7 +53,8 @@ class RisLegs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Paths:
-    """K cycles by P identities. Where `valid` is False the other entries are zero and mean nothing.
+    """Propagation paths of P identities over K cycles. Where `valid` is False the other entries are zero and mean
+    nothing.
 
     A path's identity is (kind, landmark, tx_walls, rx_walls), walls in the order of travel; no two columns share one.
     """
@@ -64,7 +68,7 @@ class Paths:
     rx_walls: Integers
     """(P, D) walls between landmark and Rx, padded with -1."""
     valid: Booleans
-    """(K, P)."""
+    """(K, P) whether the path exists in the cycle."""
     tau: Floats
     """(K, P) delay [s]."""
     departure: Floats
@@ -80,11 +84,13 @@ class Paths:
     walls: tuple[str, ...]
     """Names of the walls; a wall is a reflector's plane, `name` or `name#facet`."""
     landmarks: tuple[str, ...]
+    """Names of the landmarks: the scatterers, then the RIS panels."""
     ris: RisLegs | None = None
+    """Element responses of the paths over RIS panels; None in a room without one."""
     source: str = ""
     """How the set was found: `traced`, `traced, refined` or `image source`, and among which wall sequences."""
     num_panels: int = 1
-    """Panels of the room, the last of `landmarks`; 1 without one, where it plays no part."""
+    """Number of RIS panels of the room, the last of `landmarks`; 1 in a room without one, where it plays no part."""
 
     def __post_init__(self) -> None:
         cycles, paths = np.shape(self.valid)
@@ -112,46 +118,47 @@ class Paths:
 
     @property
     def num_cycles(self) -> int:
-        """K, cycles of the paths."""
+        """Number K of cycles of the propagation paths."""
         return self.valid.shape[0]
 
     @property
     def num_paths(self) -> int:
-        """P, columns of paths."""
+        """Number P of path identities, the columns of a set of propagation paths."""
         return self.valid.shape[1]
 
     @property
     def aod(self) -> tuple[Floats, Floats]:
-        """Angles of departure of paths, theta_t, phi_t (K, P) [rad]."""
+        """Angles of departure theta_t, phi_t (K, P) [rad] of propagation paths."""
         return angles_from_direction(self.departure)
 
     @property
     def aoa(self) -> tuple[Floats, Floats]:
-        """Angles of arrival of paths, theta_r, phi_r (K, P) [rad]."""
+        """Angles of arrival theta_r, phi_r (K, P) [rad] of propagation paths."""
         return angles_from_direction(self.arrival)
 
     @property
     def panel(self) -> Integers:
-        """(P,) number of the panel that each path meets, -1 for none."""
+        """(P,) number of the RIS panel that each propagation path meets, -1 for none."""
         over_panel = (self.kind == PathKind.RIS) | (self.kind == PathKind.VRIS)
         first = len(self.landmarks) - self.num_panels if self.num_panels > 1 else self.landmark
         return np.where(over_panel, self.landmark - first, -1)
 
     def identity(self, path: int) -> tuple[int, int, tuple[int, ...], tuple[int, ...]]:
-        """Identity of a path's column (kind, landmark, tx_walls, rx_walls), without padding."""
+        """Identity (kind, landmark, tx_walls, rx_walls) of one propagation path, without padding."""
         tx = tuple(int(w) for w in self.tx_walls[path] if w >= 0)
         rx = tuple(int(w) for w in self.rx_walls[path] if w >= 0)
         return int(self.kind[path]), int(self.landmark[path]), tx, rx
 
     def label(self, path: int) -> str:
-        """A column's identity for people, e.g. `VS wall_y0 sphere | wall_x0`: Rx walls after the bar."""
+        """Text of a propagation path's identity, e.g. `VS wall_y0 sphere | wall_x0`: walls of the Rx leg after the
+        bar."""
         kind, landmark, tx, rx = self.identity(path)
         names = [self.walls[w] for w in tx] + ([self.landmarks[landmark]] if landmark >= 0 else [])
         text = " ".join([PathKind(kind).name, *names])
         return f"{text} | {' '.join(self.walls[w] for w in rx)}" if rx else text
 
     def of_cycle(self, cycle: int) -> "Paths":
-        """The paths of one cycle alone, as views: nothing is copied and checked again."""
+        """Propagation paths of one cycle alone, as views: nothing is copied and checked again."""
         one, paths = slice(cycle, cycle + 1), copy(self)
         for name in ("valid", "tau", "departure", "arrival", "gain", "vertices"):
             object.__setattr__(paths, name, getattr(self, name)[one])
@@ -163,7 +170,7 @@ class Paths:
         return paths
 
     def with_gain(self, gain: Any) -> "Paths":
-        """The same paths with other gains (K, P); all else is shared, not copied and checked again."""
+        """The same propagation paths with other gains (K, P); all else is shared, not copied and checked again."""
         paths = copy(self)
         object.__setattr__(paths, "gain", frozen(gain, np.complex128, self.valid.shape, "Paths.gain"))
         return paths

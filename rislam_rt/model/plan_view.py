@@ -1,4 +1,4 @@
-"""Plan of a room as SVG text, a small view from above: what a notebook shows of a scene or a result."""
+"""Plan of a room as SVG text, a small view from above that a notebook shows of a scene or a result."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -9,28 +9,28 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 
 WIDTH, MARGIN = 300.0, 12.0
-"""Of the picture [px]."""
+"""Width and margin [px] of a plan's picture."""
 MOST_LINES = 4000
-"""Of a room's outline: a mesh of more edges is shown by its bounds alone, or a notebook would crawl."""
+"""Most edges of a room's outline that a plan draws; of a mesh with more it draws none, or a notebook would crawl."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Of ways, one after the other (Okabe and Ito's)."""
+"""Colours of the trajectories in a plan, one after the other (Okabe and Ito's)."""
 
 
 class PlanView(NamedTuple):
-    """What is drawn, all in metres and seen from above."""
+    """Content of a room's plan, seen from above: outline, named points and named trajectories, all in metres."""
 
     bounds: Floats
-    """(2, 3) lowest and highest corner."""
+    """(2, 3) lowest and highest corner of the room."""
     outline: Floats
     """(E, 2, 3) line segments."""
     points: Sequence[tuple[str, Floats]]
-    """Names and places (3,)."""
+    """Names and positions (3,) of landmarks."""
     ways: Sequence[tuple[str, Floats]]
-    """Names and courses (K, 3)."""
+    """Names and positions (K, 3) of trajectories."""
 
 
 def plan_svg(plan: PlanView) -> str:
-    """The plan as an SVG element; names appear on hovering."""
+    """Draw a room's plan as an SVG element; names appear on hovering."""
     low = plan.bounds[0, :2]
     size = np.maximum(plan.bounds[1, :2] - low, 1e-9)
     scale = (WIDTH - 2 * MARGIN) / size.max()
@@ -59,14 +59,15 @@ def plan_svg(plan: PlanView) -> str:
 
 
 def outline(meshes: Iterable[tuple[Floats, Integers]]) -> Floats:
-    """Edges (E, 2, 3) [m] at which a mesh ends, of meshes given as vertices and faces; none if they are too many."""
+    """Edges (E, 2, 3) [m] to draw of meshes (vertices and faces) in a plan: open ones, and those between faces that are
+    not in one plane; none if they are more than `MOST_LINES`."""
     found = [_open_edges(vertices, faces) for vertices, faces in meshes]
     edges = np.concatenate(found) if found else np.zeros((0, 2, 3))
     return edges if len(edges) <= MOST_LINES else np.zeros((0, 2, 3))
 
 
 def _open_edges(vertices: Floats, faces: Integers) -> Floats:
-    """Edges (E, 2, 3) of one face alone, or between faces that are not in one plane."""
+    """Edges (E, 2, 3) of a mesh that one face alone has, or that lie between faces which are not in one plane."""
     points, same = np.unique(np.round(vertices, 6), axis=0, return_inverse=True)
     corners = same.reshape(-1)[faces]
     edges, edge = np.unique(
@@ -83,5 +84,5 @@ def _open_edges(vertices: Floats, faces: Integers) -> Floats:
 
 
 def html_with(text: str, plan: PlanView) -> str:
-    """A line of text over the plan, as a notebook shows it."""
+    """HTML of a line of text above a room's plan, as a notebook shows it."""
     return f"<div><code>{escape(text)}</code><br>{plan_svg(plan)}</div>"

@@ -12,7 +12,8 @@ from rislam_rt.model.antennas import Antennas
 
 @dataclass(frozen=True, slots=True)
 class RxArray:
-    """Planar array in the body's x-y plane, boresight up, rows along body x and columns along body y.
+    """Receive array of the agent: planar, in the body's x-y plane, boresight up, rows along body x and columns along
+    body y.
 
     Elements are isotropic over the upper hemisphere and blind below it (`upper`), or isotropic (`isotropic`).
     A planar array cannot tell a direction from its mirror image in the array's plane; the blind side settles that.
@@ -21,8 +22,9 @@ class RxArray:
     rows: int = 4
     cols: int = 4
     spacing: float = 0.5
-    """Distance between neighbours, in wavelengths."""
+    """Distance between neighbouring elements, in wavelengths."""
     pattern: str = "upper"
+    """Element pattern, `upper` or `isotropic`."""
 
     def __post_init__(self) -> None:
         if self.rows < 1 or self.cols < 1:
@@ -34,11 +36,11 @@ class RxArray:
 
     @property
     def num_antennas(self) -> int:
-        """L of the paper, antennas of the radio's Rx array."""
+        """Number L of antennas of the radio's receive array."""
         return self.rows * self.cols
 
     def positions(self, wavelength: float) -> Floats:
-        """Element positions (L, 3) [m] of the radio's Rx array in the body frame, about its centre."""
+        """Element positions (L, 3) [m] of the radio's receive array in the body frame, about its centre."""
         x = (np.arange(self.rows) - (self.rows - 1) / 2.0) * self.spacing * wavelength
         y = (np.arange(self.cols) - (self.cols - 1) / 2.0) * self.spacing * wavelength
         xx, yy = np.meshgrid(x, y, indexing="ij")
@@ -47,22 +49,24 @@ class RxArray:
 
 @dataclass(frozen=True, slots=True)
 class RadioConfig:
-    """Everything that the radio, not the room, decides. SI units; gains and ratios are linear."""
+    """Parameters of the agent's radio: carrier, bandwidth, gains, signal energy, noise and receive array. SI units;
+    gains and ratios are linear."""
 
     carrier: float = 10e9
     """Carrier frequency [Hz]."""
     bandwidth: float = 1e9
     """Bandwidth of the flat band [Hz]."""
     tx_gain: float = 1.0
+    """Power gain of the Tx antenna, the same in all directions; times the pattern in `antennas`."""
     rx_gain: float = 1.0
-    """Of either antenna, in all directions; times what `antennas` say of a direction."""
+    """Power gain of the Rx antenna, the same in all directions; times the pattern in `antennas`."""
     energy: float = 1.0
     """E: energy of one sounding signal [J]."""
     noise_psd: float = 3.52e-11
     """N0: noise power spectral density [W/Hz]; by default the paper's sphere, 3 m away, has 13 dB over 16 antennas."""
     array: RxArray = field(default_factory=RxArray)
     antennas: Antennas = field(default_factory=Antennas)
-    """Pattern and polarisation of either end; isotropic and vertical by default."""
+    """Pattern and polarisation of Tx and Rx; isotropic and vertical by default."""
 
     def __post_init__(self) -> None:
         for name in ("carrier", "bandwidth", "tx_gain", "rx_gain", "energy", "noise_psd"):
@@ -79,9 +83,10 @@ class RadioConfig:
 
     @property
     def effective_bandwidth_squared(self) -> float:
-        """zeta^2 [Hz^2] of a flat band: B^2 / 12."""
+        """Square zeta^2 = B^2 / 12 [Hz^2] of the effective bandwidth of the radio's flat band."""
         return self.bandwidth**2 / 12.0
 
     def integrated_snr(self, gain: Floats | Complexes) -> Floats:
-        """L E |alpha|^2 / N0 of path gains (...,): after integration over the signal and all L antennas, linear."""
+        """Integrated SNR L E |alpha|^2 / N0 of path gains alpha (...,): after integration over the signal and all L
+        antennas, linear."""
         return self.array.num_antennas * self.energy * np.abs(gain) ** 2 / self.noise_psd

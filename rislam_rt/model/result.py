@@ -1,4 +1,4 @@
-"""The result of a run: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
+"""Result of a run: for each scheme, everything cycle by cycle, and all that is needed to repeat it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,24 +16,26 @@ STEPS = ("optimise", "communicate", "measure", "localise")
 """The four steps of a cycle, in their order."""
 
 NOTHING = -9
-"""In `SchemeResult.component_path` and `.component_landmark`: no component in this column."""
+"""Value in `SchemeResult.component_path` and `.component_landmark` of a column that holds no component."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SchemeResult:
-    """One scheme over K cycles; P path identities, I landmarks ever held, up to M components a cycle."""
+    """Result of one scheme (filter and code policy) over K cycles, with P path identities, I landmarks ever held, and
+    up to M components a cycle."""
 
     scheme: str
+    """Name of the scheme."""
     time: Floats
     """(K,) [s] of the cycle's measurement."""
     position: Floats
-    """(K, 3) estimated [m]."""
+    """(K, 3) [m] estimated positions of the agent."""
     velocity: Floats
-    """(K, 3) estimated [m/s]."""
+    """(K, 3) [m/s] estimated velocities of the agent."""
     heading: Floats
-    """(K,) [rad]."""
+    """(K,) [rad] headings of the agent."""
     covariance: Floats
-    """(K, 6, 6) of position and velocity, as the filter believes."""
+    """(K, 6, 6) covariance of position and velocity, as the filter believes."""
     sent: Integers
     """(K, N, M) code that the agent sent; (K, 0, 0) without a panel."""
     applied: Integers
@@ -56,20 +58,20 @@ class SchemeResult:
     landmark_position: Floats
     """(K, I, 3) its estimated position [m], zero where it was not held."""
     ris_probability: Floats
-    """(K, I) probability of being the panel."""
+    """(K, I) probability that the landmark is a RIS panel."""
     seconds: Floats
     """(K, 4) time [s] that each of `STEPS` took."""
     info: Mapping[str, Floats]
     """Diagnostics of the filter, (K,) each."""
     outcome: tuple[str, ...]
-    """(K,) how each cycle went, in the filter's words."""
+    """(K,) how each cycle went, by the filter's own word."""
     map: MapEstimate
-    """After the last cycle."""
+    """Estimated map after the last cycle."""
     panel: Any = None
-    """(K, I) which of several panels `ris_probability` is about; None: there is one."""
+    """(K, I) which of several RIS panels `ris_probability` is about; None: there is one."""
     smoothed: Any = None
-    """(K, 3) positions with hindsight [m], of filters that look back (`slam.filter = "window"`: 40 cycles, fewer at the
-    end); None of others, and of runs in slices."""
+    """(K, 3) [m] positions smoothed with later measurements, of filters that do so (`slam.filter = "window"`: 40 cycles
+    later, fewer at the end); None of others, and of runs in slices."""
     given: Any = None
     """What the estimator was given, cycle by cycle, and the seed that it drew from
     (`rislam_rt.pipeline.recordings.inputs.RecordedInputs`); None where the result was read from a file: it
@@ -102,7 +104,8 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """(K, I) whether a scheme's landmark was held for a panel."""
+        """Whether (K, I) each of a scheme's landmarks was identified as a given RIS panel in each cycle (probability
+        above one half)."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:
@@ -112,25 +115,27 @@ class SchemeResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamResult:
-    """A whole run."""
+    """Result of a whole run: the true scene and paths, the result of each scheme, and all that is needed to repeat
+    it."""
 
     name: str
-    """Of the pipeline."""
+    """Name of the pipeline."""
     scene: Scene
     """The true room, with the trajectory cut to the cycles of the run."""
     paths: Paths
     """The true paths, panel at level 0; each scheme holds its own gains."""
     schemes: Mapping[str, SchemeResult]
+    """Result of each scheme, by name."""
     config: Mapping[str, Any]
-    """The whole specification, defaults filled in."""
+    """The whole specification of the run, defaults filled in."""
     seed: int | None
-    """None if the caller gave a generator of another origin."""
+    """Seed of the run; None if the caller gave a generator of another origin."""
     versions: Mapping[str, str]
-    """Of this package, of Python and of the libraries that numbers depend on."""
+    """Versions of this package, of Python and of the libraries that numbers depend on."""
     seconds: Mapping[str, float] = field(default_factory=dict)
     """Time [s] of the stages that all schemes share."""
     warnings: tuple[str, ...] = ()
-    """Where a formula left its range, one line each."""
+    """Warnings of formulas used outside their range of validity, one line each."""
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {self._rmse(scheme):.3g} m" for name, scheme in self.schemes.items())
@@ -144,5 +149,6 @@ class SlamResult:
         return html_with(repr(self), self.scene.plan(("true way", self.scene.agent.position), *ways))
 
     def _rmse(self, scheme: SchemeResult) -> float:
+        """Root mean square of a scheme's horizontal position error [m] over all cycles."""
         error = (scheme.position - self.scene.agent.position)[:, :2]
         return float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) if len(error) else 0.0

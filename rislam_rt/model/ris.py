@@ -1,5 +1,5 @@
-"""Reconfigurable surfaces (RIS): what their controller tells the agent, where they hang, and the code they are set
-to."""
+"""Reconfigurable intelligent surfaces (RIS): data sheets of panels, their true places, and the phase codes that they
+are set to."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,7 +13,7 @@ from rislam_rt.errors import ConfigError, SceneError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisSpec:
-    """Data sheet of a panel: all that its controller tells the agent. It does not say where the panel hangs.
+    """Data sheet of a RIS panel: all that its controller tells the agent. It does not say where the panel hangs.
 
     Rows run along `up`, columns along `right = up x normal`; element (n, m) lies at
     `center + (n - (N-1)/2) spacing[1] up + (m - (M-1)/2) spacing[0] right`.
@@ -22,7 +22,7 @@ class RisSpec:
     rows: int
     cols: int
     spacing: Floats
-    """(2,) [m]: between columns, between rows."""
+    """(2,) [m] distances between columns and between rows."""
     normal: Floats
     """(3,) unit vector out of the panel's front."""
     up: Floats
@@ -54,43 +54,46 @@ class RisSpec:
 
     @property
     def num_elements(self) -> int:
-        """N M, elements of a RIS."""
+        """Number N M of elements of a RIS panel."""
         return self.rows * self.cols
 
     @property
     def right(self) -> Floats:
-        """(3,) unit vector along a row of a RIS."""
+        """Unit vector (3,) along a row of a RIS panel's elements."""
         return np.cross(self.up, self.normal)
 
     @property
     def diagonal(self) -> float:
-        """D [m]: diagonal of the panel, each element counted with its full cell."""
+        """Diagonal D [m] of a RIS panel, each element counted with its full cell."""
         return float(np.hypot(self.cols * self.spacing[0], self.rows * self.spacing[1]))
 
     @property
     def panels(self) -> "tuple[RisSpec, ...]":
-        """This RIS panel alone."""
+        """Data sheets of the single RIS panels: here this one alone."""
         return (self,)
 
     def span(self, panel: int) -> slice:
-        """Where a RIS panel's elements stand among all, row by row: everywhere."""
+        """Slice of one RIS panel's elements among those of all panels: here all elements, as there is one panel."""
         return slice(0, self.num_elements)
 
     def parts(self, code: "RisCode") -> "tuple[RisCode, ...]":
-        """The code of each panel: the code itself."""
+        """Phase codes of the single RIS panels in a code for all of them: here the code itself, as there is one
+        panel."""
         return (code,)
 
     def place(self, panel: int, response: Complexes) -> Complexes:
-        """Element responses (..., N, M) of a panel among those of all: themselves."""
+        """Put the element responses (..., N, M) of one RIS panel among those of all panels: here they stay as they are,
+        as there is one panel."""
         return response
 
     def offsets(self) -> Floats:
-        """Element positions (N, M, 3) [m] about the panel's centre, in the room's axes; read-only."""
+        """Element positions (N, M, 3) [m] of a RIS panel about its centre, in the room's axes; read-only."""
         return _offsets(self)
 
 
 @lru_cache(maxsize=64)
 def _offsets(spec: RisSpec) -> Floats:
+    """Element positions (N, M, 3) [m] of a RIS panel about its centre, computed once for each data sheet."""
     n = (np.arange(spec.rows) - (spec.rows - 1) / 2.0) * spec.spacing[1]
     m = (np.arange(spec.cols) - (spec.cols - 1) / 2.0) * spec.spacing[0]
     offsets = n[:, None, None] * spec.up + m[None, :, None] * spec.right
@@ -100,7 +103,7 @@ def _offsets(spec: RisSpec) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisSpecs:
-    """Data sheets of several panels that one controller sets: one code for all their elements.
+    """Data sheets of several RIS panels that one controller sets: one code for all their elements.
 
     The code is one row of elements (1, E): those of the first panel row by row, then those of the next. A path over a
     panel has response 0 at the elements of the others, so that all that is linear in `exp(-j xi)` stays as it is.
@@ -117,53 +120,55 @@ class RisSpecs:
 
     @property
     def rows(self) -> int:
-        """1: the elements stand in one row."""
+        """Number of rows in which the elements of several RIS panels are counted: 1."""
         return 1
 
     @property
     def cols(self) -> int:
-        """E."""
+        """Number E of columns in which the elements of several RIS panels are counted: all stand in one row."""
         return self.num_elements
 
     @property
     def num_elements(self) -> int:
-        """E, elements of all RIS panels."""
+        """Number E of elements of all RIS panels together."""
         return sum(panel.num_elements for panel in self.panels)
 
     @property
     def levels(self) -> int:
-        """H: phase levels, the same for all panels."""
+        """Number H of phase levels, the same for all RIS panels of a room."""
         return self.panels[0].levels
 
     def span(self, panel: int) -> slice:
-        """Where one RIS panel's elements stand in the row of all."""
+        """Slice of one RIS panel's elements in the row of the elements of all panels."""
         first = sum(other.num_elements for other in self.panels[:panel])
         return slice(first, first + self.panels[panel].num_elements)
 
     def parts(self, code: "RisCode") -> "tuple[RisCode, ...]":
-        """The code (..., N, M) of each RIS panel."""
+        """Phase code (..., N, M) of each single RIS panel, cut from the code (..., 1, E) for all of them."""
         rows = [code.index[..., 0, self.span(panel)] for panel in range(len(self.panels))]
         shapes = [(*row.shape[:-1], panel.rows, panel.cols) for row, panel in zip(rows, self.panels, strict=True)]
         return tuple(RisCode(row.reshape(shape), code.levels) for row, shape in zip(rows, shapes, strict=True))
 
     def place(self, panel: int, response: Complexes) -> Complexes:
-        """Element responses (..., N, M) of a panel among those of all (..., 1, E): 0 at the others."""
+        """Put the element responses (..., N, M) of one RIS panel into the row (..., 1, E) of all panels' elements: 0 at
+        the others."""
         whole = np.zeros((*response.shape[:-2], 1, self.num_elements), dtype=response.dtype)
         whole[..., 0, self.span(panel)] = response.reshape(*response.shape[:-2], -1)
         return whole
 
 
 DataSheet: TypeAlias = RisSpec | RisSpecs
-"""What the agent is told of the panel, or of the panels."""
+"""Data sheet of one RIS panel, or of several that have one code."""
 
 
 def join_sheets(sheets: tuple[RisSpec, ...]) -> DataSheet:
-    """One data sheet of one or more RIS panels."""
+    """Join the data sheets of one or more RIS panels into one."""
     return sheets[0] if len(sheets) == 1 else RisSpecs(sheets)
 
 
 def join_codes(codes: "tuple[RisCode, ...]") -> "RisCode":
-    """One code of all RIS panels from the code (..., N, M) of each; that of a single panel is taken as it is."""
+    """Join the phase codes (..., N, M) of single RIS panels into one code for all of them; that of a single panel is
+    taken as it is."""
     if len(codes) == 1:
         return codes[0]
     rows = [code.index.reshape(*code.index.shape[:-2], 1, -1) for code in codes]
@@ -172,11 +177,11 @@ def join_codes(codes: "tuple[RisCode, ...]") -> "RisCode":
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisPanel:
-    """A panel in its place (truth): data sheet, centre and the reflector it is mounted on."""
+    """A RIS panel in its true place: data sheet, centre, and the reflector that it is mounted on."""
 
     spec: RisSpec
     center: Floats
-    """(3,) [m]."""
+    """(3,) [m] of the panel's elements."""
     host: str | None = None
     """Name of the reflector behind the panel, if any."""
     name: str = "ris"
@@ -186,13 +191,13 @@ class RisPanel:
 
     @property
     def panels(self) -> "tuple[RisPanel, ...]":
-        """This panel alone."""
+        """The RIS panels of the room: here this one alone."""
         return (self,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisPanels:
-    """Several panels of one room (truth), in the order of the scene file."""
+    """Several RIS panels of one room in their true places, in the order of the scene file."""
 
     panels: tuple[RisPanel, ...]
 
@@ -204,24 +209,26 @@ class RisPanels:
 
     @property
     def spec(self) -> RisSpecs:
-        """Their data sheets."""
+        """Data sheets of a room's RIS panels as one."""
         return RisSpecs(tuple(panel.spec for panel in self.panels))
 
 
 def join_panels(panels: tuple[RisPanel, ...]) -> RisPanel | RisPanels | None:
-    """The RIS panels of a room as a scene holds them: none, one, or several."""
+    """The RIS panels of a room as `Scene.ris` holds them: None, one `RisPanel`, or `RisPanels`."""
     return RisPanels(panels) if len(panels) > 1 else panels[0] if panels else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RisCode:
-    """A setting of the panel: level index (..., N, M) in 0..H-1; leading axes, if any, are cycles.
+    """Phase code of a RIS panel: level index (..., N, M) in 0..H-1 of each element; leading axes, if any, are cycles.
 
-    One of several panels has all their elements in one row, (..., 1, E): see `RisSpecs`.
+    The code of several panels has all their elements in one row, (..., 1, E): see `RisSpecs`.
     """
 
     index: Any
+    """(..., N, M) integers in 0..H-1."""
     levels: int
+    """H: number of phase levels, 2 pi / H apart."""
 
     def __post_init__(self) -> None:
         index = np.array(self.index)
@@ -235,5 +242,5 @@ class RisCode:
 
     @property
     def xi(self) -> Floats:
-        """Phase shifts (..., N, M) [rad]; an element multiplies its signal by exp(-j xi)."""
+        """Phase shifts (..., N, M) [rad] of a RIS panel's elements; an element multiplies its signal by exp(-j xi)."""
         return self.index * (2.0 * np.pi / self.levels)

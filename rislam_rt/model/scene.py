@@ -1,4 +1,4 @@
-"""A scene: reflecting meshes, point scatterers, panels, and the agent's true motion."""
+"""A scene: reflecting meshes, occluders, point scatterers, RIS panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,18 +12,17 @@ from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
 
 BODY_THICKNESS, BODY_LOSS, BODY_LEAST = 10.0, 0.1, 2e-3
-"""What stands for a constant R: its thickness [m]; the conductivity [S/m] that, times its refractive index, keeps the
-back of it from being seen; and the least 1 - R."""
+"""Dielectric body that stands for a constant reflection coefficient R: its thickness [m]; the conductivity [S/m] that,
+times its refractive index, keeps the back of it from being seen; and the least 1 - R."""
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """One of four: a constant reflection coefficient at every angle, one for each polarisation, a slab of an ITU-R
-    P.2040 material, or a slab of a permittivity and conductivity of one's own.
-    """
+    """Radio material of a reflector, one of four kinds: a reflection coefficient for every angle, one for each
+    polarisation, a slab of an ITU-R P.2040 material, or a slab of a given permittivity and conductivity."""
 
     reflection: float | None = None
-    """R in (0, 1]: amplitude, the same for every angle and polarisation."""
+    """Reflection coefficient R in (0, 1] of the amplitude, the same for every angle and polarisation."""
     itu: str | None = None
     """Name in ITU-R P.2040, e.g. `concrete`."""
     thickness: float = 0.1
@@ -31,15 +30,15 @@ class Material:
     permittivity: float | None = None
     """Real part of the relative permittivity, at least 1, the same at every carrier."""
     conductivity: float = 0.0
-    """[S/m] beside `permittivity`."""
+    """Conductivity [S/m] of the slab that `permittivity` describes."""
     reflection_te: float | None = None
-    """Coefficient in [-1, 1] of the field across the plane of incidence, the same at every angle,"""
+    """Reflection coefficient in [-1, 1] of the field across the plane of incidence (TE), the same at every angle."""
     reflection_tm: float | None = None
-    """...and of the field in that plane; signs as Fresnel's: of a dense dielectric near normal incidence, TE is
-    negative and TM positive."""
+    """Reflection coefficient in [-1, 1] of the field in the plane of incidence (TM); signs as Fresnel's: of a dense
+    dielectric near normal incidence, TE is negative and TM positive."""
     scattering: float = 0.0
-    """S in [0, 1): share of the reflected field that the surface scatters in all directions; the mirrored ray keeps
-    `sqrt(1 - S^2)` of its field."""
+    """Scattering coefficient S in [0, 1): share of the reflected field that the surface scatters in all directions; the
+    mirrored ray keeps `sqrt(1 - S^2)` of its field."""
 
     def __post_init__(self) -> None:
         if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
@@ -67,23 +66,26 @@ class Material:
 
     @property
     def is_slab(self) -> bool:
-        """Whether it treats the fields across and in the plane of incidence apart, as a slab does."""
+        """Whether a material reflects the polarisations across and in the plane of incidence differently: all but a
+        constant `reflection`."""
         return self.reflection is None
 
     @property
     def level(self) -> float | None:
-        """Constant |R|, in the mean of both polarisations; None for a slab, whose own depends on the angle."""
+        """Constant magnitude |R| of a material's reflection coefficient, the mean of both polarisations; None for a
+        slab, whose own depends on the angle."""
         if self.reflection_te is not None and self.reflection_tm is not None:
             return 0.5 * (abs(self.reflection_te) + abs(self.reflection_tm))
         return self.reflection
 
     @property
     def specular_share(self) -> float:
-        """Share of a material's reflected field that stays in the mirrored ray."""
+        """Share of a material's reflected field that stays in the mirrored ray: `sqrt(1 - S^2)`."""
         return float(np.sqrt(1.0 - self.scattering**2))
 
     def as_body(self) -> "Material":
-        """The face of a thick, slightly lossy body with this |R| at normal incidence (0.998 at most); a slab stays.
+        """Dielectric material that comes nearest to a constant |R|: a thick, slightly lossy body with this |R| at
+        normal incidence (0.998 at most); a slab stays as it is.
 
         `permittivity = ((1 + R) / (1 - R))^2`; elsewhere it follows Fresnel's law.
         """
@@ -96,7 +98,7 @@ class Material:
 
     @property
     def words(self) -> str:
-        """What a material is, in few words."""
+        """Short text that says what a material is, e.g. `R = 0.85` or `concrete`."""
         if self.reflection is not None:
             return f"R = {self.reflection:g}"
         if self.reflection_te is not None:
@@ -106,7 +108,7 @@ class Material:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reflector:
-    """A smooth opaque mesh; it reflects on both sides. Each plane it has is a wall of its own."""
+    """A smooth opaque mesh that reflects on both sides. Each plane it has is a wall of its own."""
 
     name: str
     vertices: Floats
@@ -120,7 +122,7 @@ class Reflector:
 
     @property
     def triangles(self) -> Floats:
-        """(F, 3, 3) [m] triangles of a reflector: face, corner, xyz."""
+        """Corners (F, 3, 3) [m] of a reflector's triangles: face, corner, xyz."""
         return self.vertices[self.faces]
 
 
@@ -133,20 +135,20 @@ class Occluder:
     faces: Any
     """(F, 3) indices into `vertices`."""
     name: str = ""
-    """What it is called where it stands alone; one of a scatterer has the scatterer's name."""
+    """Name of an occluder that stands alone; empty for one that belongs to a scatterer."""
 
     def __post_init__(self) -> None:
         _freeze_mesh(self, f"shade '{self.name}'" if self.name else "shade")
 
     @property
     def triangles(self) -> Floats:
-        """(F, 3, 3) [m] triangles of an occluder in the scene: face, corner, xyz."""
+        """Corners (F, 3, 3) [m] of an occluder's triangles: face, corner, xyz."""
         return self.vertices[self.faces]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatterer:
-    """A small object that re-radiates in all directions. It shades nothing unless it has a shade."""
+    """A point scatterer: a small object that re-radiates in all directions. It hides nothing unless it has a shade."""
 
     name: str
     position: Floats
@@ -156,14 +158,14 @@ class Scatterer:
     radius: float | None = None
     """Radius [m] of a sphere or cylinder, if it is one."""
     law: str = "constant"
-    """`constant`: `rcs` for all directions; `mie`: a sphere's exact value at the carrier; `cylinder`: that of a
-    cylinder by physical optics, for each pair of directions."""
+    """Law of the cross-section: `constant`: `rcs` for all directions; `mie`: a sphere's exact value at the carrier;
+    `cylinder`: that of a cylinder by physical optics, for each pair of directions."""
     height: float | None = None
     """Length [m] of a cylinder along its axis."""
     axis: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    """(3,) unit vector along a cylinder."""
+    """(3,) unit vector along the axis of a cylinder."""
     shade: Occluder | None = None
-    """What it hides; its own centre it does not hide."""
+    """Occluder of the object's shape; None if it hides nothing. Its own centre it does not hide."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))
@@ -183,18 +185,21 @@ class Scatterer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The true room. Nothing in `slam/` or `design/` may see it."""
+    """The true room: reflectors, occluders, scatterers, RIS panels, and the agent's motion. Nothing in `slam/` or
+    `design/` may see it."""
 
     name: str
     reflectors: tuple[Reflector, ...]
     scatterers: tuple[Scatterer, ...]
     ris: RisPanel | RisPanels | None
-    """The panel, or several of them (`join_panels`)."""
+    """The RIS panel, several of them (`join_panels`), or None."""
     agent: Trajectory
+    """True trajectory of the agent."""
     digest: str = ""
     """SHA-256 over the scene file and its meshes; empty for a scene built in memory."""
     occluders: tuple[Occluder, ...] = ()
-    """What hides and is neither wall nor landmark: clutter too small or too round to reflect like a plane."""
+    """Meshes that hide what lies behind them and are neither wall nor landmark: clutter too small or too round to
+    reflect like a plane."""
 
     def __repr__(self) -> str:
         size = " x ".join(f"{length:.3g}" for length in self.bounds[1] - self.bounds[0])
@@ -210,39 +215,39 @@ class Scene:
         return html_with(repr(self), self.plan(("true way", self.agent.position)))
 
     def plan(self, *ways: tuple[str, Floats]) -> PlanView:
-        """The scene from above, with named courses (K, 3) [m] in it."""
+        """Plan of a scene seen from above, with named trajectories (K, 3) [m] in it."""
         edges = outline((reflector.vertices, reflector.faces) for reflector in self.reflectors)
         return PlanView(self.bounds, edges, list(zip(self.landmarks, self.landmark_positions, strict=True)), ways)
 
     @property
     def panels(self) -> tuple[RisPanel, ...]:
-        """All panels of a scene, in the order of the code's elements; empty without one."""
+        """All RIS panels of a scene, in the order of the code's elements; empty without one."""
         return self.ris.panels if self.ris is not None else ()
 
     @property
     def landmarks(self) -> tuple[str, ...]:
-        """Names of a scene's landmarks in the order of their numbers: scatterers first, then the panels."""
+        """Names of a scene's landmarks in the order of their numbers: scatterers first, then the RIS panels."""
         return tuple(s.name for s in self.scatterers) + tuple(panel.name for panel in self.panels)
 
     @property
     def landmark_positions(self) -> Floats:
-        """(num_landmarks, 3) [m] of a scene's landmarks, in the order of `landmarks`."""
+        """Positions (num_landmarks, 3) [m] of a scene's landmarks, in the order of `landmarks`."""
         points = [s.position for s in self.scatterers] + [panel.center for panel in self.panels]
         return np.array(points, dtype=np.float64).reshape(-1, 3)
 
     def panel_number(self, landmark: int) -> int:
-        """Which of the panels a landmark is, -1 for a scatterer."""
+        """Number of the RIS panel that a landmark is, -1 for a scatterer."""
         return max(landmark - len(self.scatterers), -1)
 
     @property
     def bounds(self) -> Floats:
-        """(2, 3) [m] bounds of a scene: lowest and highest corner of all reflectors."""
+        """Bounds (2, 3) [m] of a scene: lowest and highest corner of all reflectors."""
         points = np.concatenate([r.vertices for r in self.reflectors]) if self.reflectors else np.zeros((1, 3))
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
 def _freeze_mesh(mesh: Any, place: str) -> None:
-    """Check and freeze `vertices` and `faces` of a mesh in a scene."""
+    """Check and freeze `vertices` and `faces` of a reflector's or occluder's mesh."""
     freeze(mesh, "vertices", np.float64, (None, 3))
     freeze(mesh, "faces", np.int64, (None, 3))
     if len(mesh.faces) == 0:

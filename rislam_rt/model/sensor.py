@@ -1,7 +1,7 @@
-"""The sensor model, what is known of the receiver: which paths it reports, what else, what it cannot tell apart.
+"""Sensor model, what is known of the receiver: detection, false alarms, the range of delays, and resolution.
 
-One object says it all. The simulation draws from the one that its settings make; filter, bound and rivals reckon with
-the one that they are told, which may be wrong.
+One object says it all. The simulation draws from the one that its settings make; filters and bounds reckon with the one
+that they are told, which may be wrong.
 """
 
 from dataclasses import dataclass
@@ -16,33 +16,35 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model.radio import RadioConfig
 
 RESOLUTIONS = ("cell", "joint", "all")
-"""What two paths must be to come out apart: outside each other's cell; certain of their amplitudes when all else is
-unknown (`information.resolved_probability`); anything at all."""
+"""Rules by which two paths are resolved: they lie outside each other's resolution cell; their amplitudes can be told
+when all else is unknown (`information.resolved_probability`); always."""
 ONE_PULSE = 1.0
-"""[s] Period of a sounding that does not repeat: longer than any path."""
+"""Period [s] that stands for a sounding which does not repeat: longer than any path."""
 CERTAIN_SNR = 10.0
-"""Standard deviations above the threshold from which on the detection probability is 1 to double precision."""
+"""Standard deviations of the measured SNR's root above the threshold from which on the detection probability is 1 to
+double precision."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """Detection, false alarms and resolution of a receiver. SI units; SNRs linear, over all antennas."""
+    """Sensor model of the receiver: detection, false alarms and resolution of multipath components. SI units; SNRs
+    linear, over all antennas."""
 
     radio: RadioConfig
-    """Noise, band, gains and array that the rest refers to."""
+    """Radio (noise, band, gains and array) that the rest refers to."""
     threshold: float = 10.0
-    """A component is reported when its measured SNR exceeds this."""
+    """Detection threshold: a component is reported when its measured SNR exceeds this."""
     false_alarms: float = 0.5
     """Mean number of false components a cycle."""
     window: tuple[float, float] = (0.0, 80e-9)
-    """First and last delay [s] that are reported."""
+    """First and last delay [s] at which components are reported."""
     period: float = ONE_PULSE
-    """Time [s] after which a sounding of tones repeats: what comes later is heard as if it came earlier by whole
+    """Period [s] after which a sounding of tones repeats: what comes later is measured as if it came earlier by whole
     periods."""
     resolution: str = "cell"
-    """What two paths must be to come out apart (`RESOLUTIONS`)."""
+    """Rule by which two paths are resolved, one of `RESOLUTIONS`."""
     alternation: bool = False
-    """Whether components come with the probability that they ran over the panel."""
+    """Whether components are reported with the probability that they ran over a RIS panel."""
 
     def __post_init__(self) -> None:
         for name, least in (("threshold", 1e-300), ("false_alarms", 0.0), ("period", 1e-300)):
@@ -56,35 +58,38 @@ class SensorModel:
 
     @property
     def cell(self) -> Floats:
-        """(3,) width of a resolution cell: 1/B [s], and the array's beam in either cosine (the sky without one)."""
+        """Widths (3,) of the receiver's resolution cell: 1/B [s] in delay, and the array's beam in either direction
+        cosine (2, all directions, without an aperture)."""
         array = self.radio.array
         beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
         return np.array([1.0 / self.radio.bandwidth, *beams])
 
     @property
     def cell_length(self) -> Floats:
-        """(3,) the same with the delay as a length [m]."""
+        """Widths (3,) of the receiver's resolution cell: path length [m] and two direction cosines."""
         return self.cell * np.array([SPEED_OF_LIGHT, 1.0, 1.0])
 
     def in_window(self, delay: Floats) -> Booleans:
-        """(...,) whether components of such delays [s] are reported at all."""
+        """Whether (...,) the receiver reports components of delays [s] (...,) at all."""
         return np.asarray((delay >= self.window[0]) & (delay <= self.window[1]))
 
     def heard_as(self, length: Floats) -> Floats:
-        """Lengths [m] as which paths of lengths (...,) [m] are heard, less than a period."""
+        """Path lengths (...,) [m] as the receiver measures them: true lengths (...,) [m] less whole periods of the
+        sounding."""
         return np.asarray(np.mod(length, SPEED_OF_LIGHT * self.period))
 
     def nearest(self, gap: Floats) -> Floats:
-        """Differences (...,) of lengths [m] without whole periods."""
+        """Differences (...,) of path lengths [m] less the nearest number of whole periods of the sounding."""
         period = SPEED_OF_LIGHT * self.period
         return np.asarray(gap - period * np.round(gap / period))
 
     def detection_probability(self, snr: ArrayLike) -> Floats:
-        """Probability (...,) that a lone path of this expected SNR is reported (see `detection_probability`)."""
+        """Probability (...,) that the receiver reports a lone path of this expected SNR (see the function
+        `detection_probability`)."""
         return detection_probability(snr, self.threshold)
 
     def false_alarm_density(self, tau: ArrayLike, cosines: Floats) -> Floats:
-        """Expected false components (...,) a cycle per second of delay and unit of either cosine.
+        """Expected number (...,) of false components a cycle, per second of delay and unit of either direction cosine.
 
         Noise is stationary in delay and cosines, so that its peaks lie evenly over the window and the unit disc.
         """
@@ -98,14 +103,16 @@ class SensorModel:
         return np.where(excess >= 0.0, np.exp(-np.maximum(excess, 0.0)), 0.0)
 
     def may_merge(self, gap: Floats) -> Booleans:
-        """(...,) whether two paths a `gap` (..., 3) of delay [s] and cosines apart share a resolution cell."""
+        """Whether (...,) two paths that differ by `gap` (..., 3) in delay [s] and direction cosines share a resolution
+        cell."""
         if self.resolution == "all":
             return np.zeros(gap.shape[:-1], dtype=np.bool_)
         return np.asarray((np.abs(gap) < self.cell).all(axis=-1))
 
 
 def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
-    """Probability (...,) that the measured SNR of a path exceeds the threshold; both linear, over all antennas.
+    """Probability (...,) that the measured SNR of a path exceeds the detection threshold; expected SNR and threshold
+    linear, over all antennas.
 
     Marcum's `Q_1(sqrt(2 snr), sqrt(2 threshold))`: twice the measured SNR is noncentral chi-square with two degrees of
     freedom. `exp(-threshold)` for noise alone.
@@ -118,9 +125,10 @@ def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
 
 
 def merged_pull(ratio: ArrayLike) -> tuple[Floats, Floats]:
-    """Where two paths come out that cannot be resolved: mean and variance (...,), as a share of the gap between them.
+    """Mean and variance (...,) of where two paths that cannot be resolved are measured as one, as a share of the gap
+    between them.
 
-    Counted from the one that is `1 / ratio` times as strong as the other. One path fits both best, to first order, at
+    Counted from the path that is `1 / ratio` times as strong as the other. One path fits both best, to first order, at
     `Re sum alpha_i conj(alpha) z_i / |alpha|^2` with alpha the sum. Over an even relative phase, each weighed by the
     energy |alpha|^2 with which it is measured, the share has the mean `r^2 / (1 + r^2)`, the centre of energy, and the
     mean square `r^2 / 2 / (1 + r^2)`.

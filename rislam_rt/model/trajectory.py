@@ -1,4 +1,4 @@
-"""The agent's trajectory, and its body (where Tx and Rx sit on it)."""
+"""The agent's trajectory, and its body: the offsets of Tx and Rx."""
 
 from dataclasses import dataclass, field
 
@@ -10,13 +10,14 @@ from rislam_rt.geometry.angles import rotation_z
 
 
 def _default_offset() -> Floats:
-    """Half the paper's 0.1 m baseline, turned 0.5 rad against the heading (a straight one makes paths hit edges)."""
+    """Default offset (3,) [m] of the Rx in the body frame: half the paper's 0.1 m baseline, turned 0.5 rad against the
+    heading (a straight one makes paths hit edges)."""
     return np.array([0.05 * np.cos(0.5), 0.05 * np.sin(0.5), 0.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """Offsets (3,) [m] of Tx and Rx array centre from the agent's position, in the body frame (x forward)."""
+    """The agent's body: offsets (3,) [m] of Tx and Rx array centre from its position, in the body frame (x forward)."""
 
     tx_offset: Floats = field(default_factory=lambda: -_default_offset())
     rx_offset: Floats = field(default_factory=_default_offset)
@@ -28,14 +29,14 @@ class Body:
             raise GeometryError("tx_offset_m, rx_offset_m: Tx and Rx coincide; keep them apart")
 
     def ends(self, position: Floats, heading: Floats) -> tuple[Floats, Floats]:
-        """Tx and Rx positions (..., 3) [m] of agent positions (..., 3) and headings (...,) [rad]."""
+        """Positions (..., 3) [m] of Tx and Rx for agent positions (..., 3) [m] and headings (...,) [rad]."""
         rotation = rotation_z(heading)
         return position + rotation @ self.tx_offset, position + rotation @ self.rx_offset
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Motion over K cycles; `position` is the midpoint of Tx and Rx when the offsets are opposite."""
+    """Trajectory of the agent over K cycles; `position` is the midpoint of Tx and Rx when the offsets are opposite."""
 
     time: Floats
     """(K,) [s]."""
@@ -70,15 +71,15 @@ class Trajectory:
 
     @property
     def elapsed(self) -> Floats:
-        """Times (K,) [s] since a trajectory's first cycle: time stamps may count from the epoch."""
+        """Times (K,) [s] since a trajectory's first cycle; time stamps may count from the epoch."""
         return np.asarray(self.time - self.time[:1])
 
     @property
     def tx(self) -> Floats:
-        """Tx positions (K, 3) [m] along a trajectory."""
+        """Positions (K, 3) [m] of the Tx along a trajectory."""
         return self.body.ends(self.position, self.heading)[0]
 
     @property
     def rx(self) -> Floats:
-        """Rx positions (K, 3) [m] along a trajectory."""
+        """Positions (K, 3) [m] of the Rx along a trajectory."""
         return self.body.ends(self.position, self.heading)[1]

@@ -1,6 +1,6 @@
-"""Floor 6: the four-step cycle, the run over a trajectory, its specification, and the store of results.
+"""The simulation pipeline: the four-step SLAM cycle, runs of all schemes on a trajectory, pipeline files, run folders.
 
-Names are loaded when first used: a sweep's workers start with what their cells need.
+Names are imported when first used, so that a sweep's worker processes load only what they need.
 """
 
 from importlib import import_module

@@ -1,7 +1,8 @@
-"""The assumed model: the one place where anything crosses from the truth to filter, association and design.
+"""The assumed model: what the SLAM filter and the code design take for true, made from the true model of a run.
 
-`tell_belief` makes the filter's and the design's inputs from the truth and the errors of `[told]`; `perceived_paths`
-turns the true signals as an undeclared tilt or clock does. The quantities stand one by one in `docs/told.md`.
+Nothing of the truth reaches them in any other way. `tell_belief` makes the assumed model from the truth and the model
+errors of `[told]`; `perceived_paths` changes the true paths as a tilt or a clock offset that the agent does not know
+of. `docs/told.md` lists the quantities.
 """
 
 from dataclasses import fields, replace
@@ -18,26 +19,27 @@ from rislam_rt.slam import StartPrior
 
 
 class AssumedModel(NamedTuple):
-    """All that estimators and designs get beside measurements and the code in force."""
+    """Assumed model of a run: all that estimators and code designers get beside measurements and the applied code."""
 
     start: StartPrior
+    """Prior of position, velocity and heading at the first cycle."""
     body: Body
-    """Where Tx and Rx sit on the agent."""
+    """Assumed offsets of Tx and Rx from the agent's position, body frame."""
     panel: DataSheet | None
-    """Data sheet; None without a panel."""
+    """Assumed data sheet of the RIS panels; None without a panel."""
     settings: Settings
-    """Radio and settings of the estimators, as they are told; what concerns the receiver alone is the truth's."""
+    """Assumed radio, sensor model and estimator settings; those of the receiver alone are the true ones."""
     heading: Floats
-    """(K,) [rad] compass, one a cycle; each is shown in its own cycle alone."""
+    """(K,) [rad] compass readings; an estimator sees each in its own cycle alone."""
     time: Floats
-    """(K,) [s]."""
+    """(K,) [s] assumed times of the cycles."""
 
 
 def tell_belief(
     motion: Trajectory, body: Body, panel: DataSheet | None, spec: PipelineSpec, settings: Settings,
     *, start: np.random.Generator, compass: np.random.Generator,
 ) -> AssumedModel:  # fmt: skip
-    """All that a run's belief is told of the truth: the assumed model.
+    """Assumed model of a run, made from the true motion, body, panel and settings and the errors of `[told]`.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ def tell_belief(
     settings
         True ones.
     start, compass
-        Draw the errors of the start, and of the compass.
+        Generators of the errors of the start prior, and of the compass.
     """
     told = spec.told
     noise = np.radians(told.compass_noise_deg) * compass.standard_normal(len(motion))
@@ -67,8 +69,10 @@ def tell_start(
     motion: Trajectory, compass: float, start: StartSection, told: AssumedSection, settings: Settings,
     *, rng: np.random.Generator,
 ) -> StartPrior:  # fmt: skip
-    """The start that is told: truth plus one draw of the prior's errors; a known height exact, a known heading by
-    compass."""
+    """Start prior of the agent: the true first pose plus one draw of the prior's errors.
+
+    A known height is exact; a known heading is the first compass reading `compass` [rad].
+    """
     free_height, free_heading = settings.slam.height == "estimated", settings.slam.heading == "estimated"
     axes = told.start_scale * np.array([1.0, 1.0, float(free_height)])
     shift, push = rng.standard_normal(3), rng.standard_normal(3)
@@ -85,13 +89,14 @@ def tell_start(
 
 
 def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:
-    """The panel that is told: its data sheet, or one of each, orientation included."""
+    """Assumed data sheet of the RIS panel, or of each of several, with the errors of orientation, spacing and gain."""
     if isinstance(panel, RisSpecs):
         return RisSpecs(tuple(_tell_one(one, told) for one in panel.panels))
     return _tell_one(panel, told)
 
 
 def _tell_one(panel: RisSpec, told: AssumedSection) -> RisSpec:
+    """Assumed data sheet of one RIS panel."""
     tilt, turn = np.radians(told.panel_tilt_deg), np.radians(told.panel_turn_deg)
     normal, up = panel.normal, panel.up
     if turn:
@@ -105,7 +110,7 @@ def _tell_one(panel: RisSpec, told: AssumedSection) -> RisSpec:
 
 
 def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
-    """The settings that are told: radio, process noise, what is known of detection and of false components."""
+    """Assumed settings of all estimators: true ones with errors of radio, process noise, threshold and clutter."""
     slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
     radio = tell_radio(settings.radio, told)
     sensor = replace(
@@ -116,12 +121,15 @@ def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
     )
     found = settings._replace(radio=radio, slam=slam, sensor=sensor)
     return found._replace(
-        **{name: _livelier(getattr(found, name), told.process_noise_scale) for name in ("slam", *ESTIMATOR_SECTIONS)}
+        **{
+            name: _scale_process_noise(getattr(found, name), told.process_noise_scale)
+            for name in ("slam", *ESTIMATOR_SECTIONS)
+        }
     )
 
 
 def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
-    """The radio that is told: carrier, band and array as they are; noise, gains and antennas as assumed."""
+    """Assumed radio: true carrier, band and array, with the errors of noise density, antenna gain and patterns."""
     return replace(
         radio,
         noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
@@ -131,7 +139,7 @@ def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
 
 
 def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:
-    """The measurement that is told: what the receiver reports, calibration and deviations as far off as assumed."""
+    """Measurement that the estimator gets: the receiver's, with errors of array calibration and of reported stds."""
     if told.array_scale == 1.0 and told.array_bias == 0.0 and told.std_scale == 1.0:
         return measurement
     cosines = told.array_scale * measurement.cosines + told.array_bias
@@ -144,7 +152,7 @@ def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurem
 
 
 def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
-    """Motion of a body that leans by an untold `tilt_deg`: its ends lie where they truly are."""
+    """True trajectory with the Tx and Rx offsets of a body tilted by `tilt_deg`, of which the agent is not told."""
     if told.tilt_deg == 0.0:
         return motion
     tilt, body = _rotations(np.radians(told.tilt_deg), np.zeros(())), motion.body
@@ -154,10 +162,10 @@ def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
 def perceived_paths(
     paths: Paths, motion: Trajectory, told: AssumedSection, *, rng: np.random.Generator, since: float | None = None
 ) -> Paths:
-    """Paths as heard by a leaning, swaying array with a clock of its own, of which the agent is not told.
+    """True paths with arrival directions and delays as a tilted, swaying array with a clock offset measures them.
 
-    Arrivals are such that the body frame of a level agent gives them to the array; delays run with the clock, which
-    drifts from the time `since` [s] on, the motion's first if it is not given.
+    The agent is told neither. Arrival directions are turned so that a level body frame gives what the tilted array
+    measures; the clock drifts from the time `since` [s] on, the motion's first if it is not given.
     """
     arrival, tau = paths.arrival, paths.tau
     if told.tilt_deg or told.wobble_deg:
@@ -172,7 +180,7 @@ def perceived_paths(
 
 
 def _rotations(pitch: Floats, roll: Floats) -> Floats:
-    """Rotations (..., 3, 3) of a body whose front is raised by `pitch` (about y), after a roll about x [rad]."""
+    """Rotation matrices (..., 3, 3) of a body with its front raised by `pitch` (about y) after a roll about x [rad]."""
     pitch, roll = np.broadcast_arrays(pitch, roll)
     one, zero = np.ones_like(pitch), np.zeros_like(pitch)
     cp, sp, cr, sr = np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
@@ -182,16 +190,17 @@ def _rotations(pitch: Floats, roll: Floats) -> Floats:
 
 
 def _outwards(body: Body) -> Floats:
-    """Unit vector (3,) from the Rx to the Tx, along which an assumed baseline errs."""
+    """Unit vector (3,) from the Rx to the Tx, along which the assumed Tx-Rx baseline is too long."""
     span = body.tx_offset - body.rx_offset
     return np.asarray(span / np.linalg.norm(span))
 
 
-def _livelier(config: Any, scale: float) -> Any:
-    """An estimator's settings with another assumed process noise."""
+def _scale_process_noise(config: Any, scale: float) -> Any:
+    """Settings of an estimator with its process noise `sigma_a` multiplied by `scale`."""
     assert "sigma_a" in {field.name for field in fields(config)}
     return replace(config, sigma_a=config.sigma_a * scale)
 
 
 def _amplitude(decibel: float) -> float:
+    """Amplitude ratio of decibels."""
     return float(10.0 ** (decibel / 20.0))

@@ -1,4 +1,4 @@
-"""How each scheme chooses the panel's code: from the predicted belief, or, for the reference, from the truth."""
+"""Code policies: how schemes choose the panel's phase code, from the predicted belief or, for the genie, from truth."""
 
 from collections.abc import Callable
 
@@ -18,13 +18,16 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
 def build_designer(
     scheme: Scheme, panel: DataSheet, spec: PipelineSpec, settings: Settings, told: AssumedModel
 ) -> CodePolicy:
-    """The designer of a scheme that has a panel: true panel and settings serve the one that knows the truth."""
+    """Code policy of a scheme with a RIS panel: designs on the agent's belief, or on the true paths for the genie.
+
+    The true `panel` and `settings` serve the genie alone.
+    """
     method = spec.design.method if scheme.method == "spec" else str(scheme.method)
     return _on_truth(method, panel, spec, settings) if scheme.on_truth else _on_belief(method, spec, told)
 
 
 def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolicy:
-    """The usual policy: codes designed on the agent's belief alone."""
+    """Code policy that designs each phase code on the agent's predicted belief alone."""
     section, panel, settings = spec.design, told.panel, told.settings
     assert panel is not None
     last: RisCode | None = None
@@ -49,7 +52,10 @@ def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolic
 
 
 def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Settings) -> CodePolicy:
-    """The genie: true paths of the cycle in which the code will take effect, and the belief's own prior."""
+    """Code policy of the genie: designs each code on the true paths of the cycle in which it will take effect.
+
+    The prior of the agent's position is the belief's.
+    """
 
     def choose(
         belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator

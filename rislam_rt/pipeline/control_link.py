@@ -1,4 +1,4 @@
-"""The control channel between agent and panel: a code travels as a message that can be late or lost."""
+"""The control link between agent and RIS panel: a phase code travels as a message that can be late or lost."""
 
 from typing import NamedTuple
 
@@ -11,18 +11,18 @@ from rislam_rt.ris import flip_bits, zero_code
 
 
 class ControlLink(NamedTuple):
-    """State of the control channel."""
+    """State of the control link to the RIS panel: applied phase code, the one the agent believes, those in transit."""
 
     applied: RisCode
-    """What the panel is set to."""
+    """Phase code that the panel is set to."""
     believed: RisCode
-    """What the agent holds it to be: it knows the delay, but not that a message was lost."""
+    """Phase code that the agent holds to be applied: it knows the delay, but not that a message was lost."""
     waiting: tuple[tuple[RisCode, RisCode | None], ...] = ()
-    """Codes on their way, oldest first, and what will arrive of each; None if nothing will."""
+    """Codes in transit, oldest first: each as sent, and as it will arrive (None if it was lost)."""
 
 
 def open_link(spec: DataSheet) -> ControlLink:
-    """The control link at the start: a panel at level 0, nothing on its way."""
+    """Control link at the start of a run: the RIS panel at phase level 0, no message in transit."""
     start = zero_code(spec)
     return ControlLink(start, start)
 
@@ -30,7 +30,10 @@ def open_link(spec: DataSheet) -> ControlLink:
 def send_code(
     link: ControlLink, code: RisCode, control: ControlSection, *, rng: np.random.Generator, bit_flip: float = 0.0
 ) -> ControlLink:
-    """The control link one cycle later, after `code` was sent over a link that turns bits with a probability."""
+    """Control link one cycle later, after `code` was sent as a message that may be lost, or arrive with bits flipped.
+
+    `bit_flip` is the probability of each bit.
+    """
     arrives = bool(rng.random() >= control.loss_probability)
     sent = quantise(code, control.levels)
     heard = _damaged(sent, control.levels or code.levels, bit_flip, rng=rng) if bit_flip else sent
@@ -42,13 +45,13 @@ def send_code(
 
 
 def _damaged(code: RisCode, levels: int, bit_flip: float, *, rng: np.random.Generator) -> RisCode:
-    """What arrives over the control link of a code whose message names `levels` levels."""
+    """Phase code that arrives of one sent over the control link with `levels` levels, with random bits flipped."""
     step = code.levels // levels
     return RisCode(flip_bits(RisCode(code.index // step, levels), bit_flip, rng=rng).index * step, code.levels)
 
 
 def quantise(code: RisCode, levels: int | None) -> RisCode:
-    """Nearest code that a control message of `levels` phase levels can name, in the panel's own levels."""
+    """Nearest phase code that a control message with `levels` levels can name, given in the panel's own levels."""
     if levels is None:
         return code
     step = code.levels // levels
@@ -56,18 +59,18 @@ def quantise(code: RisCode, levels: int | None) -> RisCode:
 
 
 def message_seconds(spec: DataSheet, control: ControlSection) -> float:
-    """Air time [s] of one control message: so many bits an element as its levels need."""
+    """Duration [s] of one control message to the RIS panel: bits for the level of every element, over the bit rate."""
     bits = spec.num_elements * int(np.ceil(np.log2(control.levels or spec.levels)))
     return bits / control.rate_bits_s
 
 
 def check_control(spec: DataSheet, control: ControlSection, bit_flip: float = 0.0) -> None:
-    """Check the control message against the panel.
+    """Check that a control message's phase levels fit the RIS panel's.
 
     Raises
     ------
     ConfigError
-        The message's levels do not divide the panel's; or bits are turned over and its levels are no power of two.
+        The message's levels do not divide the panel's; or bits are flipped and its levels are no power of two.
     """
     levels = control.levels or spec.levels
     if bit_flip and levels & (levels - 1):

@@ -1,7 +1,7 @@
-"""One cycle of the protocol: optimise, communicate, measure, localise and map.
+"""One cycle of the protocol: design a phase code, send it to the panel, measure, update pose and map.
 
-The agent's side of it (design and filter) gets the measurement, the code that it holds to be applied, the time step and
-its heading; paths and poses stay on the room's side.
+Designer and filter get the measurement, the code that the agent holds to be applied, the time step and the compass
+heading; they never get the true paths and poses.
 """
 
 from collections.abc import Callable
@@ -22,56 +22,62 @@ from rislam_rt.ris import PanelErrors, rephase
 
 
 class CycleGenerators(NamedTuple):
-    """Generators of one cycle."""
+    """Random generators of one cycle, by purpose."""
 
     design: np.random.Generator
+    """Of the code designer."""
     control: np.random.Generator
+    """Of lost control messages and flipped bits."""
     noise: np.random.Generator
+    """Of the receiver."""
     filter: np.random.Generator
+    """Of the estimator."""
 
 
 class GroundTruth(NamedTuple):
-    """The true side of a run."""
+    """True paths, motion and hardware errors of a run, which the agent does not see."""
 
     paths: Paths
-    """As the array hears them (`assumed_model.perceived_paths`)."""
+    """True paths as the array measures them (`assumed_model.perceived_paths`)."""
     trajectory: Trajectory
+    """True motion over all cycles of the run."""
     doppler: Floats
-    """(K, P) shifts [Hz]: what paths turn by within the measurement slot."""
+    """(K, P) Doppler shifts [Hz], which turn the paths' phases within the measurement slot."""
     faults: PanelErrors | None = None
-    """What the panel does wrong; None without a panel."""
+    """Hardware errors of the RIS panel; None without a panel."""
     first: int = 0
-    """The cycle that the paths begin at; the trajectory is the whole one."""
+    """The cycle that `paths` begin at."""
     front_end: FrontEnd | None = None
-    """What the receiver does wrong; None for an ideal one."""
+    """Impairments of the receiver's front end; None for an ideal one."""
     clutter: Clutter | None = None
-    """What is heard besides, and has no identity."""
+    """Diffuse and diffracted paths, received with the others; None if there are none."""
 
     def at(self, cycle: int) -> Paths:
-        """The paths of one cycle alone."""
+        """True paths of one cycle alone."""
         return self.paths.of_cycle(cycle - self.first)
 
     def clutter_at(self, cycle: int) -> Clutter | None:
-        """What is heard besides in one cycle."""
+        """Diffuse and diffracted paths of one cycle; None if there are none."""
         row = cycle - self.first
         return None if self.clutter is None else self.clutter.of_cycle(row)
 
 
 class Agent(NamedTuple):
-    """What the agent carries from cycle to cycle, with its control channel."""
+    """State that the agent carries from cycle to cycle: of its estimator, its control link and its receiver."""
 
     state: Any
+    """Of the estimator."""
     link: ControlLink | None
-    """None without a panel."""
+    """Control link to the RIS panel; None without a panel."""
     heard: Measurement | None = None
-    """What the receiver found in the cycle before."""
+    """Measurement of the cycle before, with which the receiver's search begins."""
 
 
 class Receptions(dict[tuple[int, bytes, int], tuple[Measurement | None, Measurement, PathTruth, float]]):
-    """What the receiver made of cycles, kept for the schemes of one specification and room that heard the same.
+    """Cache of the measurements of a run's cycles, shared by the schemes that applied the same phase codes.
 
-    A cycle's noise is the same for all schemes. What else its components depend on is the code that was applied, and
-    the cycle before, which the search begins with: the very same record of it means the same codes all along.
+    A cycle's noise is the same for all schemes. Its components depend besides on the applied code and on the
+    measurement of the cycle before, with which the search begins: the very same object means the same codes so far.
     """
 
     def measure(
@@ -81,60 +87,69 @@ class Receptions(dict[tuple[int, bytes, int], tuple[Measurement | None, Measurem
         previous: Measurement | None,
         receive: Callable[[], tuple[Measurement, PathTruth]],
     ) -> tuple[Measurement, PathTruth, float]:
-        """Components of a cycle, which paths they were, and the seconds that finding them took the first time."""
+        """Return a cycle's measurement, its true paths and the seconds it took; `receive` is called if none is kept."""
         key = cycle, code, id(previous)
         if key not in self:
             begin = perf_counter()
             found = receive()
-            self[key] = previous, *found, perf_counter() - begin  # that holds `previous`, so that no other has its id
+            self[key] = previous, *found, perf_counter() - begin  # keeps `previous` alive: no other object has its id
         return self[key][1:]
 
 
 class RunContext(NamedTuple):
-    """What leads a scheme through its cycles, the same in all of them."""
+    """What stays the same over all cycles of a scheme: panel, code policy, estimator, true settings, assumed model."""
 
     panel: DataSheet | None
+    """True data sheet of the RIS panels; None without a panel."""
     designer: "CodePolicy | None"
+    """Chooses the phase code of each cycle; None without a panel."""
     estimator: Estimator
     spec: PipelineSpec
     settings: Settings
-    """True ones: what the room and the receiver go by."""
+    """True settings, for channel and receiver."""
     told: AssumedModel
-    """What filter and design go by."""
+    """Assumed model, for estimator and code design."""
     receptions: Receptions | None = None
-    """Of the schemes before this one that may have heard the same; None to keep nothing."""
+    """Measurements of schemes that ran before with the same codes; None to keep none."""
 
 
 class Cycle(NamedTuple):
-    """What one cycle left behind."""
+    """Record of one cycle: estimate, diagnostics, measurement and its true paths, phase codes and times."""
 
     estimate: SlamEstimate
     info: Any
+    """Diagnostics of the estimator."""
     measurement: Measurement
+    """As the estimator got it."""
     truth: PathTruth
+    """True path of each component."""
     gain: Any
     """(P,) true path gains under the applied code."""
     sent: RisCode | None
     applied: RisCode | None
     seconds: tuple[float, float, float, float]
+    """Times [s] of optimise, communicate, measure, localise."""
     believed: RisCode | None = None
-    """What the agent holds to be applied."""
+    """Phase code that the agent holds to be applied."""
 
 
 class CodePolicy(Protocol):
-    """Chooses a code from the predicted belief."""
+    """Function that chooses the RIS panel's next phase code from the predicted belief."""
 
     def __call__(
         self, belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
     ) -> RisCode:
-        """`belief` is worked out on being called, for not all need it; `room` is for the one that knows the truth."""
+        """Return the phase code to send in a cycle.
+
+        `belief` is a function that predicts the belief, as not all policies need it; `room` is for the genie alone.
+        """
         ...
 
 
 def run_cycle(
     agent: Agent, room: GroundTruth, cycle: int, context: RunContext, *, rng: CycleGenerators
 ) -> tuple[Agent, Cycle]:
-    """One cycle of one scheme."""
+    """Run one cycle of one scheme: design a code, send it, measure, update; return the agent and the cycle's record."""
     control, estimator, told = context.spec.control, context.estimator, context.told
     config = estimator.config(told.settings)
     dt = float(told.time[cycle] - told.time[cycle - 1]) if cycle else 0.0
@@ -182,5 +197,5 @@ def run_cycle(
 
 
 def usual_step(time: Floats) -> float:
-    """Cycle time [s] of times (K,), which a recording's clock keeps only nearly: the median; 0 for a single cycle."""
+    """Median time [s] between cycles at `time` (K,), as a recording's cycles are not quite even; 0 for one cycle."""
     return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -1,4 +1,4 @@
-"""Results as NetCDF data sets, with units and meaning in the attributes, and back."""
+"""Conversion of true paths and scheme results to NetCDF data sets, with units and meanings as attributes, and back."""
 
 import hashlib
 import json
@@ -56,7 +56,7 @@ SCHEME: dict[str, Entry] = {
     "seconds": (("time", "step"), "s", "time taken by optimise, communicate, measure, localise"),
 }
 SMOOTHED: dict[str, Entry] = {"smoothed": (("time", "xyz"), "m", "position with hindsight")}
-"""Of filters that look back."""
+"""Variable of a scheme's data set that only smoothing filters have."""
 MAP: dict[str, Entry] = {
     "ident": (("feature",), "1", "number of the landmark or image"),
     "position": (("feature", "xyz"), "m", "estimated position"),
@@ -80,7 +80,7 @@ AXES: dict[str, list[str]] = {
 
 
 def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
-    """Data set of the true trajectory and true paths."""
+    """NetCDF data set of a run's true trajectory and true paths."""
     content = _arrays(paths, PATHS, "")
     truth = {"true_position": motion.position, "true_velocity": motion.velocity, "true_heading": motion.heading}
     content |= variables({"time": motion.time, **truth}, TRAJECTORY, "")
@@ -99,14 +99,14 @@ def paths_to_dataset(paths: Paths, motion: Trajectory) -> "xr.Dataset":
 
 
 def dataset_to_paths(data: "xr.Dataset") -> Paths:
-    """The inverse of `paths_to_dataset`."""
+    """True paths from a NetCDF data set that `paths_to_dataset` made."""
     walls, landmarks = (names_of(data.attrs[name]) for name in ("walls", "landmarks"))
     about: dict[str, Any] = {"source": str(data.attrs["source"]), "num_panels": int(data.attrs.get("panels", 1))}
     return Paths(**_values(data, PATHS, ""), walls=walls, landmarks=landmarks, **about)
 
 
 def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
-    """Data set of one scheme, with the filter's diagnostics as `info_...` and its last map as `map_...`."""
+    """NetCDF data set of one scheme's result, with the filter's diagnostics as `info_...`, its last map as `map_...`"""
     content = _arrays(result, SCHEME, "") | _arrays(result.map, MAP, "map_")
     for name, values in result.info.items():
         content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})
@@ -120,7 +120,7 @@ def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
 
 
 def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
-    """The inverse of `scheme_to_dataset`."""
+    """Result of one scheme from a NetCDF data set that `scheme_to_dataset` made."""
     outcomes = names_of(data.attrs["outcomes"])
     return SchemeResult(
         scheme=str(data.attrs["scheme"]),
@@ -134,18 +134,18 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
 
 
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
-    """The data set with `about`, the schema's version, the number of cycles, and a checksum over all there is in it."""
+    """Add to a data set, as attributes, `about`, schema version, number of cycles and a checksum over its content."""
     found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["time"]))
     return found.assign_attrs(checksum=_checksum(found))
 
 
 def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
-    """Whether a data set is as `seal_dataset` gave it, and of what it should be.
+    """Check that a data set read from `path` has its checksum and the attributes `about` that it should have.
 
     Raises
     ------
     ResultError
-        It is not. One line.
+        It has not. One line.
     """
     expected = {"schema": SCHEMA, "cycles": data.sizes.get("time"), **about, "checksum": _checksum(data)}
     for name, value in expected.items():
@@ -170,7 +170,10 @@ def _checksum(data: "xr.Dataset") -> str:
 
 
 def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
-    """A data set's attributes in one form: NetCDF gives numbers as arrays, and a list of one as its only entry."""
+    """Attributes of a data set as sorted lists of texts, so that they are alike before and after NetCDF.
+
+    NetCDF gives numbers back as arrays, and a list of one entry as that entry.
+    """
     found = []
     for name in sorted(map(str, attributes)):
         value = attributes[name]
@@ -180,13 +183,14 @@ def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
 
 
 def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]:
+    """Data set variables of a record's fields that `table` lists, their names with `prefix`."""
     names = {f.name for f in fields(record)}
     found = {name: getattr(record, name) for name in table if name in names}
     return variables({name: value for name, value in found.items() if value is not None}, table, prefix)
 
 
 def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:
-    """A data set's arrays by field name."""
+    """Arrays of a data set's variables that `table` lists, by field name; complex ones joined of two variables."""
     values: dict[str, Any] = {}
     for name in table:
         key = prefix + name
@@ -198,6 +202,7 @@ def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[st
 
 
 def _dataset(content: dict[str, Any], attributes: dict[str, Any], coords: dict[str, Any]) -> "xr.Dataset":
+    """Data set of variables, with the labels (`AXES`) of the axes that they use."""
     import xarray as xr
 
     used = {axis for dims, _, _ in content.values() for axis in dims}
@@ -206,5 +211,5 @@ def _dataset(content: dict[str, Any], attributes: dict[str, Any], coords: dict[s
 
 
 def names_of(value: Any) -> tuple[str, ...]:
-    """Names from a data set's attribute, which NetCDF gives back as one string if there is only one."""
+    """Names in an attribute of a data set, which NetCDF gives back as one string if there is only one."""
     return (value,) if isinstance(value, str) else tuple(str(item) for item in value)

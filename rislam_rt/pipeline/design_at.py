@@ -1,4 +1,4 @@
-"""Every designer at one position of a room, on the true paths: what the command line's `design` shows."""
+"""Phase codes of every designer at one position of the agent, on the true paths: for the command `rislam-rt design`."""
 
 from typing import Any, NamedTuple
 
@@ -12,26 +12,27 @@ from rislam_rt.pipeline.run import build_channel
 
 
 class DesignsAt(NamedTuple):
-    """Designs at one position."""
+    """Phase codes that all designers find for one position of the agent, and the gains of panel paths under them."""
 
     designs: dict[str, Design]
     """By method. Their gains are those of the `target`."""
     target: str
-    """The panel path that single-path methods aim at: the direct one, or where it is hidden the first walled one."""
+    """Panel path that single-path methods aim at: the one without walls or, where that is hidden, the first other."""
     is_direct: bool
+    """Whether the `target` has no walls."""
     panels: dict[str, dict[str, float]]
-    """By method, of each of several panels the gain [dB] of its first path, the direct one where it is seen."""
+    """By method and panel, where there are several: gain [dB] of the panel's first path, without walls if visible."""
 
 
 def design_at(
     scene: Scene, radio: RadioConfig, point: Floats, *, channel: str, depth: int, rng: np.random.Generator
 ) -> DesignsAt:
-    """Designs by method for the agent's midpoint (3,) [m], its body and first heading as in the scene.
+    """Design the panel's phase code with every method for an agent at `point` (3,) [m], heading as the scene's first.
 
     Raises
     ------
     ConfigError
-        The scene has no panel, or no path meets it from there.
+        The scene has no panel, or no path over it is visible from there.
     """
     if scene.ris is None:
         raise ConfigError(f"design: scene '{scene.name}' has no panel; give a scene with a [ris] section")
@@ -49,7 +50,7 @@ def design_at(
 
 
 def _panel_gains(scene: Scene, problem: DesignProblem, design: Design) -> dict[str, float]:
-    """Of each of several panels; nothing of one, whose gain stands with the design."""
+    """Gain [dB] of the first path of each of several panels under a design; empty for a single panel."""
     weight, found = np.exp(-1j * design.xi.ravel()), {}
     for panel, target, (_, span) in zip(scene.panels, problem.targets, problem.panels, strict=True):
         found[panel.name] = float(20.0 * np.log10(max(abs(target @ weight[span]), 1e-20)))
@@ -57,10 +58,11 @@ def _panel_gains(scene: Scene, problem: DesignProblem, design: Design) -> dict[s
 
 
 def design_table(found: DesignsAt) -> dict[str, Any]:
-    """For JSON: figures by method, and the bound of all methods; null where the position is not observable.
+    """JSON table of the designs at one position: gain, CRLB and gap by method, and the bound of all methods.
 
-    `gain_db` and `gap_db` are the direct path's, and null where it is hidden; `target_gain_db` and `target_gap_db` are
-    those of the path that `target` names, whichever it is.
+    Null where the position is not observable.
+    `gain_db` and `gap_db` are those of the panel path without walls, null where it is hidden; `target_gain_db` and
+    `target_gap_db` are those of the path that `target` names, whichever it is.
     """
     designs = found.designs
     methods = {

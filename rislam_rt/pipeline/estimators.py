@@ -1,4 +1,5 @@
-"""Estimators of pose and map from measurements: the project's filters and the rivals, behind one set of functions."""
+"""Estimators of pose and map from measurements, behind one set of functions: the package's SLAM filters, other
+published schemes, and a user's own."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -16,33 +17,36 @@ from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
 
 ROUNDING = 1e-6
-"""Negative eigenvalues of a covariance over its largest one, that rounding in single precision may leave."""
+"""Largest ratio of a covariance's negative to its largest eigenvalue that counts as rounding in single precision."""
 FARTHEST = 1e12
-"""[m] Largest coordinate that a filter of one's own may give: as the largest number of a pipeline file; scores, which
-square it, stay finite."""
+"""[m] Largest coordinate that a user's own filter may return, so that scores, which square it, stay finite."""
 
 
 class Estimator(NamedTuple):
-    """`init -> state`, `predict` before the design, `step` with the measurements, `estimate` after it."""
+    """Functions of one SLAM estimator, and what its posterior bound must know of it."""
 
     init: Callable[..., Any]
+    """Returns the state at the start."""
     predict: Callable[..., Any]
+    """Returns the belief predicted to the next cycle, for the code design."""
     step: Callable[..., Any]
+    """Returns state and diagnostics after a cycle's measurement."""
     estimate: Callable[..., Any]
+    """Returns pose and map of a state."""
     config: Callable[[Settings], Any]
-    """The estimator's own settings among those of the run."""
+    """Picks the estimator's settings from those of the run."""
     angles: bool = True
-    """Whether it uses angles of arrival, or delays alone: what its posterior bound may count."""
+    """Whether it uses angles of arrival, or delays alone: the same goes for its posterior bound."""
     walls: Unknown = "planes"
-    """How its bound holds mirror images: `planes`, tied to walls; `images`, each a point of its own."""
+    """Unknowns of mirror images in its posterior bound: `planes`, those of walls; `images`, each image a point."""
     use_vt: Callable[[Settings], bool] = lambda settings: settings.slam.use_vt
-    """Whether wall returns are among the measurements of its map."""
+    """Whether wall returns (VT paths) are among the measurements of its map."""
     smoothed: Callable[..., Any] = lambda state: None
-    """Positions (K, 3) of all cycles with hindsight; None of an estimator that does not look back."""
+    """Returns smoothed positions (K, 3) [m] of all cycles; None of an estimator that does not smooth."""
 
 
 class Outcomes(NamedTuple):
-    """What is read of the diagnostics of an estimator of one's own: it has none."""
+    """Diagnostics that stand for those of a user's own estimator, which gives none."""
 
     landmark: Integers
     """(M,) -1: no component is known to be of a landmark."""
@@ -50,7 +54,10 @@ class Outcomes(NamedTuple):
 
 
 def own_estimator(name: str) -> Estimator:
-    """An estimator of one's own (`docs/own_methods.md`) behind the functions of all others."""
+    """Estimator made of the user's own class of that name (`docs/own_methods.md`); the poses it returns are checked.
+
+    The functions raise `ConfigError` for whatever it raises, and for a covariance or position that cannot be.
+    """
     own = load_own(name)
 
     def checked(found: SlamEstimate, what: str) -> SlamEstimate:
@@ -94,7 +101,7 @@ def own_estimator(name: str) -> Estimator:
 
 
 class Estimators(dict[str, Estimator]):
-    """Estimators by name; one that is not built in is looked up among methods of one's own."""
+    """SLAM estimators by name; a name that is not built in is loaded as a user's own (`module:attribute`)."""
 
     def __missing__(self, name: str) -> Estimator:
         return own_estimator(name)
@@ -118,4 +125,4 @@ ESTIMATORS = Estimators({
         use_vt=lambda settings: settings.channel_slam.planes,
     ),
 })  # fmt: skip
-"""All built-in estimators by name, and those of one's own when they are asked for."""
+"""Built-in SLAM estimators by name; a user's own are loaded when they are asked for."""

@@ -1,4 +1,5 @@
-"""The files that a method of one's own is made of: its own, and those beside it that it imports."""
+"""Source files that a user's own method consists of (its own file and those of its package that it imports), and their
+digest."""
 
 import ast
 import hashlib
@@ -7,9 +8,11 @@ from pathlib import Path
 
 
 def own_digest(file: Path) -> str:
-    """SHA-256 of a file and of all that it imports from its own folder or package, at any remove; of its bytes alone if
-    there is nothing of that kind. Installed libraries are no part of it, nor what is imported by a name made up on the
-    way."""
+    """SHA-256 of a Python file and of all that it imports, directly or not, from its own folder or package.
+
+    Of its bytes alone if there is nothing of that kind. Installed libraries are left out, as are imports by names that
+    are computed at run time.
+    """
     files = sorted(_all_of(file))
     if len(files) == 1:
         return hashlib.sha256(file.read_bytes()).hexdigest()
@@ -19,6 +22,7 @@ def own_digest(file: Path) -> str:
 
 
 def _all_of(file: Path) -> set[Path]:
+    """A Python file and all files that it imports, directly or not, from its own folder or package."""
     found, left = {file}, [file]
     while left:
         fresh = set(_imported(left.pop())) - found
@@ -28,7 +32,7 @@ def _all_of(file: Path) -> set[Path]:
 
 
 def _imported(file: Path) -> Iterator[Path]:
-    """Files below the root that a file names in its imports, packages on the way included."""
+    """Files of the same folder or package that a Python file imports, `__init__.py` of packages included."""
     root = _root(file)
     try:
         tree = ast.parse(file.read_bytes())
@@ -46,7 +50,7 @@ def _imported(file: Path) -> Iterator[Path]:
 
 
 def _places(folder: Path, names: list[str]) -> Iterator[Path]:
-    """The files of a dotted name and of every package on its way, as far as they are there."""
+    """Existing Python files of a dotted module name, and of every package that it names on the way."""
     place = folder
     for name in filter(None, names):
         place = place / name
@@ -56,7 +60,7 @@ def _places(folder: Path, names: list[str]) -> Iterator[Path]:
 
 
 def _root(file: Path) -> Path:
-    """Folder of the outermost package that a file lies in; its own if it lies in none."""
+    """Folder that contains the outermost package that a Python file belongs to; the file's folder if it is in none."""
     folder = file.parent
     while (folder / "__init__.py").is_file() and folder != folder.parent:
         folder = folder.parent

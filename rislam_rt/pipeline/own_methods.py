@@ -1,4 +1,4 @@
-"""Methods of one's own: a designer, an estimator or a channel from a user's file or an installed package, by name.
+"""A user's own methods: a code designer, an estimator or a channel from a file or an installed package, by name.
 
 A name is `module:attribute`, as `mine:my_designer` for a function in `mine.py`, or the name of an entry point of one of
 `GROUPS`. The command line looks for modules beside the pipeline file and in the working folder too.
@@ -30,18 +30,18 @@ from rislam_rt.model import (
 from rislam_rt.pipeline.own_files import own_digest
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
-"""Entry points under which an installed package offers methods."""
+"""Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
 @cache
 def load_own(name: str) -> Any:
-    """One's own method, channel or estimator that a name stands for; a class that takes no arguments is made.
+    """Import a user's own designer, estimator, channel or scheme by name; an estimator's class is instantiated.
 
     Raises
     ------
     ConfigError
-        There is nothing of that name.
+        There is nothing of that name, or it cannot be imported.
     """
     if not _FORM.fullmatch(name):
         return _entry_point(name)
@@ -61,12 +61,12 @@ def load_own(name: str) -> Any:
 
 @contextmanager
 def own_method_errors(name: str) -> Iterator[None]:
-    """Around a call of a method of one's own: whatever it raises becomes one line that says where.
+    """Turn whatever a user's own method raises within this context into a one-line error that names file and line.
 
     Raises
     ------
     ConfigError
-        It raised.
+        The method raised.
     """
     try:
         yield
@@ -83,13 +83,15 @@ def own_method_errors(name: str) -> Iterator[None]:
 
 
 def is_own(name: str) -> bool:
-    """Whether a name has the form of a method of one's own, or is an entry point's."""
+    """Whether a name has the form of a user's own method (`module:attribute`), or is that of an entry point."""
     return bool(_FORM.fullmatch(name)) or name in _offered()
 
 
 def own_digests(names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of the files behind the names that are methods of one's own, with what they import from beside them:
-    numbers depend on them."""
+    """SHA-256 of the source files of each of `names` that is a user's own method, by name; empty if it has no file.
+
+    Files of its own package that it imports are part of it: a run's numbers depend on them.
+    """
     found = {}
     for name in sorted(set(names)):
         if is_own(name):
@@ -101,12 +103,12 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
 def own_code(
     name: str, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator
 ) -> RisCode:
-    """The code of a designer of one's own.
+    """Phase code that a user's own designer returns for a belief, checked.
 
     Raises
     ------
     ConfigError
-        It returned something else than levels of the panel.
+        It raised, or returned something else than phase levels of the panel.
     """
     with own_method_errors(name):
         levels = np.asarray(load_own(name)(belief, panel, radio, rng=rng))
@@ -119,7 +121,7 @@ def own_code(
 
 
 class OwnChannel:
-    """A channel of one's own behind the protocol of all others, asked for paths of the trajectory's cycles."""
+    """Channel that takes its paths from a user's own channel class, and checks them."""
 
     def __init__(self, name: str, scene: Scene, radio: RadioConfig, depth: int) -> None:
         self.name, self.scene, self.radio, self.depth = name, scene, radio, depth
@@ -127,7 +129,7 @@ class OwnChannel:
             self.inner = load_own(name)(scene, radio, depth)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """What one's own channel gives: every path of every cycle, with the panel at level 0.
+        """Paths of all cycles of a trajectory from the user's own channel, with the RIS panel at phase level 0.
 
         Raises
         ------
@@ -142,17 +144,19 @@ class OwnChannel:
         return found
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """What one's own channel gives: the same paths under another code."""
+        """The same paths with the gains that the user's own channel gives under another phase code."""
         with own_method_errors(self.name):
             return self.inner.respond(paths, code)
 
 
 @cache
 def _offered() -> dict[str, Any]:
+    """Entry points of installed packages in `GROUPS`, by name."""
     return {entry.name: entry for group in GROUPS for entry in entry_points(group=group)}
 
 
 def _entry_point(name: str) -> Any:
+    """Load a user's own method from the entry point of an installed package."""
     entry = _offered().get(name)
     if entry is None:
         raise ConfigError(f"'{name}': no such method; give a built-in name, or module:attribute, as mine:my_designer")
@@ -164,7 +168,7 @@ def _entry_point(name: str) -> Any:
 
 
 def _made(name: str, found: Any) -> Any:
-    """One's own method ready for use: an estimator made, a function or a class of a channel as it is."""
+    """Check a loaded method of the user's own; an estimator's class is instantiated, all else returned as it is."""
     if not hasattr(found, "step"):
         if hasattr(found, "init") and hasattr(found, "estimate"):
             raise ConfigError(f"'{name}': has 'init' and 'estimate' and no 'step'; a filter has all three")
@@ -185,7 +189,7 @@ def _made(name: str, found: Any) -> Any:
 
 
 def _file(thing: Any) -> str | None:
-    """The source file of a method of one's own; None if it has none."""
+    """Path of the source file of a user's own method; None if it has none."""
     with suppress(TypeError):  # built into Python
         return inspect.getsourcefile(thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing))
     return None

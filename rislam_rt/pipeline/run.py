@@ -1,4 +1,4 @@
-"""A run: trace the room once, then lead every scheme through all cycles under the same noise."""
+"""A run of the pipeline: find all paths along the trajectory once, then simulate every scheme with the same noise."""
 
 import platform
 from collections.abc import Mapping, MutableMapping
@@ -33,35 +33,35 @@ from rislam_rt.scene.findings import raise_errors
 from rislam_rt.worker_pool import run_side_by_side
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
-"""Libraries that numbers depend on; their versions go into every result."""
+"""Libraries that a run's numbers depend on; their versions are written into every result."""
 IN_ONE_PIECE = 50_000
-"""Most cycles that are traced and held at once: 5 GB in the paper's room."""
+"""Most cycles of a run that is held in memory as a whole: 5 GB in the paper's room."""
 SAME_CYCLE = 0.01
-"""Share of its cycle by which the scene's may differ from the budget: what clocks and their time stamps leave open."""
+"""Largest relative difference between the scene's cycle time and the sum of the time budget: clocks are inexact."""
 CYCLE_BYTES = 100_000
-"""Of a cycle while it is traced, in the paper's room with two bounces."""
+"""Memory of the paths of one cycle [bytes], in the paper's room with two bounces."""
 
 
 class RunSetup(NamedTuple):
-    """What all schemes of a run share."""
+    """What all schemes of a run share: scene with the true motion, true paths, seeds."""
 
     scene: Scene
-    """With the true motion of this run."""
+    """With the true motion of this run as its trajectory."""
     paths: Paths
-    """Panel at level 0."""
+    """True paths along the motion, RIS panel at phase level 0."""
     body: Body
-    """Of a level agent: what is told of it."""
+    """Tx and Rx offsets of a level agent."""
     seeds: Seeds
     seconds: float
-    """Time [s] that the channel took."""
+    """Time [s] that finding the paths took."""
     extras: Paths | None = None
-    """What is heard besides, without identities."""
+    """Diffuse and diffracted paths; None if none are wanted."""
     receptions: Receptions | None = None
-    """Where schemes of one specification leave what they heard for each other; None if they do not."""
+    """Cache of measurements that schemes with the same codes share; None to keep none."""
 
 
 def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
-    """The room of a run with its true motion, the body of a level agent, and the run's seeds.
+    """Return a run's scene with its overrides and drawn true motion, the Tx and Rx offsets of a level agent, the seeds.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
 
 
 def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> RunSetup:
-    """Set a run up: draw the true motion and find all paths along it, independent of the noise, so that it serves many.
+    """Draw the true motion of a run and find all paths along it: what does not depend on noise, for all its schemes.
 
     Raises
     ------
@@ -95,12 +95,12 @@ def prepare_setup(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator)
 
 
 def check_one_piece(cycles: int, way_out: str) -> None:
-    """Refuse more cycles than a run in one piece has memory for on a small machine.
+    """Check that a run held in memory as a whole has at most `IN_ONE_PIECE` cycles.
 
     Raises
     ------
     ConfigError
-        There are more than `IN_ONE_PIECE`.
+        There are more; the message ends with `way_out`.
     """
     if cycles > IN_ONE_PIECE:
         raise ConfigError(
@@ -118,7 +118,7 @@ def run_slam(
     done: MutableMapping[str, SchemeResult] | None = None,
     progress: Tell = tell_nobody,
 ) -> SlamResult:
-    """Run all schemes of a specification in a room.
+    """Simulate all schemes of a pipeline specification in a scene, and return their estimates with the true paths.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def run_slam(
     jobs
         Schemes that run at the same time, in processes of their own if more than one; the result is the same.
     done
-        Schemes that need not run again; each new one is put there as soon as it is complete.
+        Results of schemes that need not run again; each new one is put there as soon as it is complete.
     progress
         Called after tracing and after every cycle.
 
@@ -156,7 +156,7 @@ def run_slam(
 def result_of(
     setup: RunSetup, spec: PipelineSpec, schemes: Mapping[str, SchemeResult], *, seed: int | None
 ) -> SlamResult:
-    """Schemes that ran on one setup, as a run."""
+    """Result of a run from the results of its schemes and their common setup."""
     return SlamResult(
         name=spec.name,
         scene=setup.scene,
@@ -173,19 +173,19 @@ def result_of(
 def run_scheme(
     name: str, setup: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
 ) -> SchemeResult:
-    """Run one scheme over all cycles, with its own estimator unless another is given."""
+    """Simulate one scheme over all cycles of a run, with the scheme's estimator unless another is given."""
     walk = SchemeSimulation(name, setup.scene, setup.body, spec, setup.seeds, estimator, setup.receptions)
     return walk.lead(setup.paths, 0, len(setup.scene.agent), tell, setup.extras)
 
 
 def check_run(scene: Scene, spec: PipelineSpec) -> None:
-    """Check that scene and specification of a run fit, before anything is traced or written.
+    """Check that scene and pipeline specification of a run fit, before paths are traced or files written.
 
     Raises
     ------
     ConfigError
-        The budget is not the cycle, there are fewer cycles than asked for, a scheme needs a panel that is not there, or
-        the room cannot be changed as asked, or extra paths are wanted that nobody could trace.
+        The time budget is not the scene's cycle time, the scene has fewer cycles than asked for, a scheme needs a panel
+        that is not there, the room cannot be changed as asked, or the channel cannot find the diffuse paths asked for.
     SceneError
         A wall's material is not specified at the radio's carrier.
     """
@@ -211,19 +211,19 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
 
 
 def prepare_channel(kind: str) -> None:
-    """Make sure that the machine can do what a run's channel needs, before anything is written.
+    """Load the ray tracer's backend if a run's channel needs it, so that a machine that lacks it is found out early.
 
     Raises
     ------
     SetupError
-        It cannot.
+        The machine lacks something that the tracer needs.
     """
     if kind == "traced":
         prepare_backend()
 
 
 def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:
-    """The channel of a run by name, or of one's own; the tracer is imported only if it is asked for."""
+    """Build the channel of that name: ray tracer, image sources or a user's own; the tracer is imported on demand."""
     if kind == "traced":
         from rislam_rt.channel.traced import TracedChannel
 
@@ -236,16 +236,15 @@ def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Ch
 
 
 def cut_scene(scene: Scene, cycles: int | None) -> Scene:
-    """The run's scene with its trajectory's first cycles alone."""
+    """Scene with the first `cycles` of its trajectory alone; unchanged if None."""
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
 def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings where the panel's formulas leave their range along the run's true motion; one line each, empty if
-    nowhere.
+    """Warnings, one line each, where a RIS panel is so large that the band resolves its elements' delays.
 
-    Gains are element by element, so that the far field's limit binds nothing; a path over the panel is one delay, which
-    a panel larger than the band resolves would not be.
+    A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
+    field.
     """
     if not any(SCHEMES[name].panel for name in spec.schemes):
         return ()
@@ -255,7 +254,7 @@ def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
 
 
 def library_versions() -> dict[str, str]:
-    """Versions that a run's numbers depend on: of this package, of Python and of the libraries."""
+    """Versions of this package, of Python and of the libraries that a run's numbers depend on, by name."""
     from rislam_rt import __version__
 
     found = {"rislam-rt": __version__, "python": platform.python_version()}
@@ -268,6 +267,6 @@ def library_versions() -> dict[str, str]:
 
 
 def _seed_of(rng: np.random.Generator) -> int | None:
-    """The integer that a run's generator was made from, if it was."""
+    """The integer seed that a run's generator was made from; None if it was not made from one."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None

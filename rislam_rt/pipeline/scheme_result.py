@@ -1,4 +1,4 @@
-"""The result of a scheme: a list of its cycles as arrays over all cycles."""
+"""The result of a scheme: the records of its cycles stacked as arrays over all cycles."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from rislam_rt.storage.netcdf import padded
 
 
 def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: RecordedInputs) -> SchemeResult:
-    """All cycles of a scheme, whose times (K,) [s] these are, as one result."""
+    """Stack the records of a scheme's cycles at `time` (K,) [s] as one result, landmarks in columns by number."""
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
     ident = np.unique(np.concatenate([m.ident for m in maps]))
@@ -59,13 +59,13 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
 
 
 def _codes(codes: Sequence[RisCode | None]) -> Integers:
-    """(K, N, M) level indices of the recorded codes; (K, 0, 0) without a panel."""
+    """Phase levels (K, N, M) of one code a cycle; (K, 0, 0) without a RIS panel."""
     if any(code is None for code in codes):
         return np.zeros((len(codes), 0, 0), dtype=np.int64)
     return np.array([code.index for code in codes if code is not None], dtype=np.int64)
 
 
 def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:
-    """Result of the filter's diagnostics: the scalar numbers among the fields of its infos, (K,) each."""
+    """Filter diagnostics of all cycles, (K,) each: the fields of `infos` that are scalar numbers, by name."""
     names = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
     return {name: np.array([float(getattr(info, name)) for info in infos]) for name in names}

@@ -1,4 +1,4 @@
-"""One scheme on its way through the cycles of a run, led through all of them at once or slice by slice."""
+"""Simulation of one scheme over the cycles of a run, all at once or slice by slice."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -25,9 +25,10 @@ from rislam_rt.ris import draw_panel
 
 
 class SchemeSimulation:
-    """Agent, generators and panel of one scheme between two slices; nothing in it grows with the cycles done.
+    """Simulation of one scheme: agent, code policy, panel errors and generators, kept from slice to slice of a run.
 
-    Cycle k draws from generators of its own, so that the numbers are the same however the run is cut.
+    Memory does not grow with the cycles. Cycle k draws from generators of its own, so that the numbers are the same
+    however the run is cut.
     """
 
     def __init__(
@@ -57,12 +58,13 @@ class SchemeSimulation:
 
     @property
     def foresight(self) -> int:
-        """Cycles beyond the last one whose paths a slice needs: a design on the truth looks as far as the delay."""
+        """Number of cycles after a slice whose paths it needs: the genie designs for the cycle of the code's use."""
         return self.context.spec.control.delay_cycles if self.scheme.on_truth else 0
 
     def lead(self, paths: Paths, first: int, last: int, tell: Tell, extras: Paths | None = None) -> SchemeResult:
-        """Cycles `first` to `last` (not included); `paths` begin at `first` and may go on beyond `last`, and so do the
-        `extras` that are heard with them.
+        """Simulate the cycles from `first` to `last` (not included), and return their result.
+
+        True `paths` and diffuse paths `extras` begin at `first` and may go on beyond `last`.
         """
         if self.context.panel is None:
             paths = without_panel(paths)
@@ -94,6 +96,6 @@ class SchemeSimulation:
 
 
 def without_panel(paths: Paths) -> Paths:
-    """The paths of a plain wall where the panel hangs: identities stay, panel paths are never there."""
+    """Paths of the same room without the RIS panel: paths over it are kept as columns, but never valid."""
     panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
     return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)

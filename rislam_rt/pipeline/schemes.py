@@ -1,4 +1,4 @@
-"""The schemes that a run compares: the panel and its codes, and who estimates from what is measured."""
+"""The schemes that a run compares: each with or without the panel, with a code designer and an estimator."""
 
 from typing import NamedTuple
 
@@ -8,25 +8,25 @@ from rislam_rt.spelling import did_you_mean, nearest
 
 
 class Scheme(NamedTuple):
-    """One way to run the room. All else, motion, channel and noise included, is the same for all schemes."""
+    """Combination of code designer (or no panel) and estimator; motion, channel and noise are the same for all."""
 
     method: str | None
     """Name of a designer; `spec`: the one that the pipeline names; None: a plain wall in the panel's place."""
     on_truth: bool = False
-    """Whether the design sees the true pose and map: a reference that no agent can reach."""
+    """Whether codes are designed on the true paths: the genie, a reference that no agent can reach."""
     estimator: str = "slam"
     """Name in `pipeline.estimators.ESTIMATORS`."""
 
     @property
     def panel(self) -> bool:
-        """Whether the scheme has a panel."""
+        """Whether the scheme uses the RIS panel."""
         return self.method is not None
 
 
 class Schemes(dict[str, Scheme]):
-    """Schemes by name; a name that is not built in is looked up among methods of one's own.
+    """Schemes by name; a name that is not built in is loaded as a user's own method (`module:attribute`).
 
-    A designer becomes a scheme with the default estimator, an estimator one under random codes.
+    A designer becomes a scheme with the default estimator, an estimator one with random codes.
     """
 
     def __missing__(self, name: str) -> Scheme:
@@ -51,16 +51,16 @@ SCHEMES = Schemes(
         "channel_slam_no_ris": Scheme(None, estimator="channel_slam"),
     }
 )
-"""All built-in schemes by name, and those of one's own when they are asked for."""
+"""Built-in schemes by name; a user's own are loaded when they are asked for."""
 
 
 def check_scheme(name: str) -> str:
-    """The name, if it is a scheme's.
+    """Return `name` if it is that of a built-in scheme or of a user's own method.
 
     Raises
     ------
     ValueError
-        It is not; with the names that are.
+        It is not; the message lists the built-in ones.
     """
     if name in SCHEMES:
         return name

@@ -1,4 +1,4 @@
-"""Data sets of received signals: paths under stated codes, the samples that they make, and what is found in them."""
+"""Data sets of received signals: true paths under stated phase codes, samples, and the components found in them."""
 
 import shutil
 from collections.abc import Callable, Sequence
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
     import xarray as xr
 
 BYTES_PER_SAMPLE = 8
-"""Real and imaginary part in single precision."""
+"""Bytes of one complex sample: real and imaginary part in single precision."""
 
 
 class SignalsSpec(Section):
-    """What may be set for a data set of signals."""
+    """Settings of a data set of received signals: seed, phase codes, radio and receiver."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
     code: Literal["focused", "random", "zero"] = "focused"
-    """What the panel does: focus on the agent anew in every cycle, a random code in every cycle, or level 0."""
+    """Phase codes of the panel: focused on the agent in every cycle, random in every cycle, or level 0 throughout."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection(estimator="waveform")
 
 
 class SignalsSize(NamedTuple):
-    """Shape of a data set's samples."""
+    """Size of the samples in a data set of received signals."""
 
     cycles: int
     captures: int
@@ -46,7 +46,7 @@ class SignalsSize(NamedTuple):
 
     @property
     def num_bytes(self) -> int:
-        """Bytes of the signals' samples alone."""
+        """Number of bytes that the samples of a data set of received signals take."""
         return self.cycles * self.captures * self.antennas * self.tones * BYTES_PER_SAMPLE
 
     def __str__(self) -> str:
@@ -57,7 +57,7 @@ class SignalsSize(NamedTuple):
 
 
 def load_signals_spec(overrides: Sequence[str]) -> SignalsSpec:
-    """Specification of a data set of signals: defaults with `key=value` settings (dotted keys) put over them.
+    """Settings of a data set of received signals: the defaults, changed by `key=value` overrides (dotted keys).
 
     Raises
     ------
@@ -69,12 +69,12 @@ def load_signals_spec(overrides: Sequence[str]) -> SignalsSpec:
 
 
 def signal_settings(spec: SignalsSpec, scene: Scene | None = None) -> tuple[RadioConfig, ReceiverConfig]:
-    """Radio and receiver in SI units and linear ratios, told how many panels a scene has that take turns.
+    """Radio and receiver of a data set of signals, in SI units and linear ratios, for as many panels as the scene has.
 
     Raises
     ------
     ConfigError
-        A value is out of the range that the record itself checks, or the receiver makes no samples.
+        A value is out of range, or the receiver is one that makes no samples.
     """
     receiver = ReceiverConfig(**spec.receiver.model_dump(), panels=max(len(scene.panels), 1) if scene else 1)
     if receiver.estimator != "waveform":
@@ -83,13 +83,13 @@ def signal_settings(spec: SignalsSpec, scene: Scene | None = None) -> tuple[Radi
 
 
 def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
-    """How large the samples of a data set of signals will be."""
+    """Size that the samples of a scene's data set of received signals will have."""
     radio, receiver = signal_settings(spec, scene)
     return SignalsSize(len(scene.agent), receiver.num_captures, radio.array.num_antennas, num_tones(radio, receiver))
 
 
 def check_space(file: Path, size: SignalsSize) -> None:
-    """Make sure that a data set's signals fit on the disk, before an hour's work is lost.
+    """Check that the samples of a data set of received signals fit on the disk of `file`, before they are made.
 
     Raises
     ------
@@ -106,12 +106,12 @@ def check_space(file: Path, size: SignalsSize) -> None:
 
 
 def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rng: np.random.Generator) -> Paths:
-    """The room's paths for a data set of signals, with the panel under the code of each cycle.
+    """True paths of a scene for a data set of received signals, with gains under the phase code of each cycle.
 
     Raises
     ------
     ConfigError
-        The receiver is to alternate and the panel has no level of half a turn.
+        The receiver is to alternate and the panel has no phase level of pi.
     TraceError, SetupError
         The traced channel failed, or the machine lacks what it needs.
     """
@@ -125,7 +125,10 @@ def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rn
 
 
 def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generator) -> RisCode | None:
-    """Codes (K, N, M) of a data set of signals, one a cycle; None without a panel, or for its level 0."""
+    """Phase codes (K, N, M) of a data set of signals, one a cycle; None without a RIS panel, or for its level 0.
+
+    `kind`: `focused` on the agent (random where every path over the panel has walls), `random` or `zero`.
+    """
     if scene.ris is None or kind == "zero":
         return None
     panel = scene.ris.spec
@@ -138,7 +141,7 @@ def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generat
 def build_signals(
     scene: Scene, paths: Paths, spec: SignalsSpec, *, rng: np.random.Generator, on_cycle: Callable[[], None]
 ) -> "xr.Dataset":
-    """True trajectory and paths, samples, and what the receiver found in them, in one data set."""
+    """Data set of true trajectory, true paths, received samples and the components that the receiver found in them."""
     radio, receiver = signal_settings(spec, scene)
     signals = signals_dataset(paths, scene.agent, radio, receiver, rng=rng, on_cycle=on_cycle)
     truth = paths_to_dataset(paths, scene.agent)
@@ -149,5 +152,5 @@ def build_signals(
 
 
 def mean_components(data: "xr.Dataset") -> float:
-    """Mean number of components a cycle in a data set of signals."""
+    """Mean number of components per cycle that the receiver found in a data set of received signals."""
     return float((data["found_path"] != NO_COMPONENT).sum()) / max(data.sizes["time"], 1)

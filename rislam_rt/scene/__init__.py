@@ -1,4 +1,4 @@
-"""Floor 3: scenes on disk. Read (TOML and meshes to `Scene`), build, check, write."""
+"""Floor 3: scenes on disk. Read (TOML and meshes to `Scene`), build, import, check, write."""
 
 from rislam_rt.scene.load import check_scene, load_scene
 from rislam_rt.scene.templates import new_scene

@@ -1,14 +1,14 @@
-"""Rays along which components arrive, and where they would end if they came straight from a point."""
+"""Arrival rays of components in room axes, and where on them a point scatterer would lie."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.predicted_returns import Poses
 
 
-def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
-    """Points (..., 3) at which lengths and cosines (..., 3) end, and their distances (...,) from the Rx.
+def scatterer_positions(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
+    """Positions (..., 3) [m] of point scatterers that explain lengths and cosines (..., 3), and distances (...,) to Rx.
 
     A point on the ray `u` from the Rx lies as far out as the two legs have length for: `|r u - b| = l - r` with `b`
     from Rx to Tx.
@@ -20,7 +20,7 @@ def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
 
 
 def rays(seen: Floats, heading: Floats | float) -> Floats:
-    """Unit vectors (..., 3) towards what arrives from above with lengths and cosines (..., 3), in the room's axes."""
+    """Unit vectors (..., 3) in room axes towards the arrivals of lengths and cosines (..., 3), taken as from above."""
     flat = seen[..., 1:] / np.maximum(1.0, np.linalg.norm(seen[..., 1:], axis=-1))[..., None]
     up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))
     return np.concatenate([flat, up[..., None]], axis=-1) @ rotation_z(np.asarray(heading)).T

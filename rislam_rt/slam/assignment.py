@@ -1,4 +1,4 @@
-"""Assignment of measurements to what is expected, to tracks, or to neither: what pairs cost, and the best of all."""
+"""Assignment of measured components to predicted returns or tracks: what each pair costs, and the least cost of all."""
 
 from typing import NamedTuple
 
@@ -9,27 +9,28 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.observations import UNTOLD, Observations
 
 DIAGONAL = np.arange(3)
+"""Index of the diagonal of a 3 x 3 matrix."""
 
 
 class Candidates(NamedTuple):
-    """C predicted returns, of landmarks or tracks, that a measurement may be assigned to."""
+    """C predicted returns, of landmarks or tracks, to which measurements may be assigned."""
 
     seen: Floats
-    """(C, 3) predicted length [m] and cosines."""
+    """Predicted lengths [m] and cosines (C, 3)."""
     covariance: Floats
-    """(C, 3, 3) of the prediction."""
+    """Covariances (C, 3, 3) of the predicted lengths and cosines."""
     log_amplitude: Floats
-    """(C,)."""
+    """Predicted log amplitudes (C,)."""
     log_amplitude_std: Floats
-    """(C,)."""
+    """Standard deviations (C,) of the predicted log amplitudes."""
     log_odds: Floats
-    """(C,) logarithm of the probability that it shows at all."""
+    """Log odds (C,) that the return is detected in this cycle."""
     side: Integers
-    """(C,) (see `slam.observations`)."""
+    """Side of the panels (C,): `OTHER`, `PANEL` + q or `UNTOLD` (see `slam.observations`)."""
 
 
 def cheapest(cost: Floats) -> tuple[Integers, Integers]:
-    """Rows and columns of the one assignment of least cost (R, C), of those pairs that lower it."""
+    """Rows and columns of the pairs of the one-to-one assignment of least cost (R, C), those of negative cost alone."""
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     good = cost[rows, columns] < 0.0
     return rows[good], columns[good]
@@ -39,7 +40,8 @@ def pair_costs(
     candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float,
     pairs: tuple[Integers, Integers] | None = None,
 ) -> Floats:  # fmt: skip
-    """(C, M): -2 log of the likelihood ratio of each pair against a stranger, 0 where it cannot be.
+    """Costs (C, M) of assigning measurements to candidates: -2 log likelihood ratio against a new or false component,
+    at most 0.
 
     A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
     to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
@@ -62,8 +64,12 @@ def pair_costs(
 def within_reach(
     seen: Floats, variance: Floats, candidates: Candidates, observations: Observations, gate: float
 ) -> tuple[Integers, Integers]:
-    """Pairs (P,), (P,) of candidates at (C, 3), each axis with at most that variance, and observations, each axis and
-    the amplitude in the gate, on one side: no distance is less than that along one axis alone."""
+    """Pairs (P,), (P,) of candidates and observations that may be in the gate: each axis and the amplitude are, and the
+    sides agree.
+
+    Candidates are taken at `seen` (C, 3), with at most `variance` (C, 3) along each axis: no Mahalanobis distance is
+    less than that along one axis alone.
+    """
     reach = gate * (variance[:, :1] + observations.std[:, 0] ** 2)
     row, column = ((seen[:, :1] - observations.seen[:, 0]) ** 2 <= reach).nonzero()
     gap, loudness = seen[row] - observations.seen[column], candidates.log_amplitude[row]

@@ -1,4 +1,4 @@
-"""Configuration of the filter, and what the agent is told about its start."""
+"""Configuration of the SLAM filter: the settings `[slam]`."""
 
 from dataclasses import dataclass
 
@@ -10,28 +10,28 @@ from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.setting_checks import check_inside, check_named, check_not_negative
 
 FILTERS = ("window", "nested")
-"""Filters with the same inputs and outputs."""
+"""Names that `slam.filter` takes: filters with the same inputs and outputs."""
 DEFAULT_NESTED = NestedConfig()
-"""Frozen, so that all settings may share it."""
+"""Default settings of the nested filter; frozen, so that all settings may share them."""
 MAX_SAMPLES = 10_000
-"""Of positions for the design: ten times and more what any study of this package takes."""
+"""Largest number of positions for the phase design: ten times and more what any study of this package takes."""
 
 
 @dataclass(frozen=True, slots=True)
 class SlamConfig:
-    """Everything that the filter is free to choose. SI units."""
+    """Settings of the SLAM filter, which localises the agent and maps the room. SI units."""
 
     filter: str = "window"
-    """Who localises and maps: the default, or the paper's `nested` particle filter; same inputs, same outputs."""
+    """Which filter localises and maps: `window` or the paper's `nested` particle filter; same inputs, same outputs."""
     sigma_a: float = 0.01
     """Standard deviation of the white acceleration [m/s^2]."""
     motion: str = "learnt"
-    """`learnt`: how lively each step is, `sigma_a` being a first guess; `told`: white acceleration of `sigma_a`. Of the
-    default filter; others are told."""
+    """Motion model: `learnt` estimates the acceleration of each step, from `sigma_a` as a first value; `told` is white
+    acceleration of `sigma_a`. Of the default filter; the others are always told."""
     use_vt: bool = True
     """Whether wall returns (virtual transmitters) join the map as planes, or are thrown away as in the paper."""
     heading: str = "known"
-    """`known` by a compass or `estimated`; of the nested filter also along the `velocity`."""
+    """How the heading is found: `known` by a compass, `estimated`, or, in the nested filter, along the `velocity`."""
     turn_std: float = 0.01
     """Random walk of an estimated heading [rad/sqrt(s)]."""
     height: str = "known"
@@ -43,9 +43,9 @@ class SlamConfig:
     """Expected components of paths that the map lacks, per metre of length, unit of each cosine, and e-fold of
     amplitude; false ones come on top, as many as the agent is told of its receiver."""
     num_samples: int = 32
-    """Positions handed to the phase design."""
+    """Number of equally likely positions handed to the phase design."""
     nested: NestedConfig = DEFAULT_NESTED
-    """What only the filter `nested` takes."""
+    """Settings that the filter `nested` alone takes."""
 
     def __post_init__(self) -> None:
         states = ("known", "estimated")
@@ -62,5 +62,5 @@ class SlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """(3,) ones for the axes that are filtered."""
+        """Ones (3,) for the position's axes that are estimated, zero for a known height."""
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])

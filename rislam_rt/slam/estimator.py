@@ -1,4 +1,4 @@
-"""The estimator of pose and map: the same four functions for every filter that `slam.filter` names."""
+"""The estimator of the agent's pose and the map: the same functions for every filter that `slam.filter` names."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
-    """An estimator's state at the start: the start prior, and an empty map."""
+    """State of the SLAM filter before the first cycle: the start prior of the agent, and an empty map."""
     if config.filter == "window":
         return window.init(start, body, ris, sensor, config, rng=rng)
     return nested.init(start, body, ris, sensor, config, rng=rng)
@@ -27,18 +27,18 @@ def step(
     state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> tuple[Any, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    """Advance the SLAM filter by a measurement: `dt` [s] since the last, `heading` [rad], `code` held to be applied."""
     advance = window.step if isinstance(state, window.WindowState) else nested.step
     return advance(state, measurement, code, dt, heading, config, rng=rng)
 
 
 def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent."""
+    """Estimate of pose and map predicted `dt` [s] ahead without noise, to where the next cycle finds the agent."""
     return window.predict(_front(state), dt, config)
 
 
 def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Any:
-    """Another run, or another agent's, on the map of an earlier one: landmarks, walls and who they are stay known.
+    """State of the SLAM filter that begins another run, or another agent's, on an earlier run's map and identities.
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
@@ -47,15 +47,15 @@ def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random
 
 
 def smoothed(state: Any) -> Floats | None:
-    """Positions (K, 3) [m] of all cycles with the hindsight of the window; None of a filter that does not look back."""
+    """Smoothed positions (K, 3) [m] of the agent in all cycles, with hindsight; None of a filter without smoothing."""
     return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 
 def estimate(state: Any, config: SlamConfig) -> SlamEstimate:
-    """An estimator's mean and covariance of the pose, equally likely samples of it, and the map."""
+    """Estimate that a SLAM filter's state holds: mean, covariance, equally likely samples of the pose, and the map."""
     return window.estimate(_front(state), config)
 
 
 def _front(state: Any) -> window.WindowState:
-    """What pose and map are read from: the window filter's state, or the nested filter's Gaussian view."""
+    """Window state from which pose and map are read: the window filter's own, or the nested filter's Gaussian view."""
     return state if isinstance(state, window.WindowState) else state.front

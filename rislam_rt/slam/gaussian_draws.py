@@ -1,4 +1,4 @@
-"""Gaussian draws without a random number, and square roots of covariances."""
+"""Gaussian samples without random numbers (quasi-random draws), and square roots of covariances."""
 
 from functools import lru_cache
 
@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 
 
 def square_root(covariance: Floats) -> Floats:
-    """A factor (D, K) with `factor @ factor.T = covariance`, null directions left out."""
+    """Square root (D, K) of a covariance (D, D), `factor @ factor.T = covariance`, null directions left out."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     keep = values > 1e-12
@@ -17,17 +17,18 @@ def square_root(covariance: Floats) -> Floats:
 
 
 def square_roots(covariance: Floats) -> Floats:
-    """Factors (N, D, D) of covariances (N, D, D) as by `square_root`, null directions being columns of zeros."""
+    """Square roots (N, D, D) of covariances (N, D, D) as by `square_root`, null directions being columns of zeros."""
     scale = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-30))
     values, vectors = np.linalg.eigh(covariance / (scale[:, :, None] * scale[:, None, :]))
     return np.asarray(scale[:, :, None] * vectors * np.sqrt(np.where(values > 1e-12, values, 0.0))[:, None, :])
 
 
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
+"""Bases of Halton's sequence, one for each dimension."""
 
 
 def radical_inverse(count: int, base: int) -> Floats:
-    """(count,) van der Corput's sequence in (0, 1): the digits of 1, 2, ... in a base, mirrored at the point.
+    """First terms (count,) of van der Corput's sequence in (0, 1): the digits of 1, 2, ... mirrored at the point.
 
     `scipy.stats.qmc.Halton` without its half second of import.
     """
@@ -40,7 +41,7 @@ def radical_inverse(count: int, base: int) -> Floats:
 
 @lru_cache(maxsize=16)
 def even_draws(count: int, dims: int) -> Floats:
-    """(count, dims) equally likely draws of a standard normal without a random number: mean 0, covariance 1.
+    """Equally likely, deterministic samples (count, dims) of a standard normal, corrected to mean 0 and covariance 1.
 
     Halton's sequence through the normal quantile.
     """

@@ -1,17 +1,18 @@
-"""Walls as planes and the images of points in them, with their uncertainty, from the features of a map."""
+"""Geometry of the estimated map: its walls as planes, and mirror images of its points in them, with covariances."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.returns import AXES, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, by_wall, reflect
 
 MAX_LEAN = np.radians(1.0)
-"""RMS angle [rad] between a wall's normal and its mean above which the belief does not know how the wall stands, and it
-is not shown on the map."""
+"""Largest RMS angle [rad] between a wall's normal and its mean at which the wall is shown on the map: beyond it the
+belief does not know how the wall stands."""
 
 
 def wall_planes(mean: Floats, covariance: Floats, anchor: Floats, rows: Integers) -> tuple[Floats, Floats, Floats]:
-    """Normals (W, 3) away from the agent, offsets (W,), standard deviations (W, 2) of angle and offset at the foot."""
+    """Estimated planes of walls: normals (W, 3) away from the agent, offsets (W,) [m], deviations (W, 2) of angle [rad]
+    and offset [m]."""
     span = mean[rows] - anchor[rows]
     length = np.sqrt(np.vecdot(span, span))
     normal = span / length[:, None]
@@ -25,7 +26,7 @@ def wall_planes(mean: Floats, covariance: Floats, anchor: Floats, rows: Integers
 def images_in(
     mean: Floats, covariance: Floats, anchors: Floats, points: Integers, walls: Integers
 ) -> tuple[Floats, Floats]:
-    """Mirror images (Q, 3) of points in walls, and their covariances (Q, 3, 3) from both."""
+    """Mirror images (Q, 3) [m] of the map's points in its walls, and covariances (Q, 3, 3) from the errors of both."""
     if not len(points):
         return np.zeros((0, 3)), np.zeros((0, 3, 3))
     point, wall, anchor = mean[points], mean[walls], anchors[walls]
@@ -41,6 +42,6 @@ def images_in(
 
 
 def diagonal_blocks(covariance: Floats, rows: Integers) -> Floats:
-    """Diagonal blocks (R, 3, 3) of some of the map's features."""
+    """Covariances (R, 3, 3) of some of the map's features: diagonal blocks of the joint covariance (3F, 3F)."""
     columns = 3 * rows[:, None] + np.arange(3)
     return covariance[columns[:, :, None], columns[:, None, :]]

@@ -9,24 +9,24 @@ import numpy as np
 
 
 class ModelConstants(NamedTuple):
-    """SI units; probabilities are a cycle's unless said otherwise."""
+    """Constants of the SLAM filters' model, in SI units; probabilities are a cycle's unless said otherwise."""
 
     window: int = 40
-    """Poses that are re-linearised: a batch over 40 cycles does what one over the run does."""
+    """Number of poses that are re-linearised: a batch over 40 cycles does what one over the run does."""
     rare: float = 0.02
-    """Probability of what happens every 5 s: the motion mode changes; something comes to stand in a path's way."""
+    """Probability of a rare event, one in 5 s: the motion mode changes; an obstacle comes to block a path."""
     tail: float = 4.0
-    """Degrees of freedom of Student's t, where the receiver tells no tails: neighbours that the map lacks."""
+    """Degrees of freedom of the residuals' Student's t, where the receiver tells none: neighbours the map lacks."""
     wall_ratio: float = -0.6
     """Mean log amplitude reflection of a wall: concrete to plasterboard at 10 GHz, ITU-R P.2040."""
     wall_ratio_std: float = 0.5
-    """Its spread over building materials."""
+    """Standard deviation of a wall's log amplitude reflection over building materials."""
     fading: float = 0.3
-    """Spread of one amplitude about its law: angle of incidence, neighbours."""
+    """Standard deviation of one log amplitude about its law: angle of incidence, neighbours."""
     strength: float = 0.15
     """Median root of a scatterer's cross-section [m]: a sphere of 0.08 m radius."""
     strength_std: float = 1.2
-    """Spread of its logarithm."""
+    """Standard deviation of the logarithm of the root of a scatterer's cross-section."""
     panels: float = 0.1
     """Panels per scatterer, where there is a panel at all: one in a room, among what is found in it."""
     lean: float = 0.01
@@ -38,59 +38,59 @@ class ModelConstants(NamedTuple):
     size: float = 15.0
     """Radius [m] of the volume in which features are looked for."""
     born: float = 0.95
-    """Posterior probability of a kind from which on a feature enters the map."""
+    """Posterior probability of a birth hypothesis from which on its feature enters the map."""
     fit: float = 3.0
-    """Standard deviations of its cost above which a hypothesis does not fit at all."""
+    """Standard deviations of its cost above which a birth hypothesis does not fit at all."""
     company: float = 0.25
     """Probability that a new track shares its cell with another path: 0.2 to 0.35 of traced components, whatever their
     SNR (docs/slam_measured.md)."""
     memory: float = 4.0
-    """Cycles over which the pull of such neighbours keeps its sign: phases turn once in half a wavelength of motion."""
+    """Cycles over which an unresolved neighbour's pull keeps its sign: phases turn once in half a wavelength moved."""
     cleared: float = 0.05
-    """Probability that in a cycle what stands in the way of a path goes away again."""
+    """Probability that an obstacle which blocks a path goes away again in a cycle."""
     depth: float = 0.15
     """Distance [m] beyond a wall from which on a thing is behind it, and not on it: furniture, frames."""
     shown: float = 0.95
-    """Probability that a path above the threshold with nothing in its way is reported by itself."""
+    """Probability that a path above the threshold and not occluded is reported as a component of its own."""
     law: float = 0.05
     """Relative error of predicted amplitudes: geometry, and what the amplitude law leaves out."""
     walk: float = 1.0
-    """Standard deviation [m/s] of a velocity of which nothing is known; as far [m] an agent goes astray."""
+    """Standard deviation [m/s] of a velocity of which nothing is known, and [m] of the position of a lost agent."""
     level: float = 0.001
     """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on a level floor."""
     calmest: float = 0.003
-    """The same of the horizontal one: a rail car..."""
+    """Standard deviation [m/s^2] of the horizontal acceleration in the calmest motion mode: a rail car."""
     liveliest: float = 1.0
-    """...and in the liveliest mode: a person who turns on the spot."""
+    """Standard deviation [m/s^2] of the horizontal acceleration in the liveliest mode: a person turns on the spot."""
 
     @property
     def stay(self) -> float:
-        """Probability that a step is as lively as the one before."""
+        """Probability that the motion mode of a step is that of the step before."""
         return 1.0 - self.rare
 
     @property
     def dead(self) -> float:
-        """Probability of existence below which a feature is taken back."""
+        """Probability of existence below which a feature is removed from the map."""
         return self.rare
 
     @property
     def log_lost(self) -> float:
-        """Log probability that a cycle is the one in which the agent is lost: two rare things at once."""
+        """Log probability that the agent is lost in this very cycle: two rare events at once."""
         return 2.0 * self.log_rare
 
     @property
     def max_log_ratio(self) -> float:
-        """Most that one observation may add to log odds: what was observed is a rare thing of another kind."""
+        """Largest change of log odds by one observation, which may always be a rare event of another kind."""
         return -self.log_rare
 
     @property
     def log_born(self) -> float:
-        """Log odds from which on a thing is held for true."""
+        """Log odds above which a hypothesis is held for true."""
         return float(np.log(self.born / (1.0 - self.born)))
 
     @property
     def log_rare(self) -> float:
-        """Of an unannounced manoeuvre; of a thing behind a wall; of two walls neither of which is heard by itself."""
+        """Log probability of an unannounced manoeuvre, a thing behind a wall, two walls neither of which is heard."""
         return float(np.log(self.rare))
 
     @property
@@ -101,33 +101,34 @@ class ModelConstants(NamedTuple):
 
     @property
     def weaker(self) -> float:
-        """Share of the weaker of two paths that are a wall's loss apart in the place of both, and its spread."""
+        """Weight of the weaker of two unresolved paths, a wall's loss apart, in their component; and its deviation."""
         return float(1.0 / (1.0 + np.exp(-self.wall_ratio)))
 
     @property
     def steady(self) -> float:
-        """Probability that nothing stands in the way of a leg that was not looked for before."""
+        """Prior probability that nothing blocks a leg that was not looked for before."""
         return self.cleared / (self.cleared + self.rare)
 
     @property
     def crowd(self) -> float:
-        """Mean square of a residual in reported deviations beforehand: as much as still fits."""
+        """Prior mean square of a residual in reported standard deviations: as much as still fits."""
         return self.fit**2
 
     @property
     def against(self) -> float:
-        """Median squared residual (3 dof, half are below 2.4) from which on measurements contradict a feature."""
+        """Median squared residual (3 dof, half are below 2.4) above which measurements contradict a feature."""
         return self.fit**2
 
     @property
     def log_volume(self) -> float:
-        """Of the space in which features are looked for [m^3]."""
+        """Logarithm of the volume [m^3] in which features are looked for."""
         return float(np.log(4.0 / 3.0 * np.pi * self.size**3))
 
     @property
     def log_upright(self) -> float:
-        """Log odds of an upright or level surface."""
+        """Prior log odds that a surface is upright or level."""
         return float(np.log(self.upright / (1.0 - self.upright)))
 
 
 CONSTANTS = ModelConstants()
+"""The constants of the model that all filters use."""

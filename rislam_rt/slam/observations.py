@@ -1,4 +1,4 @@
-"""Observations of one cycle in the units of the filters, and on which side of the panels they are."""
+"""Observations: a cycle's components in the units of the filters, and whether each ran over a panel."""
 
 from typing import NamedTuple
 
@@ -14,45 +14,45 @@ LOS_MARGIN = 0.1
 FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
 UNTOLD, OTHER, PANEL = -1, 0, 1
-"""Which side a component is on, where the receiver sets the panel's paths apart by alternating codes; `PANEL` + q for
-panel q of several."""
+"""Sides of a component, where the receiver sets the panel's paths apart by alternating codes: either, not over the
+panel, over the panel (`PANEL` + q for panel q of several)."""
 
 
 class Observations(NamedTuple):
-    """One cycle's measurement in the units of the filter."""
+    """The M multipath components of one cycle in the units of the filters."""
 
     seen: Floats
-    """(M, 3) length [m] and two cosines."""
+    """Lengths [m] and direction cosines in the body frame (M, 3)."""
     std: Floats
-    """(M, 3)."""
+    """Standard deviations (M, 3) of length [m] and cosines."""
     log_amplitude: Floats
-    """(M,)."""
+    """Logarithms (M,) of the amplitudes."""
     log_amplitude_std: Floats
-    """(M,)."""
+    """Standard deviations (M,) of the log amplitudes."""
     ratio: Floats
-    """(M,) amplitude over that of free space of the same length."""
+    """Amplitudes (M,) over that of free space of the same length."""
     side: Integers | None = None
-    """(M,) `PANEL`, `OTHER` or, where either may be, `UNTOLD`; None where the receiver does not tell."""
+    """Side (M,) of each component: `PANEL`, `OTHER` or, if either, `UNTOLD`; None where the receiver does not tell."""
     panel_odds: Floats | None = None
-    """(M,) log odds of having run over the panel, of several the likeliest, likewise."""
+    """Log odds (M,) of having run over the panel, of several the likeliest; None where the receiver does not tell."""
 
     @property
     def sides(self) -> Integers:
-        """(M,) with `UNTOLD` where the receiver does not tell."""
+        """Side (M,) of each component, `UNTOLD` where the receiver does not tell."""
         return np.full(len(self.ratio), UNTOLD) if self.side is None else self.side
 
     @property
     def odds(self) -> Floats:
-        """(M,) log odds of having run over the panel, 0 where the receiver does not tell."""
+        """Log odds (M,) that a component ran over the panel, 0 where the receiver does not tell."""
         return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
 
     def take(self, rows: Integers) -> "Observations":
-        """Only some of the observations."""
+        """Observations of some of the components, by row."""
         return Observations._make(None if field is None else field[rows] for field in self)
 
 
 def observations_of(measurement: Measurement, radio: RadioConfig) -> Observations:
-    """A measurement in the filter's units; nothing stays infinite, no standard deviation zero."""
+    """Observations in the filter's units of a measurement; nothing stays infinite, no standard deviation zero."""
     length = np.clip(SPEED_OF_LIGHT * measurement.tau, 0.0, FAR)
     amplitude = np.clip(measurement.amplitude, 1e-30, 1e30)
     free = np.exp(free_space(radio)) / np.maximum(length, 1e-3)
@@ -68,7 +68,7 @@ def observations_of(measurement: Measurement, radio: RadioConfig) -> Observation
 
 
 def stranger_density(observations: Observations, sensor: SensorModel, new_density: float) -> Floats:
-    """(M,) expected new or false components per metre, unit of each cosine and e-fold of amplitude, where each lies.
+    """Expected density (M,) of new or false components per metre, unit of each cosine and e-fold, at each observation.
 
     False ones are as strong as noise that passes the threshold, hence rare where a component is strong.
     """
@@ -80,7 +80,7 @@ def stranger_density(observations: Observations, sensor: SensorModel, new_densit
 
 
 def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[Integers | None, Floats | None]:
-    """Side (M,) of components that ran over a panel with a probability (M,), and its log odds; None without them.
+    """Side (M,) of components from the probability (M,) of having run over a panel, and its log odds; None without it.
 
     What may be either is left open. `panel` (M,): which of several panels that is.
     """
@@ -100,6 +100,6 @@ def free_space(radio: RadioConfig) -> float:
 
 
 def is_los(observations: Observations, body: Body) -> Booleans:
-    """(M,) whether a component is no longer than the direct path, which the body's drawing tells."""
+    """Whether each component (M,) is the direct path: no longer than the baseline from Tx to Rx of the agent's body."""
     baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
     return observations.seen[:, 0] < baseline + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)

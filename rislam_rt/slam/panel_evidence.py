@@ -1,4 +1,4 @@
-"""Identity of landmarks, which one is the panel: Bayes from amplitudes under the codes that were applied.
+"""Evidence for which landmark is the RIS panel: Bayes' rule on amplitudes under the phase codes that were applied.
 
 "Is the panel" predicts the amplitude with no free parameter (Rician about the panel's gain under the code, averaged
 over the belief); "is a scatterer" predicts one unknown cross-section for all cycles, integrated out on a grid. Cycles
@@ -16,13 +16,13 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 
 STRENGTHS = np.linspace(np.log(1e-3), np.log(3.0), 81)
-"""Grid of log sqrt(cross-section / m^2): 1 mm to 3 m in steps of 10 %."""
+"""Grid (G,) of a scatterer's log strength, log sqrt(cross-section / m^2): 1 mm to 3 m in steps of 10 %."""
 BEYOND = 8.0
-"""Standard deviations above the threshold from which on no amplitude stays below it."""
+"""Standard deviations above the detection threshold from which on no amplitude stays below it."""
 
 
 def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
-    """Log density of the amplitude of a constant `mean` in complex noise of `std` a real dimension."""
+    """Log density (Rice) of the amplitude of a path of mean `mean` in complex noise of `std` in each real dimension."""
     variance = std**2
     product = amplitude * mean / variance
     bessel = np.log(scipy.special.i0e(product))
@@ -30,7 +30,7 @@ def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
 
 
 def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
-    """Log probability that the amplitude of a constant `mean` is not reported: below `threshold`, shaded or merged.
+    """Log probability that a path of mean amplitude `mean` is not reported: below `threshold`, occluded or merged.
 
     Below it is one minus Marcum's Q, a noncentral chi-square of two degrees of freedom.
     """
@@ -40,21 +40,21 @@ def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
 
 
 def log_panel(amplitude: Floats, std: Floats, gain: Complexes) -> Floats:
-    """Log likelihood (P,) of amplitudes (P,) under "is the panel", averaged over belief samples of gain (P, S)."""
+    """Log likelihood (P,) that amplitudes (P,) are those of the RIS panel, averaged over samples (P, S) of its gain."""
     mean = np.abs(gain)
     each = log_rice(amplitude[:, None], mean, _spread(std, mean))
     return np.logaddexp.reduce(each, axis=1) - np.log(gain.shape[1])
 
 
 def log_panel_missed(std: Floats, gain: Complexes, threshold: float) -> Floats:
-    """Log probability (P,) that the panel is not reported, averaged over belief samples of gain (P, S)."""
+    """Log probability (P,) that the RIS panel is not reported, averaged over samples (P, S) of its gain."""
     mean = np.abs(gain)
     each = log_missed(mean, _spread(std, mean), threshold)
     return np.logaddexp.reduce(each, axis=1) - np.log(gain.shape[1])
 
 
 def log_scatterer(amplitude: Floats, std: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
-    """Log likelihood (P, G) of a scatterer's identity from amplitudes (P,), for every strength of the grid."""
+    """Log likelihood (P, G) that landmarks of amplitudes (P,) are scatterers, for every strength of the grid."""
     mean = point_amplitude(np.exp(STRENGTHS), tx_length[:, None], rx_length[:, None], radio)
     return log_rice(amplitude[:, None], mean, _spread(std, mean))
 
@@ -68,7 +68,7 @@ def log_scatterer_missed(
 
 
 def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
-    """Mean and standard deviation (P,) of the log strength from grids (P, G) of log likelihoods."""
+    """Mean and standard deviation (P,) of scatterers' log strengths from grids (P, G) of log likelihoods."""
     weight = np.exp(log_grid - np.logaddexp.reduce(log_grid, axis=1, keepdims=True))
     mean = weight @ STRENGTHS
     step = STRENGTHS[1] - STRENGTHS[0]
@@ -76,7 +76,8 @@ def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
 
 
 def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Floats) -> tuple[Floats, Floats]:
-    """One cycle's amplitudes for P points: new grids (P, G), and new log odds of panel against scatterer.
+    """Log probabilities (P, G) of scatterer strengths and log odds of panel against scatterer of P landmarks, after one
+    cycle's amplitudes.
 
     Grids are log probabilities. The odds, and what `panel` says of them, are (P,), or (P, Q) for Q panels.
     """
@@ -87,7 +88,7 @@ def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Fl
 
 
 def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
-    """Identities after one more silent cycle of P points that are one of Q panels, or a scatterer.
+    """Update of P landmarks' log odds of Q panels against scatterer by a cycle in which none of them was detected.
 
     `missed` (P, Q + 1) is the probability of silence while nothing is in the way, `hidden` (P, Q + 1) that something
     is, the scatterer's last. What is blocked is silent whatever it is: a gap tells as much as its first cycles, not
@@ -100,7 +101,7 @@ def weigh_silence(hidden: Floats, missed: Floats) -> tuple[Floats, Floats]:
 
 
 def panel_probabilities(log_ris: Floats) -> Floats:
-    """Probability of each of P points of being each panel, from log odds (P, Q) against scatterer; for one (P,) alike.
+    """Probabilities (P, Q) that each of P landmarks is each panel, from log odds (P, Q) against scatterer; or (P,).
 
     A panel is one of the points or none of them, which competes with prior one point's worth; a point is one panel at
     most. Exact, over all ways to give each panel a point of its own or none.
@@ -113,7 +114,7 @@ def panel_probabilities(log_ris: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def _probabilities(odds: bytes, panels: int) -> Floats:
-    """(P, Q), read-only: asked for several times in a cycle."""
+    """Probabilities (P, Q) of `panel_probabilities`, read-only and cached: asked for several times in a cycle."""
     table = np.frombuffer(odds).reshape(-1, panels)
     before, after = _log_ways(table), _log_ways(table[::-1])[::-1]
     total = np.logaddexp.reduce(before[-1, ::-1])
@@ -129,14 +130,14 @@ def _probabilities(odds: bytes, panels: int) -> Floats:
 
 
 def ris_probabilities(log_ris: Floats, points: Integers) -> Floats:
-    """(F, Q) of being each panel, from log odds (F, Q); 0 but for the rows `points`."""
+    """Probabilities (F, Q) that each feature is each RIS panel, from log odds (F, Q); 0 but for the rows `points`."""
     probability = np.zeros(log_ris.shape)
     probability[points] = panel_probabilities(log_ris[points])
     return probability
 
 
 def panel_rows(probability: Floats) -> tuple[int, ...]:
-    """(Q,) row of the landmark held for each panel (probability (F, Q) above one half), -1 where none is."""
+    """Row (Q,) of the landmark held for each RIS panel, by a probability (F, Q) above one half; -1 where none is."""
     if not len(probability):
         return (-1,) * probability.shape[1]
     rows = np.argmax(probability, axis=0)
@@ -144,7 +145,7 @@ def panel_rows(probability: Floats) -> tuple[int, ...]:
 
 
 def _log_ways(table: Floats) -> Floats:
-    """(P + 1, 2^Q) log weight of giving the panels of each set (as bits) different ones of the first points."""
+    """Log weights (P + 1, 2^Q) of giving a set of panels (as bits) different ones of the first 0 to P landmarks."""
     points, panels = table.shape
     ways = np.full((points + 1, 2**panels), -np.inf)
     ways[:, 0] = 0.0

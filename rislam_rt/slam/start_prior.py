@@ -1,4 +1,4 @@
-"""What the agent is told about its start."""
+"""Start prior: what the agent is told of its first position, velocity and heading."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,20 @@ from rislam_rt.errors import ConfigError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StartPrior:
-    """What the agent is told about its first pose: a Gaussian about it."""
+    """Gaussian prior of the agent's first position, velocity and heading, as it is told."""
 
     position: Floats
-    """(3,) [m]."""
+    """Mean (3,) [m] of the position."""
     velocity: Floats
-    """(3,) [m/s]."""
+    """Mean (3,) [m/s] of the velocity."""
     heading: float
-    """[rad]."""
+    """Mean [rad] of the heading."""
     position_std: float = 0.01
-    """[m], each axis; the height is exact when it is known."""
+    """Standard deviation [m] of the position along each axis; the height is exact when it is known."""
     velocity_std: float = 0.01
-    """[m/s], each axis."""
+    """Standard deviation [m/s] of the velocity along each axis."""
     heading_std: float = 0.0
-    """[rad], where the heading is estimated."""
+    """Standard deviation [rad] of the heading, where it is estimated."""
 
     def __post_init__(self) -> None:
         freeze(self, "position", np.float64, (3,))

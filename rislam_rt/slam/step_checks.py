@@ -6,16 +6,16 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import DataSheet, Measurement, RisCode, RisSpecs
 
 MAX_STEP = 1e6
-"""[s] Twelve days; the squares of longer steps leave nothing of what was known."""
+"""Longest time step [s]: twelve days; the squares of longer ones leave nothing of what was known."""
 
 
 def check_sides(measurement: Measurement, ris: DataSheet | None) -> None:
-    """Check that a measurement which tells the panels' components says which of several they ran over.
+    """Check that a measurement which sets the panels' components apart says over which of several panels each ran.
 
     Raises
     ------
     ConfigError
-        It does not.
+        It does not say so.
     """
     if measurement.from_panel is not None and measurement.panel is None and isinstance(ris, RisSpecs):
         raise ConfigError(

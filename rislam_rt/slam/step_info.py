@@ -1,4 +1,4 @@
-"""What a filter's step says of its cycle (`StepInfo`)."""
+"""Diagnostics that a filter's step returns about its cycle (`StepInfo`)."""
 
 from enum import StrEnum
 from typing import NamedTuple
@@ -6,30 +6,39 @@ from typing import NamedTuple
 from rislam_rt.arrays import Integers
 
 UNUSED, REMOVED = -1, -2
-"""In `StepInfo.landmark`: clutter or not yet explained; taken for LOS or a wall return."""
+"""Values of `StepInfo.landmark`: clutter or not yet explained; taken for the direct path or a wall return."""
 
 
 class StepOutcome(StrEnum):
-    """How a cycle went. Values, not exceptions: a filter must survive every one of them."""
+    """How a filter's cycle went. Values, not exceptions: a filter must survive every one of them."""
 
     OK = "ok"
+    """Components were heard, the map holds landmarks, and the filter does not hold itself for lost."""
     NO_MEASUREMENTS = "no measurements"
+    """The receiver reported no component."""
     NO_LANDMARKS = "no landmarks"
+    """The map holds no landmark."""
     DIVERGED = "diverged"
+    """The filter holds itself for lost."""
 
 
 class StepInfo(NamedTuple):
-    """Diagnostics of one cycle."""
+    """Diagnostics of one cycle of a SLAM filter."""
 
     landmark: Integers
-    """(M,) ident that each measurement went to, of an image or two walls by a number of both; -1 clutter or unused,
-    -2 removed as LOS or wall return."""
+    """Number (M,) of the landmark to which each measurement was assigned, for an image or two walls that of both
+    together; -1 clutter or unused, -2 removed as LOS or wall return."""
     ess: float
     """Effective sample size before resampling."""
     resampled: bool
+    """Whether the particles were resampled in this cycle."""
     nis: float
     """Normalised innovation squared of the mean belief."""
     nis_dof: int
+    """Degrees of freedom of `nis`."""
     log_evidence: float
+    """Log density of the cycle's measurements given all earlier ones."""
     num_landmarks: int
+    """Number of landmarks that the map holds."""
     outcome: StepOutcome
+    """How the cycle went."""

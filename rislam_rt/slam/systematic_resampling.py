@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats, Integers
 
 
 def ancestors_at(weight: Floats, size: int, comb: Floats) -> Integers:
-    """Ancestors (K, size) by systematic resampling of each row of (K, N), from where its comb (K,) in [0, 1) starts.
+    """Ancestor rows (K, size) by systematic resampling of each row of weights (K, N), whose comb (K,) starts in [0, 1).
 
     Particle i of a row is drawn `size w_i` times on average; the ancestors come in the order of the particles.
     """
@@ -17,5 +17,5 @@ def ancestors_at(weight: Floats, size: int, comb: Floats) -> Integers:
 
 
 def systematic_ancestors(weight: Floats, count: int, *, rng: np.random.Generator) -> Integers:
-    """Ancestors (count,) by systematic resampling of one set of weights (N,), unbiased."""
+    """Ancestor rows (count,) by systematic resampling of one set of particle weights (N,), unbiased."""
     return ancestors_at(weight[None], count, rng.random(1))[0]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from rislam_rt.channel.compare import PathReport, Validation, compare_paths, validate_rooms
-from rislam_rt.channel.compare.both_channels import room_rng, trace_both
+from rislam_rt.channel.compare.channel_comparison import room_rng, trace_both
 from rislam_rt.errors import RislamError
 from rislam_rt.model import Paths, RadioConfig, Scene
 from rislam_rt.pipeline.specification.radio import build_radio

@@ -117,8 +117,9 @@ def run_sweep(
         left = any(read_row(folder, cell).state != DONE for cell in cells)
         # a cluster first: one that is not there leaves no folder behind
         hired = _hire(stack, effort) if left and effort.dask is not None else None
-        stack.enter_context(open_folder(folder, sweep))
-        board = _Board(sweep, folder, effort, cells, tell, grow)
+        shown = effort.only_estimate and (folder / "table.csv").is_file()  # tables of what was run stay as they are
+        stack.enter_context(open_folder(folder, sweep, keep=shown))
+        board = _Board(sweep, folder, effort, cells, tell, grow, keep=shown)
         stack.callback(board.write)
         if board.left:
             run, board.width = hired or _hire(stack, effort)
@@ -161,7 +162,10 @@ class _Board:
         cells: Sequence[Cell],
         tell: Callable[[SweepProgress], None] | None,
         grow: Callable[[Sequence[Row]], None] | None,
+        *,
+        keep: bool,
     ) -> None:
+        self.keep = keep
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
         self.rows = {cell.ident: read_row(folder, cell) for cell in cells}
         self.left = {
@@ -201,7 +205,9 @@ class _Board:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Bring a running sweep's table up to date."""
+        """Bring a running sweep's table up to date, unless it is one to keep."""
+        if self.keep:
+            return
         begin = monotonic()
         rows = list(self.rows.values())
         write_table(self.folder, rows)

@@ -79,8 +79,9 @@ def check_folder(folder: Path) -> None:
 
 
 @contextmanager
-def open_folder(folder: Path, sweep: Sweep) -> Iterator[None]:
-    """Make the folder, say what is swept, keep other sweeps out, and remove what a killed one was writing.
+def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None]:
+    """Make the folder, say what is swept (unless what it says is to be kept), keep other sweeps out, and remove what a
+    killed one was writing.
 
     Raises
     ------
@@ -95,7 +96,8 @@ def open_folder(folder: Path, sweep: Sweep) -> Iterator[None]:
         with hold(folder, "sweep"):
             check_folder(folder)
             remove_temporaries((folder, folder / "cells"))
-            write_sweep(folder, sweep)
+            if not keep:
+                write_sweep(folder, sweep)
             yield
     finally:
         remove_empty(made)

@@ -1,4 +1,4 @@
-"""Ray-traced paths: Sionna RT and Mitsuba on the room's meshes. The only folder that imports them, and late.
+"""Ray-traced channel: Sionna RT and Mitsuba on the room's meshes. The only folder that imports them, and late.
 
 How a trajectory of K cycles becomes few solves:
 

@@ -1,1 +1,1 @@
-"""Runs of many cycles: led, written and scored slice by slice."""
+"""Long runs: simulated, written and scored in slices of some cycles, so that memory does not grow with the cycles."""

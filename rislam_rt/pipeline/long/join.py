@@ -10,10 +10,11 @@ from rislam_rt.arrays import Integers
 from rislam_rt.model import NOTHING, Paths, SchemeResult
 
 Identity = tuple[int, int, tuple[int, ...], tuple[int, ...]]
+"""Identity of a path: kind, landmark, walls on the Tx leg, walls on the Rx leg."""
 
 
 def join_paths(parts: Sequence[Paths]) -> Paths:
-    """Join paths of consecutive cycles of a long run; a path that a slice lacks is not valid there."""
+    """Join the true paths of consecutive slices of a long run; a path that a slice lacks is not valid there."""
     columns = path_columns(parts)
     count = max((int(c.max(initial=-1)) for c in columns), default=-1) + 1
     first: dict[str, Any] = {}
@@ -31,7 +32,7 @@ def join_paths(parts: Sequence[Paths]) -> Paths:
 
 
 def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> SchemeResult:
-    """Join one scheme over consecutive slices, whose paths tell which gain belongs to which identity."""
+    """Join the results of one scheme over consecutive slices, gains in columns by path identity as in `paths`."""
     columns = path_columns(paths)
     count = max((int(c.max(initial=-1)) for c in columns), default=-1) + 1
     ident = np.unique(np.concatenate([part.ident for part in parts]))
@@ -62,13 +63,13 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
 
 
 def subsampled_paths(paths: Paths, rows: Integers) -> Paths:
-    """Some cycles alone of the joined paths."""
+    """Paths of the cycles in `rows` alone."""
     names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
     return replace(paths, **{name: getattr(paths, name)[rows] for name in names}, ris=None)
 
 
 def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
-    """Some cycles alone of the joined scheme."""
+    """Result of a scheme for the cycles in `rows` alone."""
     names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
              "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
     return replace(
@@ -82,7 +83,7 @@ def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
 
 
 def path_columns(parts: Sequence[Paths]) -> list[Integers]:
-    """For each part to join, the common column (P,) of each of its paths, in the order of first appearance."""
+    """For each slice of a long run, the joined column (P,) of each of its paths, by order of first appearance."""
     numbers: dict[Identity, int] = {}
     return [
         np.array([numbers.setdefault(p.identity(i), len(numbers)) for i in range(p.num_paths)], dtype=np.int64)
@@ -91,7 +92,7 @@ def path_columns(parts: Sequence[Paths]) -> list[Integers]:
 
 
 def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> Any:
-    """Joined arrays (K_i, P_i, ...) under each other, at their columns of (K, count, ...); zero elsewhere."""
+    """Array (K, count, ...) of arrays (K_i, P_i, ...) under each other, each at its `columns`; zero elsewhere."""
     tail = tuple(max(sizes) for sizes in zip(*(part.shape[2:] for part in parts), strict=True))
     table = np.zeros((sum(map(len, parts)), count, *tail), dtype=parts[0].dtype)
     row = 0
@@ -105,11 +106,11 @@ def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> An
 
 
 def _renamed(path: Integers, column: Integers) -> Integers:
-    """Path columns of a part as those of the joined paths; what is no column (clutter, nothing) stays."""
+    """Path numbers of a slice's components as numbers of the joined paths; negative ones (clutter, none) stay."""
     return np.where(path >= 0, column[np.maximum(path, 0)] if len(column) else path, path)
 
 
 def _stacked(parts: Sequence[Integers]) -> Integers:
-    """Joined rows of different width under each other, filled up with `NOTHING`."""
+    """Arrays of different width under each other, rows filled up with `NOTHING`."""
     width = max(part.shape[1] for part in parts)
     return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=NOTHING) for p in parts])

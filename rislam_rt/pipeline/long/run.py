@@ -1,4 +1,4 @@
-"""A long run from its slices: schemes side by side, scores counted slice by slice, the folder that it leaves."""
+"""A long run in slices: simulates the schemes side by side, scores them slice by slice, completes the run folder."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -44,24 +44,26 @@ from rislam_rt.worker_pool import run_side_by_side
 
 
 class LongRun(NamedTuple):
-    """A run in slices: its scores over all cycles, and every n-th cycle for figures."""
+    """Result of a long run: scores over all cycles, and every n-th cycle for figures."""
 
     summary: dict[str, Any]
+    """All scores, for JSON."""
     shown: SlamResult
+    """Every n-th cycle, at most `SHOWN`."""
 
 
 def is_long(scene: Scene, spec: PipelineSpec) -> bool:
-    """Whether a run goes slice by slice."""
+    """Whether a run has so many cycles that it is simulated in slices."""
     return (spec.cycles or len(scene.agent)) > slices.SLICE
 
 
 def run_long(
     scene: Scene, spec: PipelineSpec, store: RunFolder, *, rng: np.random.Generator, jobs: int, progress: Tell
 ) -> LongRun:
-    """Run all schemes of a specification slice by slice into a run's folder, and complete it.
+    """Simulate all schemes of a long run slice by slice, write each slice to the run folder, and complete the folder.
 
-    Schemes that are there are not run again. Memory does not grow with the cycles, and neither does what is returned:
-    the slices' files are the result.
+    Schemes that are there already are not run again. Neither memory nor what is returned grows with the cycles: the
+    slices' files are the result.
 
     Raises
     ------
@@ -102,7 +104,7 @@ def run_long(
 
 
 def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
-    """Scores and figures' cycles of schemes whose slices are all there; `about` as in the marker of the run.
+    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in the run's marker.
 
     Raises
     ------
@@ -139,7 +141,7 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) 
 
 
 def read_any(folder: Path) -> LongRun:
-    """Scores and figures' cycles of a completed run, in slices or in one piece, worked out anew.
+    """Read a completed run folder, in slices or not, score it anew, and return scores and the cycles for figures.
 
     Raises
     ------
@@ -163,7 +165,7 @@ def read_any(folder: Path) -> LongRun:
 
 
 def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
-    """Whether this version knows the settings that the run was made with: its bounds are worked out from them."""
+    """Check that this version knows all settings of a run read from `folder`, as its bounds are computed from them."""
     try:
         PipelineSpec.model_validate(dict(config))
     except ValidationError as error:
@@ -176,7 +178,7 @@ def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
 
 
 def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:
-    """Complete a long run: all that the slices do not hold; the last step is the marker."""
+    """Write the files of a long run that are not in slices: trajectories, maps, scores and, last, the marker."""
     tracks = {"truth.tum": _truth_lines(scene)}
     for name in about["schemes"]:
         tracks[f"estimate_{name}.tum"] = _estimate_lines(store, name, scene)
@@ -189,7 +191,7 @@ def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str
 
 
 def _remove_unfinished(store: RunFolder) -> None:
-    """Remove a long run's slices of schemes that did not come to their end: they begin anew."""
+    """Remove the slices of schemes that were interrupted in a long run: these schemes begin anew."""
     for place in sorted((store.folder / FOLDER).glob("*")):
         for file in place.glob("*.nc"):
             if str(file.relative_to(store.folder)) not in store.files:
@@ -201,11 +203,13 @@ def _remove_unfinished(store: RunFolder) -> None:
 
 
 def _truth_lines(scene: Scene) -> Iterator[bytes]:
+    """True trajectory of a long run in TUM format, slice by slice."""
     for first, last in slice_bounds(len(scene.agent)):
         motion = scene.agent[first:last]
         yield tum_bytes(motion.time, motion.position, motion.heading)
 
 
 def _estimate_lines(store: RunFolder, name: str, scene: Scene) -> Iterator[bytes]:
+    """Estimated trajectory of one scheme of a long run in TUM format, slice by slice."""
     for part in read_parts(store.folder, name, scene, store.identity.digest):
         yield tum_bytes(part.motion.time, part.scheme.position, part.scheme.heading)

@@ -1,8 +1,8 @@
-"""Long runs: traced, led and written slice by slice, so that memory does not grow with the number of cycles.
+"""Slices of long runs: paths are found and schemes simulated for some cycles at a time, each written to a file.
 
-A scheme goes through the slices one after the other and leaves a file in each slice's folder; the agent, its generators
-and the panel go along, the paths and the cycles' records do not. Noise is drawn for each path of a slice, so that the
-law is that of a run in one piece, and its draws are not.
+A scheme goes through the slices one after the other; agent, generators and panel are kept from slice to slice, paths
+and the cycles' records are not, so that memory does not grow with the cycles. Noise is drawn for each path of a slice:
+its distribution is that of a run in one piece, its draws are not.
 """
 
 from collections.abc import Iterable, Iterator
@@ -35,14 +35,14 @@ from rislam_rt.progress import Tell
 from rislam_rt.storage.netcdf import read_dataset, write_dataset
 
 SLICE = 1000
-"""Cycles of a slice. With the paper's room a cycle holds 0.1 MB while it is traced: 0.1 GB a slice."""
+"""Number of cycles in a slice. In the paper's room the paths of a cycle take 0.1 MB: 0.1 GB a slice."""
 SHOWN = 2000
-"""Most cycles that figures of a run in slices are drawn from."""
+"""Largest number of cycles that figures of a long run are drawn from."""
 FOLDER, PATHS_FILE = "slices", "paths.nc"
 
 
 class SlicePart(NamedTuple):
-    """One slice of one scheme, as it was written."""
+    """One slice of a long run, read from its files: true trajectory, true paths and the result of one scheme."""
 
     motion: Trajectory
     paths: Paths
@@ -50,21 +50,21 @@ class SlicePart(NamedTuple):
 
 
 def slice_bounds(cycles: int) -> list[tuple[int, int]]:
-    """First cycle of each slice, and the first one after it."""
+    """First cycle of each slice of a long run, and the first one after the slice."""
     return [(first, min(first + SLICE, cycles)) for first in range(0, cycles, SLICE)]
 
 
 def slice_file(folder: Path, number: int, name: str) -> Path:
-    """A file of a slice."""
+    """Path of a file `name` of slice `number` in a run folder."""
     return folder / FOLDER / f"{number:05d}" / name
 
 
 def run_slices(
     name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, folder: Path, run: str, tell: Tell
 ) -> float:
-    """Lead one scheme through all slices, each written to `folder` when it is done. Returns the seconds of tracing.
+    """Simulate one scheme over all slices of a long run and write each to `folder`; return the seconds of path finding.
 
-    `run` is the run's identity, which every file carries.
+    `run` is the run's identity, which is written into every file.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def run_slices(
 
 
 def slice_files(name: str, cycles: int) -> list[str]:
-    """Names below the run's folder of all files that a scheme in slices leaves."""
+    """Names of all slice files that a scheme of a long run writes, relative to the run folder."""
     count = len(slice_bounds(cycles))
     return [
         str(slice_file(Path(), number, file))
@@ -105,7 +105,7 @@ def slice_files(name: str, cycles: int) -> list[str]:
 
 
 def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[SlicePart]:
-    """The slices of a scheme in the order of time, one at a time.
+    """Read the slices of one scheme of a long run from its folder, in order of time, one after the other.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
-    """Every n-th cycle of a scheme whose slices are `parts`, at most `SHOWN` in all, for figures."""
+    """True trajectory, true paths and result of a scheme at every n-th cycle of a long run, at most `SHOWN` in all."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
     for part in parts:

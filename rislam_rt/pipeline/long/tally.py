@@ -1,6 +1,6 @@
-"""Tally of a run's scores, slice by slice: the same as of the whole run, but for the posterior bound.
+"""Tally of a long run's scores, summed slice by slice: equal to the scores of the whole run, without posterior bound.
 
-The bound is a recursion over all cycles with every path that is ever heard among its unknowns; it is left out (None).
+The bound is a recursion over all cycles in which every path that is ever detected has unknowns; it is None here.
 """
 
 from collections import Counter
@@ -27,7 +27,7 @@ CLUTTER = None
 
 
 class Tally:
-    """Running sums of one scheme, whose estimator has wall returns in its map or not (`use_vt`)."""
+    """Running sums for the scores of one scheme of a long run, whose estimator maps wall returns or not (`use_vt`)."""
 
     def __init__(self, scene: Scene, budget: Any, *, use_vt: bool) -> None:
         self.scene, self.budget, self.use_vt = scene, budget, use_vt
@@ -46,13 +46,13 @@ class Tally:
         self.panel = False
 
     def counting(self, parts: Iterable[SlicePart]) -> Iterator[SlicePart]:
-        """The slices of a long run, each counted as it goes by: a slice's files are read once for all that asks."""
+        """Yield the slices of a long run unchanged, adding each to the sums, so that its files are read only once."""
         for part in parts:
             self.add(part)
             yield part
 
     def add(self, part: SlicePart) -> None:
-        """Count one slice of a long run."""
+        """Add the errors, associations, landmarks and times of one slice to the sums."""
         scheme, truth = part.scheme, part.motion.position
         errors = position_errors(scheme.position, truth)
         self.cycles += len(errors)
@@ -72,7 +72,7 @@ class Tally:
         self._count_components(part)
 
     def scores(self) -> dict[str, Any]:
-        """Scores from the tally of a long run, as `summarise_scheme` gives them."""
+        """Scores of one scheme of a long run, by name as `summarise_scheme` gives them."""
         walls = wall_scores(self.scene, self.map)
         seconds = dict(zip(STEPS, (self.seconds / self.cycles).tolist(), strict=True))
         nees = None if self.nees is None else self.nees[0] / self.cycles
@@ -98,6 +98,7 @@ class Tally:
         }
 
     def _count_landmarks(self, part: SlicePart) -> None:
+        """Add the squared errors of each landmark in one slice, and the cycles in which it is held and identified."""
         track = landmark_track(self.scene, part.scheme)
         self.landmark_square += np.nansum(track.error**2, axis=0)
         self.held += (track.column >= 0).sum(axis=0)
@@ -109,6 +110,7 @@ class Tally:
             self.identified[number] += int(np.sum(part.scheme.named(panel)[rows, column[rows]]))
 
     def _landmarks(self) -> dict[str, dict[str, Any]]:
+        """Scores of each true landmark, by name."""
         found: dict[str, dict[str, Any]] = {}
         for number, name in enumerate(self.scene.landmarks):
             held, final = int(self.held[number]), float(self.landmark_final[number])
@@ -123,7 +125,7 @@ class Tally:
         return found
 
     def _count_components(self, part: SlicePart) -> None:
-        """How often each label met each landmark or image."""
+        """Add to the counts of components by the landmark that the estimator associated and by their true source."""
         scheme = part.scheme
         shown = scheme.component_path != NOTHING
         label = np.maximum(scheme.component_landmark[shown], -1)
@@ -133,6 +135,7 @@ class Tally:
             self.pairs[who, sources[path]] += count
 
     def _association(self) -> tuple[float, float, float]:
+        """Accuracy, precision and recall of data association."""
         labels = sorted({label for label, _ in self.pairs})
         sources = sorted({source for _, source in self.pairs}, key=lambda s: (s is not None, s))
         counts = np.array([[self.pairs[label, source] for source in sources] for label in labels], dtype=np.int64)
@@ -143,7 +146,7 @@ class Tally:
 
 
 class _Overlap:
-    """Sums for the error after the best turn about z and shift (see `evaluate.align`)."""
+    """Sums for the position RMSE after the best rotation about z and shift of the estimate (see `evaluate.align`)."""
 
     def __init__(self) -> None:
         self.count, self.cross = 0, 0j
@@ -151,7 +154,7 @@ class _Overlap:
         self.origin: Floats | None = None
 
     def add(self, estimate: Floats, truth: Floats) -> None:
-        """Add positions to the tally of the aligned error, about the first true one, so that little cancels."""
+        """Add estimated and true positions (K, 3) [m], relative to the first true one against cancellation."""
         self.origin = truth[0].copy() if self.origin is None else self.origin
         estimate, truth = estimate - self.origin, truth - self.origin
         self.count += len(truth)
@@ -160,7 +163,7 @@ class _Overlap:
         self.cross += complex(np.sum(np.conj(_plane(estimate)) * _plane(truth)))
 
     def rmse(self) -> float:
-        """Root mean square [m] over x, y and z of the aligned positions."""
+        """Root mean square error [m] of the positions after alignment."""
         mean = self.sums / self.count
         overlap = self.cross - self.count * complex(np.conj(_plane(mean[:1])[0]) * _plane(mean[1:])[0])
         own, true, both = self.squares - self.count * np.stack([mean[0] ** 2, mean[1] ** 2, mean[0] * mean[1]])
@@ -170,4 +173,5 @@ class _Overlap:
 
 
 def _plane(points: Floats) -> Any:
+    """Horizontal coordinates of points (K, 3) as complex numbers x + jy."""
     return points[:, 0] + 1j * points[:, 1]

@@ -1,4 +1,4 @@
-"""What an estimator was given, as arrays and as files, and what any estimator makes of it."""
+"""Recordings of an estimator's inputs, as arrays and as files, and estimates of pose and map from them."""
 
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs
 from rislam_rt.pipeline.recordings.own_measurements import inputs_of, localise, read_inputs

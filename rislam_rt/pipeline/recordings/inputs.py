@@ -1,4 +1,4 @@
-"""Inputs of an estimator, cycle by cycle, as arrays and as a NetCDF file: so that others can be given the same."""
+"""Inputs of an estimator, cycle by cycle, as arrays and as a NetCDF file, so that other estimators can get the same."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.cycle import Cycle
 
 PADDING = -9.0
-"""Fills cycles that have fewer components than the fullest one."""
+"""Value that fills the arrays where a cycle has fewer components than the one with most."""
 PARTS = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std")
-"""Fields of a measurement."""
+"""Fields of a measurement that every recording has."""
 INPUTS: dict[str, Entry] = {
     "time": (("time",), "s", "time since the first cycle"),
     "heading": (("time",), "rad", "compass: heading of the body about z"),
@@ -44,37 +44,40 @@ INPUTS: dict[str, Entry] = {
     "panel_up": (("panel", "xyz"), "1", "unit vector along a column"),
     "panel_amplitude": (("panel",), "1", "amplitude of an element"),
 }
-"""What an estimator may see."""
+"""Variables of a recording: axes, unit and meaning of everything that an estimator gets."""
 
 
 class Inputs(NamedTuple):
-    """All that an estimator gets over K cycles."""
+    """All that an estimator gets over K cycles: start prior, data sheets, compass, measurements, phase codes."""
 
     start: StartPrior
+    """Prior of position, velocity and heading at the first cycle."""
     body: Body
+    """Offsets of Tx and Rx from the agent's position, body frame."""
     panel: DataSheet | None
-    """Data sheet; None without a panel."""
+    """Data sheet of the RIS panels; None without a panel."""
     time: Floats
     """(K,) [s] since the first cycle."""
     heading: Floats
     """(K,) [rad], of the compass; NaN without one."""
     measurements: tuple[Measurement, ...]
-    """(K,)."""
+    """(K,) one a cycle."""
     codes: tuple[RisCode | None, ...]
-    """(K,) what the agent holds the panel to be set to; None without a panel."""
+    """(K,) phase code that the agent holds to be applied; None without a panel."""
 
 
 class RecordedInputs(NamedTuple):
-    """What an estimator was given over some cycles, and what it drew from."""
+    """Inputs of an estimator over some cycles, and the seed of its random numbers."""
 
     inputs: Inputs
     seed: np.random.SeedSequence
+    """Of the estimator's generator."""
 
 
 def given_of(
     told: "AssumedModel", first: int, cycles: "Sequence[Cycle]", seed: np.random.SeedSequence
 ) -> RecordedInputs:
-    """Record of what the estimator was given from cycle `first` on."""
+    """Record of an estimator's inputs in consecutive cycles from `first` on, from the assumed model and the cycles."""
     span = slice(first, first + len(cycles))
     time, heading = told.time[span] - told.time[0], told.heading[span]
     measurements = tuple(cycle.measurement for cycle in cycles)
@@ -83,13 +86,13 @@ def given_of(
 
 
 def given_to_dataset(result: SchemeResult) -> "xr.Dataset":
-    """What a scheme's estimator was given, as `rislam-rt slam` reads it: nothing in it is of the truth."""
+    """NetCDF data set of the inputs of a scheme's estimator, as `rislam-rt slam` reads it, without anything true."""
     inputs, seed = result.given
     return inputs_to_dataset(inputs, scheme=result.scheme, **seed_marks(seed))
 
 
 def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
-    """Variables of `INPUTS`, and attributes: the rest of the start and of the panel's data sheet, and `about`."""
+    """NetCDF data set of an estimator's inputs: variables of `INPUTS`; the scalars and `about` as attributes."""
     import xarray as xr
 
     heard = inputs.measurements
@@ -118,7 +121,7 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
 
 
 def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
-    """What an estimator is given, from the variables of `INPUTS` alone: a file of one's own needs no truth."""
+    """Inputs of an estimator from a NetCDF data set with the variables of `INPUTS`; no truth is needed."""
     marks = data.attrs
     start = StartPrior(
         data["start_position"].to_numpy(),
@@ -132,12 +135,12 @@ def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
 
 
 def seed_marks(seed: np.random.SeedSequence) -> dict[str, Any]:
-    """A seed as attributes: an estimator that draws from it does again what it did."""
+    """Attributes of a NetCDF recording that hold the seed of the estimator's random numbers."""
     return {"filter_entropy": str(seed.entropy), "filter_spawn_key": np.array(seed.spawn_key, dtype=np.int64)}
 
 
 def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
-    """The generator that the estimator of a run drew from; None in a file of another origin."""
+    """Random generator of the estimator from the seed in a NetCDF recording; None if the file has no seed."""
     if "filter_entropy" not in data.attrs:
         return None
     key = tuple(int(part) for part in np.atleast_1d(data.attrs["filter_spawn_key"]))
@@ -145,7 +148,7 @@ def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
 
 
 def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, ...]]:
-    """Recorded panel: its data sheet, and one code a cycle; None without a panel."""
+    """Data sheet of the recorded RIS panels, and the phase code of each cycle; None without a panel."""
     if "code" not in data:
         return None, (None,) * data.sizes["time"]
     levels, elements = int(data.attrs["panel_levels"]), names_of(data.attrs["panel_element"])
@@ -158,7 +161,7 @@ def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, 
 
 
 def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
-    """Recorded measurements, one a cycle, without the padding."""
+    """Measurements of a NetCDF recording, one a cycle, without the padding."""
     fields = {name: name for name in (*PARTS, "from_panel")} | {"which_panel": "panel"}
     table = {field: data[name].to_numpy() for name, field in fields.items() if name in data}
     held = table["tau"] != PADDING

@@ -1,4 +1,4 @@
-"""Measurements of one's own: from a table, a CSV or a NetCDF file to what an estimator is given, checked on entry."""
+"""A user's own measurements: reads a table, a CSV or a NetCDF file, checks it, and estimates pose and map from it."""
 
 import csv
 from collections.abc import Mapping
@@ -37,17 +37,17 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "amplitude_std": ("1", "likewise"),
     "panel_probability": ("1", "that it ran over the panel, where the receiver can tell"),
 }
-"""Columns of a table: unit and meaning."""
+"""Columns of a user's table of measurements, by name: unit and meaning."""
 LONGEST_DELAY = 1e-5
-"""[s] 3 km: no room; a number above is of another unit."""
+"""[s] Largest delay accepted, 3 km: a larger number is in another unit."""
 ROUNDING = 1e-6
-"""By how much the squares of two cosines may sum to more than 1: what tables of six digits leave."""
+"""By how much the sum of two squared direction cosines may exceed 1: the rounding of tables with six digits."""
 FINEST_STD = 1e-15
-"""[s] a standard deviation below a third of a micrometre is of another unit, too."""
+"""[s] Least standard deviation of a delay accepted, 0.3 um: a smaller number is in another unit."""
 
 
 def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) -> Answers:
-    """Pose and map, cycle by cycle, from measurements alone: no scene, no channel, no truth.
+    """Estimate pose and map, cycle by cycle, from recorded or own measurements alone: no scene, channel or truth.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
     Raises
     ------
     ConfigError
-        No compass told the headings, and the estimator is to take them for known.
+        There is no heading from a compass, and the estimator is to take the headings for known.
     """
     if np.isnan(inputs.heading).any():
         if spec.slam.heading == "known":
@@ -72,23 +72,25 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
 
 
 def run_rng(file: str | Path) -> np.random.Generator | None:
-    """What the filter of a run drew from, if the file holds a run's measurements: led by the same numbers, it gives the
-    same estimate to the bit.
+    """Random generator of the filter from a run's file of measurements, with which its estimate repeats to the bit.
+
+    None for a file of another origin.
     """
     return marked_rng(read_dataset(Path(file))) if _is_netcdf(Path(file)) else None
 
 
 def _is_netcdf(file: Path) -> bool:
+    """Whether a file's suffix is one of NetCDF or HDF5."""
     return file.suffix.lower() in (".nc", ".h5", ".hdf5")
 
 
 def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, body: Body | None = None) -> Inputs:
-    """The measurements of a CSV file (`COLUMNS`) or of a NetCDF file (as recordings are written).
+    """Read an estimator's inputs from a CSV file (columns as in `COLUMNS`) or a NetCDF file (as recordings have them).
 
     Parameters
     ----------
     start
-        What is known of the first pose; a NetCDF file brings its own, a CSV file needs it.
+        Prior of the first pose; a NetCDF file has its own, a CSV file needs it.
     radio
         Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
 
@@ -119,7 +121,7 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
 def inputs_of(
     table: Mapping[str, Any], start: StartPrior, radio: RadioConfig, body: Body | None = None, *, place: str = "table"
 ) -> Inputs:
-    """The measurements of a table: a mapping (or a data frame) from names of `COLUMNS` to arrays, a row a component.
+    """Inputs of an estimator from a table of measurements, a row a component: a mapping or data frame with `COLUMNS`.
 
     Raises
     ------
@@ -166,12 +168,12 @@ def inputs_of(
 
 
 def check_inputs(inputs: Inputs, place: str) -> Inputs:
-    """One's own measurements, if units and ranges are such as a room has.
+    """Check units and ranges of an estimator's inputs from a user's file, and return them.
 
     Raises
     ------
     ConfigError
-        They are not.
+        A delay, cosine, amplitude, standard deviation or time cannot be; the line says which.
     """
     for cycle, one in enumerate(inputs.measurements):
         where = f"{place}: cycle {cycle}"
@@ -206,6 +208,7 @@ _PARTS = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_st
 
 
 def _numbers(column: Any, name: str, place: str) -> Floats:
+    """Column of a user's table of measurements as real numbers."""
     if np.iscomplexobj(column):
         raise ConfigError(f"{place}: {name}: complex numbers received; give real ones (amplitude: the modulus)")
     try:
@@ -215,7 +218,7 @@ def _numbers(column: Any, name: str, place: str) -> Floats:
 
 
 def _check_names(columns: Mapping[str, Floats], place: str) -> None:
-    """Refuse columns of own measurements that are unknown, missing, given in two forms or of different lengths."""
+    """Raise an error for columns of a user's measurements that are unknown, missing, redundant or of unequal length."""
     for name in columns:
         if name not in COLUMNS:
             raise ConfigError(f"{place}: {name}: unknown column; the known ones are {', '.join(COLUMNS)}")
@@ -240,7 +243,7 @@ def _check_names(columns: Mapping[str, Floats], place: str) -> None:
 
 
 def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> dict[str, Floats]:
-    """The parts of measurements, what is left out worked out from the SNR."""
+    """Fields of measurements from a user's columns: cosines from angles, amplitudes and missing stds from the SNR."""
     if "amplitude" in columns:
         amplitude = columns["amplitude"]
         with np.errstate(over="ignore"):
@@ -286,7 +289,7 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> di
 
 
 def _read_csv(file: Path) -> dict[str, list[float]]:
-    """Columns by name of one's own measurements in a CSV file; an empty field is NaN."""
+    """Read a user's CSV file of measurements into columns by name; an empty field is NaN."""
     try:
         with file.open(newline="", encoding="utf-8-sig") as lines:
             reader = csv.DictReader(lines)

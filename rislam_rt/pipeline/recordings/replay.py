@@ -1,4 +1,4 @@
-"""Replay of what an estimator was given, cycle by cycle, and what it answered."""
+"""Replay of recorded inputs through an estimator, cycle by cycle, and the estimates that it returns."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,18 +21,18 @@ from rislam_rt.toml import put_dotted
 
 
 class Answers(NamedTuple):
-    """What an estimator made of them."""
+    """Estimates, diagnostics and computing time of an estimator over the cycles of a recording."""
 
     estimates: tuple[SlamEstimate, ...]
-    """(K,)."""
+    """(K,) pose and map after each cycle."""
     infos: tuple[Any, ...]
     """(K,) diagnostics; of each, `landmark` and `outcome` are read."""
     seconds: float
-    """CPU time [s] of a cycle, step and estimate."""
+    """Mean CPU time [s] of a cycle, step and estimate."""
 
 
 class ReplayDiagnostics(NamedTuple):
-    """What is read of an estimator's diagnostics."""
+    """Diagnostics of an external estimator in one cycle: its data association, and whether it holds itself for lost."""
 
     landmark: Integers
     """(M,) number of the landmark that each component went to, -1 for none."""
@@ -48,20 +48,20 @@ def answers_from_arrays(
     lost: Booleans | None = None,
     landmark: Sequence[Integers] | None = None,
 ) -> Answers:
-    """Answers to a replayed recording by an estimator that is none of this package's, from plain arrays.
+    """Answers of an external estimator to a recording, from plain arrays of positions and maps, so they can be scored.
 
     Parameters
     ----------
     position
-        (K, 3) [m].
+        (K, 3) estimates [m].
     covariance
         (K, 3, 3) of the position [m^2]; without it there is no NEES.
     maps
-        (K,) one a cycle, or the last one alone; without them nothing is found.
+        (K,) one a cycle, or the last one alone; without them the map is empty.
     lost
-        (K,) whether it holds itself for lost.
+        (K,) whether the estimator holds itself for lost.
     landmark
-        (K,) numbers (M,) of the landmarks, as in the maps, that each cycle's components were taken for.
+        (K,) numbers (M,) of the landmarks, as in the maps, that each cycle's components were associated with.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def answers_from_arrays(
 
 
 class Recorder:
-    """An estimator that remembers what passes through it."""
+    """Wrapper of an estimator that records its inputs, estimates, diagnostics and computing time."""
 
     def __init__(self, inner: Estimator) -> None:
         self.inner = inner
@@ -110,18 +110,18 @@ class Recorder:
 
     @property
     def estimator(self) -> Estimator:
-        """Recorder to be used in an estimator's place."""
+        """Functions to be used in place of the wrapped estimator's, which record what passes."""
         return self.inner._replace(init=self._init, step=self._step, estimate=self._estimate)
 
     @property
     def inputs(self) -> Inputs:
-        """Recorded inputs: what the estimator was given."""
+        """All inputs that the wrapped estimator got so far."""
         measurements, codes, dt, heading = zip(*self.steps, strict=True)
         return Inputs(*self.begin, np.cumsum(dt), np.array(heading, dtype=np.float64), measurements, codes)
 
     @property
     def answers(self) -> Answers:
-        """Recorded answers of the estimator."""
+        """All estimates and diagnostics that the wrapped estimator returned so far, and its mean time."""
         return Answers(tuple(self.estimates), tuple(self.infos), self.seconds / max(len(self.steps), 1))
 
     def _init(
@@ -150,7 +150,7 @@ class Recorder:
 
 
 GONE = ("gate", "window", "birth_margin", "max_misses", "merge_distance")
-"""Settings `nested.*` that recordings of earlier versions hold."""
+"""Settings `nested.*` of earlier versions that a replay leaves out: they do not exist any more."""
 
 
 def replay(
@@ -162,9 +162,9 @@ def replay(
     *,
     rng: np.random.Generator,
 ) -> Answers:
-    """Lead an estimator through recorded inputs; nothing is traced and nothing drawn but what the estimator draws.
+    """Run an estimator on the recorded inputs of a run, cycle by cycle, and return its estimates; no paths are traced.
 
-    Codes are those of the recording: an estimator that would have designed others is scored on the same data.
+    Phase codes are those of the recording, even if the estimator's belief would have led to others.
 
     Parameters
     ----------

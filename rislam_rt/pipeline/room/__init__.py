@@ -1,1 +1,1 @@
-"""The true side of a run beside its paths: what is changed in the room, how the agent moves, what the receiver is."""
+"""The true room of a run: scene overrides, the agent's true motion, diffuse clutter, the receiver's real front end."""

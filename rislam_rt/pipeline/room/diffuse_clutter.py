@@ -1,4 +1,4 @@
-"""What a run hears beside the paths that have an identity: walls that scatter, edges that diffract."""
+"""Diffuse clutter of a run: paths that rough walls scatter and edges diffract, which no landmark explains."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 
 
 def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:
-    """Refuse diffuse paths that nobody could trace.
+    """Check that the diffuse paths asked for can be found: the channel is the ray tracer, and some wall scatters.
 
     Raises
     ------
@@ -26,7 +26,7 @@ def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:
 def trace_diffuse_clutter(
     scene: Scene, radio: RadioConfig, motion: Trajectory, section: DiffuseSection
 ) -> Paths | None:
-    """Scattered and diffracted paths along a motion, by cells of the receiver; None if none are wanted.
+    """Trace scattered and diffracted paths along a trajectory, summed by resolution cell; None if none are wanted.
 
     Raises
     ------
@@ -46,5 +46,5 @@ def trace_diffuse_clutter(
 
 
 def received_clutter(paths: Paths, motion: Trajectory, radio: RadioConfig) -> Clutter:
-    """Diffuse clutter as received, with what it turns by within the slot."""
+    """Clutter of diffuse and diffracted paths, with their Doppler shifts."""
     return Clutter(paths, doppler_shift(paths, motion, radio.wavelength))

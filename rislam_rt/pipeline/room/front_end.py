@@ -1,4 +1,4 @@
-"""The front end of a run's receiver as it was built, and its calibration before the run."""
+"""The receiver's front end in a run: draws its hardware impairments and calibrates it before the first cycle."""
 
 from dataclasses import replace
 
@@ -13,14 +13,16 @@ from rislam_rt.pipeline.specification.spec import Settings
 def prepare_front_end(
     paths: Paths, motion: Trajectory, body: Body, settings: Settings, *, rng: np.random.Generator
 ) -> FrontEnd | None:
-    """The front end that all schemes of a run share; None for an ideal one that is not to be calibrated.
+    """Draw the hardware impairments of the receiver's front end, and calibrate it if asked; None for an ideal one.
+
+    All schemes of a run share it.
 
     Parameters
     ----------
     paths
-        Along the motion, panel at level 0.
+        True paths along the motion, RIS panel at phase level 0.
     body
-        As it is drawn: where the direct path comes from.
+        Designed offsets of Tx and Rx, which say where the direct path comes from.
     """
     if settings.hardware == HardwareConfig():
         return None
@@ -34,7 +36,10 @@ def prepare_front_end(
 def calibrated(
     front_end: FrontEnd, paths: Paths, motion: Trajectory, body: Body, settings: Settings, *, rng: np.random.Generator
 ) -> FrontEnd:
-    """The front end with its calibration, from a walk of its own over the first cycles with the panel at level 0."""
+    """The front end with its calibration, from the direct path in captures of the first cycles, panel at phase level 0.
+
+    Their noise is not that of the run.
+    """
     radio, receiver = settings.radio, replace(settings.receiver, alternation=False)
     recorded = []
     for cycle in range(min(settings.hardware.calibration_cycles, len(motion))):

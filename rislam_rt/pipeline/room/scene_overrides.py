@@ -1,4 +1,4 @@
-"""A room with another panel, or with more or fewer scatterers, than its scene says."""
+"""Overrides of a scene: another size of the panel, more or fewer scatterers, or rougher walls than its file says."""
 
 from dataclasses import replace
 
@@ -12,16 +12,17 @@ from rislam_rt.model import RisPanel, Scatterer, Scene, join_panels
 from rislam_rt.pipeline.specification.spec import RoomSection
 
 RADIUS = 0.05
-"""Of a sphere that is added [m]: the paper's."""
+"""[m] Radius of an added scatterer, a sphere: the paper's."""
 OFF_WALLS, APART, OFF_PATH = 0.4, 0.8, 0.4
 """Least distances [m] of an added sphere from surfaces, other landmarks, and the agent's way."""
 ABOVE = 0.2
-"""By how much an added sphere lies above the agent [m]: an array that looks up hears nothing from below."""
+"""[m] Least height of an added sphere above the agent: an array that looks up receives nothing from below."""
 TRIES = 2000
+"""Random places tried for added spheres."""
 
 
 def change_room(scene: Scene, room: RoomSection, *, rng: np.random.Generator) -> Scene:
-    """The scene with what the section replaces.
+    """Scene with the panel size, phase levels, scatterers and wall scattering that `[room]` of a pipeline file sets.
 
     Raises
     ------
@@ -45,13 +46,14 @@ def change_room(scene: Scene, room: RoomSection, *, rng: np.random.Generator) ->
 
 
 def _changed(panel: RisPanel, room: RoomSection) -> RisPanel:
+    """RIS panel with the rows, columns and phase levels that `[room]` gives."""
     spec = panel.spec
     rows, cols = room.panel_rows or spec.rows, room.panel_cols or spec.cols
     return replace(panel, spec=replace(spec, rows=rows, cols=cols, levels=room.panel_levels or spec.levels))
 
 
 def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[Scatterer, ...]:
-    """The scene's first `count`, or all and spheres at random places of its bounding box, clear of everything."""
+    """The scene's first `count` scatterers; if it has fewer, spheres are added at random free places of the room."""
     found = list(scene.scatterers[:count])
     walls = build_walls(scene)
     surfaces = np.concatenate([walls.triangles, walls.occluders.triangles])
@@ -70,6 +72,7 @@ def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[
 
 
 def _is_free(point: Floats, surfaces: Floats, others: Floats, way: Floats) -> bool:
+    """Whether a point (3,) [m] keeps the least distances from triangles, other landmarks and the agent's positions."""
     if float(distance_to_triangles(point[None], surfaces).min()) < OFF_WALLS:
         return False
     nearest = float(np.linalg.norm(others - point, axis=1).min(initial=np.inf))

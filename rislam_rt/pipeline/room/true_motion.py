@@ -1,4 +1,4 @@
-"""The true motion of a run: the scene's trajectory, shaken by the white acceleration that a filter reckons with."""
+"""The true motion of a run: the scene's trajectory plus white-noise acceleration, as the filter's model has it."""
 
 from dataclasses import replace
 
@@ -11,15 +11,15 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Scene, Trajectory
 
 CLEARANCE = 0.3
-"""Least distance [m] from every surface; less where the scene's own trajectory comes nearer."""
+"""Least distance [m] of a drawn trajectory from every surface; less where the scene's own trajectory comes nearer."""
 BATCH = 256
-"""Trajectories drawn at a time."""
+"""Number of trajectories drawn at a time."""
 MAX_BATCHES = 400
-"""Batches after which the acceleration is held to be too large for the room."""
+"""Batches of drawn trajectories after which the acceleration is held to be too large for the room."""
 
 
 def draw_motion(scene: Scene, sigma_a: float, *, rng: np.random.Generator) -> Trajectory:
-    """The scene's trajectory plus a random walk of the velocity in the horizontal plane.
+    """Draw the true trajectory: the scene's plus a random walk of the velocity in the horizontal plane.
 
     Discrete white-noise acceleration: over each step of `dt` an acceleration of standard deviation `sigma_a` [m/s^2]
     an axis, `v += a dt`, `x += v dt + a dt^2 / 2`, starting at rest against the scene's trajectory. Whole trajectories

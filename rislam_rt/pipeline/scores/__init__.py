@@ -1,1 +1,1 @@
-"""The scores of a run, and the posterior bounds beside them."""
+"""The scores of a run (agent, landmarks, walls, data association), and the posterior bounds of its errors."""

@@ -1,4 +1,4 @@
-"""Audible paths of a run: those above the detection threshold, and the walls that they meet, for its scores."""
+"""Audible paths of a run, those above the detection threshold, and the walls that reflect them, for the scores."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from rislam_rt.model import PathKind, Paths
 from rislam_rt.pipeline.specification.spec import Settings
 
 HEARD = 2.0
-"""[s] in all for which something must be audible to count as heard."""
+"""[s] Least total time for which a path or wall must be above the detection threshold to count in a score."""
 
 
 def audible_paths(paths: Paths, settings: Settings) -> Booleans:
-    """(K, P) which paths are above the detection threshold, on the side that the array hears.
+    """Which true paths (K, P) the receiver can detect: over the SNR threshold, in its window, from the array's front.
 
-    Wall returns count where the estimator uses them.
+    The direct path does not count; wall returns (VT) do where the estimator uses them.
     """
     sensor = settings.sensor
     heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
@@ -27,7 +27,7 @@ def audible_paths(paths: Paths, settings: Settings) -> Booleans:
 
 
 def audible_planes(paths: Paths, audible: Booleans, group: Integers) -> Booleans:
-    """(K, N) whether a path that is `audible` (K, P) meets each plane; `group` (W,) tells the plane of each wall."""
+    """Whether an `audible` path (K, P) is reflected at each plane, (K, N); `group` (W,) is the plane of each wall."""
     over = np.zeros((paths.num_paths, int(group.max(initial=-1)) + 1), dtype=np.bool_)
     for path in range(paths.num_paths):
         _, _, tx, rx = paths.identity(path)
@@ -36,11 +36,11 @@ def audible_planes(paths: Paths, audible: Booleans, group: Integers) -> Booleans
 
 
 def audible_seconds(audible: Booleans, time: Floats) -> Floats:
-    """(N,) [s] for which each column of (K, N) was audible, in all, for scores; of one cycle, `HEARD` each."""
+    """Total time (N,) [s] for which each path or plane was audible, from (K, N) cycles; a lone cycle counts `HEARD`."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else HEARD
     return np.asarray(audible.sum(axis=0) * step)
 
 
 def heard_long(audible: Booleans, time: Floats) -> Booleans:
-    """Which columns of (K, N) count in a score: audible for `HEARD` seconds in all."""
+    """Which paths or planes (N,) count in a score: those of (K, N) that were audible for `HEARD` seconds in all."""
     return np.asarray(audible_seconds(audible, time) >= HEARD - 1e-9)

@@ -1,4 +1,4 @@
-"""The posterior bound of a scheme in a run: what no estimator could beat with the same room, codes and noise."""
+"""The posterior Cramér-Rao bound of a scheme in a run: the least errors possible with its room, codes and noise."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -27,37 +27,42 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings, build_settings
 
 NO_ROWS = LinearMeasurements(np.zeros((0, 3)), np.zeros((0, 0)), np.zeros(0))
-"""A cycle in which nothing is heard."""
+"""Linear measurements of a cycle in which no path is detected."""
 
 
 class SchemeBound(NamedTuple):
-    """Least RMS errors of one scheme in one run."""
+    """Posterior bounds on the RMS errors of agent, landmarks and walls of one scheme in one run."""
 
     agent: Floats
-    """(K,) position [m], over the axes that are filtered."""
+    """(K,) [m] bound on the position error, over the axes that are filtered."""
     landmarks: Mapping[str, float]
-    """[m] at the end of the run, of each landmark that a path was heard from."""
+    """[m] Bound on the position error at the end of the run, of each landmark that a path was detected from."""
     walls: Mapping[str, WallSpread]
-    """At the end of the run, of each wall that a counted path meets; its distance at the middle of its surface."""
+    """Bounds on angle and distance at the end of the run, of each wall that reflects a counted path.
+
+    The distance is that at the middle of the wall's surface."""
 
 
 class BoundProblem(NamedTuple):
-    """What the recursion of a bound goes through: it can be run under several assumptions about motion and start."""
+    """Inputs of a posterior bound's recursion: linearised measurements, unknowns of the map, priors of map and motion.
+
+    The recursion can be run under several assumptions about motion and start.
+    """
 
     rows: Sequence[LinearMeasurements]
-    """(K,) measurements of each cycle."""
+    """(K,) linearised measurements of each cycle."""
     model: LandmarkModel | None
-    """None where nothing is heard."""
+    """Unknowns of the map; None where no path is detected."""
     unknown_std: Floats
-    """(U,)."""
+    """(U,) prior standard deviations of the map's unknowns."""
     motion: MotionPrior
-    """What the scheme's filter takes for granted."""
+    """Motion model and start prior, as the scheme's filter assumes them."""
     heard: frozenset[str]
-    """Landmarks that a counted path comes from."""
+    """Names of landmarks that a counted path comes from."""
 
 
 def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> BoundProblem:
-    """What of a scheme in a run counts for its bound; see `scheme_bound`."""
+    """Linearise the detectable paths of a scheme's run for the recursion of its posterior bound; see `scheme_bound`."""
     spec = PipelineSpec.model_validate(dict(config))
     settings = build_settings(spec)
     estimator, walls = ESTIMATORS[SCHEMES[scheme].estimator], build_walls(scene)
@@ -81,14 +86,13 @@ def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Ma
 
 
 def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> SchemeBound:
-    """Bound on the errors of a scheme: least RMS of agent, landmarks and walls.
+    """Posterior Cramér-Rao bound on the RMS errors of agent, landmarks and walls of one scheme in one run.
 
     Linearised at the true motion, under the codes that were applied. Landmarks and walls are unknown, the start is
-    known to its prior. A path that the array hears and whose delay is reported counts with its information times the
-    probability of its detection (the information reduction factor of Niu, Willett and Bar-Shalom, 2001); which path
-    each component is counts as known, and paths as resolved. A scheme of delays alone has no angles, and one that holds
-    every mirror image as a point of its own has no walls. Of walls nothing is known beforehand but what the filter
-    takes for granted (`information.assumed_std`).
+    known to its prior. A path from the array's front within the delay window counts with its information times its
+    detection probability (the information reduction factor of Niu, Willett and Bar-Shalom, 2001); data association
+    counts as known, and paths as resolved. A scheme that uses delays alone has no angles, and one that maps every
+    mirror image as a point has no walls. The prior of walls is the filter's (`information.assumed_std`).
 
     Parameters
     ----------
@@ -112,8 +116,10 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
 
 
 def over_distortion(paths: Paths, settings: Settings) -> Complexes:
-    """Gains (K, P) for the bound, smaller by as much as the distortion that the estimator is told of exceeds the
-    noise."""
+    """Gains (K, P) of paths, reduced so that their SNR counts the expected hardware distortion as noise, for the bound.
+
+    Unchanged where the estimator is not told of the distortion (`hardware.told`).
+    """
     hardware, receiver, radio = settings.hardware, settings.receiver, settings.radio
     if not hardware.told:
         return paths.gain

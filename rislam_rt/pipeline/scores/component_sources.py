@@ -1,4 +1,4 @@
-"""Where each component truly came from, for the score of association: a landmark, an image of it, or walls."""
+"""True sources of multipath components, for the score of data association: a landmark, its mirror image, or walls."""
 
 from collections.abc import Sequence
 
@@ -14,17 +14,17 @@ from rislam_rt.pipeline.scores.walls import coplanar
 from rislam_rt.pipeline.specification.spec import Settings
 
 Source = tuple[int, ...]
-"""Landmark and, of its images, the plane next to it (-1: the landmark itself); of a wall return -1 and its planes."""
+"""Source of a path: landmark and the plane that mirrors it (-1: none); of a wall return -1 and its planes, sorted."""
 
 
 def uses_wall_returns(scheme: str, settings: Settings) -> bool:
-    """Whether a scheme's estimator has wall returns among the measurements of its map."""
+    """Whether a scheme's estimator uses wall returns (VT paths) as measurements of its map."""
     known = scheme in SCHEMES or is_own(scheme)
     return known and ESTIMATORS[SCHEMES[scheme].estimator].use_vt(settings)
 
 
 def component_labels(scene: Scene, paths: Paths, scheme: SchemeResult, *, use_vt: bool) -> tuple[Integers, Integers]:
-    """What the agent took each component for, and what it truly came from; -1 for none, in time order.
+    """Associated landmark and true source of each component of a run, as numbers; -1 for none, in order of time.
 
     As in the map, a path with walls belongs to the image in the wall next to the landmark, on the Rx leg if it has one.
     A wall return belongs to its walls in any order; to nothing, for an estimator that throws such returns away. Walls
@@ -41,19 +41,19 @@ def component_labels(scene: Scene, paths: Paths, scheme: SchemeResult, *, use_vt
 
 
 def true_planes(scene: Scene) -> list[int]:
-    """(W,) the plane of each wall of a room."""
+    """Number of the plane that each wall of a scene lies in, (W,); coplanar walls have one."""
     return [int(plane) for plane in coplanar(build_walls(scene))]
 
 
 def path_sources(paths: Paths, planes: Sequence[int], *, use_vt: bool) -> list[Source | None]:
-    """(P,) what each path comes from, of walls in `planes` (W,); None for LOS, and for wall returns unless they are
-    used."""
+    """True source of each path (P,) with walls in `planes` (W,); None for LOS, and for wall returns unless `use_vt`."""
     return [_source(*paths.identity(path), planes, use_vt) for path in range(paths.num_paths)]
 
 
 def _source(
     kind: int, landmark: int, tx: tuple[int, ...], rx: tuple[int, ...], planes: Sequence[int], use_vt: bool
 ) -> Source | None:
+    """True source of a path of that identity."""
     if kind == PathKind.LOS:
         return None
     before, after = [planes[wall] for wall in tx], [planes[wall] for wall in rx]

@@ -1,4 +1,4 @@
-"""Summary of a run's scores: agent, each landmark, each wall, for every scheme."""
+"""Summary of a run's scores for every scheme: errors of agent, landmarks and walls, data association, times."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -25,24 +25,24 @@ from rislam_rt.pipeline.scores.walls import count_ghosts, seconds_audible, wall_
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 DIVERGED = 0.5
-"""Position error [m] that no run may reach unless the bound is of that size: a fraction of the room."""
+"""Position error [m] beyond which a run counts as diverged."""
 FAR_OVER = 5.0
-"""Error over bound that chance does not explain: five standard deviations even if all error is along one line."""
+"""Ratio of error to bound beyond which a run counts as diverged: five standard deviations even along one line."""
 NEAR_LANDMARK = 1.0
-"""Distance [m] from a true landmark beyond which an estimate is not held for it."""
+"""Largest distance [m] of an estimated point from the true landmark that it is matched with."""
 
 
 class LandmarkTrack(NamedTuple):
-    """Estimates of the true landmarks over K cycles."""
+    """Errors of the estimated points matched with the N true landmarks over K cycles."""
 
     error: Floats
-    """(K, N) distance [m] of the estimate that stands for each landmark, NaN where there is none."""
+    """(K, N) distance [m] of the matched point from each landmark, NaN where there is none."""
     column: Integers
-    """(K, N) its column in the scheme's record, -1 where there is none."""
+    """(K, N) column of the matched point in the scheme's result, -1 where there is none."""
 
 
 def summarise(result: SlamResult) -> dict[str, Any]:
-    """All scores of a run, for JSON."""
+    """All scores of a run and its schemes as a table for JSON."""
     return {
         "seed": result.seed,
         "cycles": len(result.scene.agent),
@@ -56,7 +56,7 @@ def summarise(result: SlamResult) -> dict[str, Any]:
 
 
 def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]:
-    """The scores of one scheme."""
+    """Scores of one scheme in a run: position RMSE and bound, NEES, landmarks, walls, GOSPA, association, times."""
     scene, truth = result.scene, result.scene.agent.position
     errors = position_errors(scheme.position, truth)
     least = run_bound(result, scheme)
@@ -93,7 +93,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
 
 
 def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
-    """(K,) normalised squared position errors per degree of freedom; None where no axis is filtered."""
+    """Normalised estimation error squared (NEES) of the position per degree of freedom, (K,); None if all is known."""
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
     if not len(axes):
         return None
@@ -102,7 +102,7 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
 
 
 def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
-    """The posterior bound of agent, landmarks and walls; None where the scheme's name says nothing of it."""
+    """Posterior bound of agent, landmarks and walls for a scheme of a run; None for a scheme of unknown name."""
     if scheme.scheme not in SCHEMES and not is_own(scheme.scheme):
         return None
     return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
@@ -115,9 +115,9 @@ def has_diverged(errors: Floats, limit: Floats | None) -> bool:
 
 
 def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dict[str, Any]:
-    """Score of the map: GOSPA of its last points (no images) against all landmarks, cut at `NEAR_LANDMARK`, order 2.
+    """GOSPA [m] (order 2, cutoff `NEAR_LANDMARK`) of the map's points, without mirror images, against true landmarks.
 
-    Without a `panel` in the scheme there is none to be found.
+    Panels count among the true landmarks only if the scheme uses them (`panel`).
     """
     points = estimate.position[estimate.parent < 0]
     truth = scene.landmark_positions if panel else scene.landmark_positions[: len(scene.scatterers)]
@@ -127,12 +127,12 @@ def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dic
 
 
 def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
-    """Names of the steps whose mean time exceeds their share of the cycle, for the summary."""
+    """Names of the cycle's steps whose mean computing time exceeds their time budget."""
     return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
 
 
 def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
-    """For each true landmark and cycle, the estimated point (not an image) that stands for it, one to one."""
+    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle."""
     truth = scene.landmark_positions
     error = np.full((len(scheme.position), len(truth)), np.nan)
     column = np.full(error.shape, -1)
@@ -148,9 +148,9 @@ def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
 
 
 def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
-    """Scores of each landmark: error RMS over the cycles that hold it, and at the end; null where never found.
+    """Scores of each true landmark: position RMSE [m] over the cycles in which it is mapped, last error and bound.
 
-    With its bound at the end, null where nothing was heard of it.
+    Null where it was never mapped; the bound is null where no path from it was detectable.
     """
     track = landmark_track(scene, scheme)
     scores: dict[str, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""Scores of walls: which estimated plane stands for which, and how far off it is."""
+"""Scores of walls: matches estimated planes with true walls, and measures their distance and angle."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,12 +18,12 @@ from rislam_rt.pipeline.specification.spec import Settings
 def wall_scores(
     scene: Scene, estimate: MapEstimate, least: SchemeBound | None = None, audible_s: Floats | None = None
 ) -> dict[str, dict[str, Any]]:
-    """Scores of each wall of the last map: RMS distance over its true surface, angle, offset; null if missing.
+    """Scores of each true wall against the last map: RMS distance over its surface, angle, offset; null if missing.
 
-    With the deviation of the angle, both tilts together, that the map itself reckons with, and the bounds of angle and
-    offset. A wall that no path meets cannot be found: it has no bound, and no plane stands for it. Walls in one plane
-    are one: what stands for one of them stands for all that are heard. `audible_s` (W,) [s] is how long in all a path
-    over its plane was above the threshold.
+    Besides, the map's own standard deviation of the angle (both tilts together), and the bounds of angle and offset.
+    A wall that reflects no path cannot be found: it has no bound, and no plane is matched with it. Coplanar walls are
+    one: the plane matched with one of them is matched with all that reflect a path. `audible_s` (W,) [s] is how long in
+    all a path over the wall's plane was above the detection threshold.
     """
     walls = build_walls(scene)
     group, alone = coplanar(walls), wall_surfaces(walls, np.arange(len(walls)))
@@ -49,21 +49,24 @@ def wall_scores(
 
 
 def seconds_audible(scene: Scene, paths: Paths, settings: Settings, gain: Any) -> Floats:
-    """(W,) [s] for which a path over each wall's plane was audible under the gains (K, P), in all, for its score."""
+    """Total time (W,) [s] for which a path over each wall's plane was above the detection threshold, for its score.
+
+    `gain` (K, P) are the paths' gains under the applied codes.
+    """
     group = coplanar(build_walls(scene))
     audible = audible_planes(paths, audible_paths(paths.with_gain(gain), settings), group)
     return audible_seconds(audible, scene.agent.time)[group]
 
 
 def count_ghosts(scene: Scene, estimate: MapEstimate) -> int:
-    """Planes of a map that stand for no true wall, heard or not, for its score; walls in one plane are one."""
+    """Number of ghost walls: estimated planes of a map that match no true wall."""
     walls = build_walls(scene)
     surfaces = wall_surfaces(walls, coplanar(walls))
     return int(ghost_planes(surfaces, estimate.wall_normal, estimate.wall_offset).sum())
 
 
 def coplanar(walls: Walls) -> Integers:
-    """(W,) number of the true plane of each wall, in the order of the walls: what an agent can tell apart."""
+    """Number of the plane of each true wall (W,), from 0; coplanar walls, which no agent can tell apart, have one."""
     group = np.full(len(walls), -1)
     count = 0
     for wall in range(len(walls)):
@@ -79,7 +82,7 @@ def coplanar(walls: Walls) -> Integers:
 
 
 def wall_surfaces(walls: Walls, group: Integers) -> Surfaces:
-    """True surface of each group of walls, `group` (W,) numbered from 0, for scores.
+    """Middle, normal and second moments of the surface of each group of true walls; `group` (W,) numbers from 0.
 
     Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
     """

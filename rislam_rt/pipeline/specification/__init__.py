@@ -1,1 +1,1 @@
-"""What a pipeline file may say, and how it is read."""
+"""Specification of pipeline files: their tables and settings, ranges and defaults, and how they are read."""

@@ -1,4 +1,4 @@
-"""Diffuse and diffracted paths, heard beside those that have an identity: the table `[extras]` of a pipeline file."""
+"""Settings of diffuse and diffracted paths, which no landmark explains: the table `[extras]` of a pipeline file."""
 
 from typing import Annotated
 
@@ -8,16 +8,16 @@ from rislam_rt.pipeline.specification.section import Section
 
 
 class DiffuseSection(Section):
-    """Paths that last for no two cycles, found by the tracer and heard with all else; the agent is told of none."""
+    """Which diffuse and diffracted paths the ray tracer adds to the received signal, unknown to the agent."""
 
     diffuse: bool = False
-    """What rough walls scatter: those whose material has `scattering`, or all by `room.scattering`."""
+    """Whether rough walls scatter: those whose material has `scattering`, or all by `room.scattering`."""
     diffraction: bool = False
-    """What edges bend: of walls, of objects, of openings."""
+    """Whether edges of walls, objects and openings diffract."""
     depth: Annotated[int, Field(ge=1, le=3)] = 1
     """Most interactions of such a path."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 2000
-    """Rays shot in every cycle; power does not depend on them, its grain does."""
+    """Rays shot in every cycle; the mean power does not depend on them, its fluctuation does."""
 
     @property
     def wanted(self) -> bool:

@@ -1,4 +1,4 @@
-"""Mismatches between truth and what the belief is told: the table `[told]` of a pipeline file."""
+"""Mismatches between the truth and the model that the agent assumes: the table `[told]` of a pipeline file."""
 
 from typing import Annotated, Literal
 
@@ -10,7 +10,7 @@ Degrees = Annotated[float, Field(ge=-45.0, le=45.0)]
 
 
 class AssumedSection(Section):
-    """By how much each quantity that the belief is told is off. By default nothing is: all are told exactly.
+    """Errors of the model that filter and code design assume, a setting for each quantity; by default there are none.
 
     `docs/told.md` lists the quantities, and what the belief makes of each.
     """

@@ -1,4 +1,4 @@
-"""The table `[radio]` of a pipeline file, and the radio that it becomes."""
+"""Settings of the radio, the table `[radio]` of a pipeline file, and their conversion to SI units."""
 
 from typing import Annotated, Literal
 
@@ -15,7 +15,7 @@ Polarization = Literal["V", "H"]
 
 
 class ArraySection(Section):
-    """The Rx array."""
+    """Settings of the receive array: antennas, spacing, pattern."""
 
     rows: Side = 4
     """Antennas along the body's x axis, forward."""
@@ -28,26 +28,28 @@ class ArraySection(Section):
 
 
 class RadioSection(Section):
-    """The radio. The noise is given by what it does to the paper's sphere at 3 m, or by its density."""
+    """Settings of the radio: carrier, band, antennas, energy, and noise (as a reference SNR or as a density)."""
 
     carrier_ghz: Carrier = 10.0
     """Carrier frequency."""
     bandwidth_ghz: Positive = 1.0
-    """Of a flat band; delays are resolved to its inverse."""
+    """Bandwidth of a flat band; delays are resolved to its inverse."""
     tx_gain_db: Decibel = 0.0
-    """Of the transmit antenna in all directions, besides what its pattern says."""
+    """Gain of the transmit antenna in all directions, besides its pattern."""
     rx_gain_db: Decibel = 0.0
-    """Of each receive antenna in all directions where the array hears, besides what its pattern says."""
+    """Gain of each receive antenna in all directions that the array receives from, besides its pattern."""
     tx_pattern: Pattern = "iso"
-    """Of the transmit antenna: isotropic, short or half-wave dipole (upright), sector of 3GPP TR 38.901 (ahead)."""
+    """Pattern of the transmit antenna: isotropic, short or half-wave dipole (upright), sector of 3GPP TR 38.901
+    (ahead)."""
     rx_pattern: Pattern = "iso"
-    """Of each receive antenna; `radio.array.pattern` may make it blind below, besides."""
+    """Pattern of each receive antenna; `radio.array.pattern` may make it blind below, besides."""
     tx_polarization: Polarization = "V"
-    """Of the transmit antenna: vertical or horizontal."""
+    """Polarisation of the transmit antenna: vertical or horizontal."""
     rx_polarization: Polarization | None = None
-    """Of the receive antennas; as the transmit antenna's if not given. A crossed link hears what slabs have turned."""
+    """Polarisation of the receive antennas; as the transmit antenna's if not given. A crossed link receives what
+    reflections have turned."""
     energy_j: Positive = 1.0
-    """Of one sounding; SNR follows from its ratio to the noise."""
+    """Energy of one sounding; SNR follows from its ratio to the noise."""
     power_dbm: Decibel | None = None
     """Transmit power, instead of the energy: that is then power times `sounding_s`. Needs `noise_psd`."""
     sounding_s: Positive | None = None
@@ -55,7 +57,7 @@ class RadioSection(Section):
     reference_snr_db: Decibel | None = None
     """SNR of the paper's sphere 3 m away, integrated over the signal and over all antennas; 13 if nothing is given."""
     noise_psd: Positive | None = None
-    """N0 [W/Hz], instead."""
+    """Noise power spectral density N0 [W/Hz], instead of `reference_snr_db`."""
     array: ArraySection = ArraySection()
 
     @model_validator(mode="after")
@@ -80,24 +82,24 @@ class RadioSection(Section):
 
     @property
     def energy(self) -> float:
-        """[J] of one sounding by the radio's section."""
+        """Energy [J] of one sounding, given or power times duration."""
         if self.power_dbm is None or self.sounding_s is None:
             return self.energy_j
         return 1e-3 * linear(self.power_dbm) * self.sounding_s
 
     @property
     def antennas(self) -> Antennas:
-        """Antennas of the radio's section: pattern and polarisation of either end."""
+        """Patterns and polarisations of the transmit and receive antennas."""
         return Antennas(self.tx_pattern, self.rx_pattern, self.tx_polarization, self.rx_polarization or "")
 
 
 def build_radio(section: RadioSection) -> RadioConfig:
-    """The radio in SI units and linear ratios.
+    """Radio configuration in SI units and linear ratios from the table `[radio]` of a pipeline file.
 
     Raises
     ------
     ConfigError
-        A value is out of the range that the record itself checks.
+        A value is out of range.
     """
     if section.bandwidth_ghz >= 2.0 * section.carrier_ghz:
         raise ConfigError(
@@ -121,5 +123,5 @@ def build_radio(section: RadioSection) -> RadioConfig:
 
 
 def linear(decibel: float) -> float:
-    """A power ratio of decibels in the radio's section."""
+    """Power ratio of a value in decibels."""
     return float(np.power(10.0, decibel / 10.0))

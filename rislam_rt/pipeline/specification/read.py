@@ -1,4 +1,4 @@
-"""Read a pipeline file, with settings of the command line put over it."""
+"""Read a pipeline file, with settings of the command line put over it, and check its keys and values."""
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
@@ -15,29 +15,30 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
+from rislam_rt.wanted import wanted
 
 MAX_BYTES = 1_000_000
-"""A pipeline file is written by people; anything larger is another file by mistake."""
+"""Largest size [bytes] of a pipeline file; anything larger is another file by mistake."""
 
 EITHER = (("radio", "reference_snr_db", "noise_psd"),)
-"""Section, and the keys in it of which one alone may be given."""
+"""Tables of a pipeline file with the keys that exclude each other."""
 
 Spec = TypeVar("Spec", bound=BaseModel)
 
 
 class Table(NamedTuple):
-    """What a pipeline file and the command line say, not yet looked at."""
+    """Content of a pipeline file with the command line's settings put over it, not yet checked."""
 
     path: Path
     content: dict[str, Any]
     changed: tuple[str, ...]
-    """Keys that the command line set."""
+    """Keys that the command line set, dotted."""
     sweep: dict[str, Any] | None = None
     """The table `[sweep]`, which is no part of the experiment itself."""
 
 
 def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
-    """The specification of a file, `key=value` settings (dotted keys) put over it first.
+    """Read a pipeline file as a checked specification, with `key=value` settings (dotted keys) put over it first.
 
     Raises
     ------
@@ -48,13 +49,13 @@ def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
 
 
 class RadioSpec(Section):
-    """What a command may set that knows no more of a pipeline than its radio."""
+    """Settings of commands that need the radio alone of a pipeline."""
 
     radio: RadioSection = RadioSection()
 
 
 def load_radio(overrides: Sequence[str]) -> RadioConfig:
-    """Read the usual radio, with `radio.key=value` settings put over it.
+    """Default radio configuration, with `radio.key=value` settings of the command line put over it.
 
     Raises
     ------
@@ -67,7 +68,7 @@ def load_radio(overrides: Sequence[str]) -> RadioConfig:
 
 
 def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
-    """A pipeline file of any kind, `key=value` settings (dotted keys) put over it.
+    """Read a pipeline file of any kind as an unchecked table, with `key=value` settings (dotted keys) put over it.
 
     Raises
     ------
@@ -82,8 +83,10 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
 
 
 def make_way(table: Table, keys: Sequence[str]) -> None:
-    """Take out of a specification what excludes one of some keys (dotted) that are to be set later, unless the command
-    line set it: then it is a contradiction, and stays one."""
+    """Remove from a pipeline's table the keys that exclude one of `keys` (dotted), which a sweep sets later.
+
+    A key that the command line set is kept, so that the contradiction is reported.
+    """
     for section, *names in EITHER:
         if any(f"{section}.{name}" in keys for name in names):
             for name in names:
@@ -92,7 +95,7 @@ def make_way(table: Table, keys: Sequence[str]) -> None:
 
 
 def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
-    """Specification as a table of `key=value` settings (dotted keys) alone, put over defaults.
+    """Unchecked table of `key=value` settings (dotted keys) of the command line, put over defaults, without a file.
 
     Raises
     ------
@@ -104,7 +107,9 @@ def settings_table(overrides: Sequence[str], defaults: dict[str, Any]) -> Table:
 
 
 def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object]) -> Spec:
-    """The table as a specification; `check` tries what it becomes, with errors that begin with the field.
+    """Check a pipeline's table against its typed model and return the specification.
+
+    `check` builds the settings in SI units, to find values out of range; its errors begin with the field.
 
     Raises
     ------
@@ -118,12 +123,7 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
         items = error.errors(include_url=False, include_context=False)
         items = [item for item in items if item["loc"] == ("kind",)] or items  # a file of another kind has other keys
         items = [item for item in items if item["type"] == "missing" or _is_said(content, item["loc"])] or items
-        raise ConfigError(
-            *(
-                f"{_source(path, _place(item), changed, item['type'] == 'extra_forbidden')}: {_remark(item, model)}"
-                for item in items
-            )
-        ) from None
+        raise ConfigError(*(_line(path, item, changed, model) for item in items)) from None
     try:
         check(spec)
     except ConfigError as error:
@@ -132,6 +132,7 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
+    """Content of a pipeline file in TOML."""
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -149,6 +150,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _near_pipeline(path: Path) -> str:
+    """Hint at built-in pipelines with a name like that of a missing file."""
     known = shipped_pipelines()
     return did_you_mean(nearest(path.stem, known)) or f"give one, or a built-in one: {', '.join(known)}"
 
@@ -168,7 +170,7 @@ def _override(table: dict[str, Any], setting: str) -> str:
 
 
 def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
-    """Of two keys of a specification that exclude each other, the file's goes where the command line set the other."""
+    """Remove from a pipeline's table the keys of the file that exclude one that the command line set."""
     for section, *keys in EITHER:
         given = [key for key in keys if f"{section}.{key}" in changed]
         if len(given) == 1:
@@ -177,31 +179,38 @@ def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
 
 
 def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:
-    """Where the field at fault was read: the command line if that set it, or something in it, else the file."""
+    """Origin of a setting at fault, for messages: `--set` if the command line gave it or a key in it, else the file."""
     set_there = any(f"{place}.".startswith((f"{key}.", f"{key}[")) for key in changed)
     return "--set" if set_there or (unknown and any(key.startswith(f"{place}.") for key in changed)) else str(path)
 
 
 def _place(item: Any) -> str:
+    """Dotted key of a validation error."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")[:100]
 
 
-def _remark(item: Any, model: type[BaseModel]) -> str:
-    """One bad field of a specification: where, what was received, how to mend it."""
+def _line(path: Path, item: Any, changed: Sequence[str], model: type[BaseModel]) -> str:
+    """Line for one validation error: the file, or the command line that set the key, and the message."""
+    source = _source(path, _place(item), changed, item["type"] == "extra_forbidden")
+    return f"{source}: {_remark(item, model, source == '--set')}"
+
+
+def _remark(item: Any, model: type[BaseModel], typed: bool) -> str:
+    """Message for one validation error of a pipeline's settings: key, value received, how to mend it."""
     place = _place(item)
     if item["type"] == "missing":
         return f"{place}: missing; add it"
     if item["type"] == "extra_forbidden":
         near = _near_key([str(part) for part in item["loc"]], model)
         return f"{place}: unknown key; {did_you_mean(near) or 'remove it or mend its name'}"
-    message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     if isinstance(item["input"], dict):
+        message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
         return f"{place}: {message}" if place else message
-    return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
+    return f"{place}: {str(item['input'])[:60]!r} received; {wanted(item, typed)}"
 
 
 def _is_said(content: Any, place: tuple[Any, ...]) -> bool:
-    """Whether a pipeline's table has the key at fault itself, not handed on from another section."""
+    """Whether a pipeline's table itself gives the key at fault, which else was copied from another table."""
     for part in place:
         if not isinstance(content, dict):
             return True  # of a list or a value, all is said
@@ -212,7 +221,7 @@ def _is_said(content: Any, place: tuple[Any, ...]) -> bool:
 
 
 def _near_key(words: list[str], model: type[BaseModel]) -> list[str]:
-    """What an unknown key was meant to be: that of the same name in another table, or else one of the same table."""
+    """Known keys like an unknown one of a pipeline file: the same name in another table, or else one of its table."""
     keys = _keys(model)
     table = ".".join(word for word in words[:-1] if not word.isdigit())
     own = [key.rpartition(".")[2] for key in keys if key.rpartition(".")[0] == table]
@@ -221,7 +230,7 @@ def _near_key(words: list[str], model: type[BaseModel]) -> list[str]:
 
 
 def _keys(section: type[BaseModel], above: str = "") -> list[str]:
-    """Every key of a specification's section and of those below it, dotted."""
+    """All keys of a table of a pipeline file and of the tables below it, dotted."""
     keys = []
     for name, field in section.model_fields.items():
         keys.append(f"{above}{name}")

@@ -1,4 +1,4 @@
-"""Every setting of a pipeline, asked of the typed models themselves: default, unit, range, meaning."""
+"""List of all settings of a pipeline file with default, unit, range and meaning, read from the typed models."""
 
 import ast
 import inspect
@@ -18,32 +18,17 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.specification.section import Choices
 from rislam_rt.pipeline.specification.spec import RECORDS
 from rislam_rt.spelling import did_you_mean, nearest
-
-UNITS = {
-    "_m_s2": "m/s^2",
-    "_m_s": "m/s",
-    "_bits_s": "bit/s",
-    "_ns_s": "ns/s",
-    "_ghz": "GHz",
-    "_db": "dB",
-    "_deg": "degrees",
-    "_ns": "ns",
-    "_s": "s",
-    "_m": "m",
-    "_j": "J",
-    "_wavelengths": "wavelengths",
-}
-"""Units by the suffix of a name; the longest that fits. A name without one has its unit in its meaning."""
+from rislam_rt.wanted import unit_of
 
 LARGEST = 2.0**40
-"""Up to here the edge of a range is looked for; beyond, a number counts as unlimited."""
+"""Largest number tried for the end of a setting's range; a range that includes it counts as unlimited."""
 
 BISECTIONS = 120
-"""Halvings of the interval from a value to `LARGEST`: more than doubles can tell apart."""
+"""Bisections for the end of a setting's range: more than double precision can tell apart."""
 
 
 class Setting(NamedTuple):
-    """One setting of a pipeline file."""
+    """One setting of a pipeline file: key, default, type, range, unit, meaning."""
 
     key: str
     """Dotted."""
@@ -58,7 +43,7 @@ class Setting(NamedTuple):
 
 
 def list_settings(model: type[BaseModel], prefix: str = "") -> list[Setting]:
-    """All settings of a specification, those of its tables after its own, in the order of the model."""
+    """List all settings of a pipeline file's typed model, those of its tables after its own."""
     plain, tables = [], []
     for name, field in model.model_fields.items():
         below = field.annotation
@@ -70,7 +55,7 @@ def list_settings(model: type[BaseModel], prefix: str = "") -> list[Setting]:
 
 
 def explain(settings: list[Setting], key: str) -> Setting:
-    """The setting of that key, or of the only key that ends with it.
+    """Setting of a pipeline file with that dotted key, or with the only key that ends with it.
 
     Raises
     ------
@@ -88,28 +73,35 @@ def explain(settings: list[Setting], key: str) -> Setting:
 
 
 def _near(key: str, keys: list[str]) -> str:
+    """Hint at settings with a key like an unknown one."""
+    inside = [one for one in keys if key and key in one]
+    if inside:
+        more = f" and {len(inside) - 6} more" if len(inside) > 6 else ""
+        return f"there are {', '.join(inside[:6])}{more}"
     ends = [one for one in keys if nearest(key.rpartition(".")[2], [one.rpartition(".")[2]])]
     return did_you_mean(nearest(key, keys, 3) or ends[:3]) or "`rislam-rt config` lists them all"
 
 
 def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:
+    """Default, range, unit and meaning of one field of a typed model."""
     owner, record = _owner(model, name)
     meaning = _meanings(record or owner).get(name, "")
-    unit = next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     allowed = _of_constraints(field) or (_of_record(record, name) if record else "")
-    return Setting(f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit, meaning)
+    return Setting(
+        f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit_of(name), meaning
+    )
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
-    """The class that declares a setting, and the record behind it."""
+    """The class that declares a setting, and the configuration record whose fields it takes over, if any."""
     owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
     return owner, RECORDS.get(owner)
 
 
 @cache
 def _meanings(declared: type) -> dict[str, str]:
-    """Meanings of settings: the docstrings under a class's fields and its parents', in one line each, by name."""
+    """Meanings of settings by name: docstrings of the fields of a class and its parents, in one line each."""
     found: dict[str, str] = {}
     for parent in declared.__bases__:
         found |= _meanings(parent) if is_dataclass(parent) else {}
@@ -123,12 +115,13 @@ def _meanings(declared: type) -> dict[str, str]:
 
 @cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
-    """A module's classes as they stand in its file, by name, for the settings' docstrings."""
+    """Syntax trees of a module's classes by name, from which the settings' docstrings are read."""
     body = ast.parse(inspect.getsource(sys.modules[module])).body
     return {node.name: node for node in body if isinstance(node, ast.ClassDef)}
 
 
 def _kind(annotation: Any) -> str:
+    """Type of a setting in plain words."""
     names = {int: "whole number", float: "number", bool: "true or false", str: "text"}
     if annotation in names:
         return names[annotation]
@@ -144,7 +137,7 @@ def _kind(annotation: Any) -> str:
 
 
 def _of_constraints(field: FieldInfo) -> str:
-    """What a setting's type says of its values."""
+    """Range or choices of a setting in words, from the constraints of its type; empty without any."""
     metadata = [*field.metadata, *_inner_metadata(field.annotation)]
     choices = list(_choices(field.annotation)) + [name for m in metadata if isinstance(m, Choices) for name in m.names]
     if choices:
@@ -159,6 +152,7 @@ def _of_constraints(field: FieldInfo) -> str:
 
 
 def _choices(annotation: Any) -> Iterator[Any]:
+    """Values of a literal type, also inside an optional or a list."""
     if get_origin(annotation) is Literal:
         yield from get_args(annotation)
     else:
@@ -167,14 +161,14 @@ def _choices(annotation: Any) -> Iterator[Any]:
 
 
 def _inner_metadata(annotation: Any) -> Iterator[Any]:
-    """Constraints of a setting inside an optional or a list."""
+    """Constraints of a setting's type inside an optional or a list."""
     for part in get_args(annotation):
         for item in getattr(part, "__metadata__", ()):
             yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
 
 
 def _of_record(record: type, name: str) -> str:
-    """What a record that checks itself lets pass, the other settings at their defaults: found by trying."""
+    """Range of a setting in words, found by trying which values its record accepts, the others at their defaults."""
     standard = record()
     assert is_dataclass(standard)
     assert not isinstance(standard, type)
@@ -202,7 +196,7 @@ def _of_record(record: type, name: str) -> str:
 
 
 def _edge(passes: Callable[[Any], bool], inside: float, sign: int, whole: bool) -> str:
-    """End of a setting's range on one side of a value that passes, by bisection; empty if there is none."""
+    """End of a setting's range in words, found by bisection from a valid value to one side; empty if unlimited."""
     outside: float = sign * (int(LARGEST) if whole else LARGEST)
     step = 1 if whole else 1e-9
     if passes(outside):

@@ -1,4 +1,4 @@
-"""Experiment specifications: what a pipeline file may say, and the settings that it becomes."""
+"""Specification of an experiment: all tables of a pipeline file, and their conversion to settings in SI units."""
 
 from dataclasses import fields
 from typing import Annotated, Any, Literal, NamedTuple
@@ -33,12 +33,14 @@ from rislam_rt.slam.schemes.bp_slam_aoa import BpSlamAoaConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 
 RECORDS: dict[type, type] = {}
-"""The records behind the sections that are made of one."""
+"""Configuration record of each section that was made from one."""
 
 
 def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
-    """Section of a specification with the fields, types and defaults of a frozen record, which checks its own
-    ranges."""
+    """Make a table of a pipeline file with the fields, types and defaults of a configuration record.
+
+    The record checks its own ranges.
+    """
     kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
     section = create_model(name, __base__=Section, __doc__=doc, **kinds)
     RECORDS[section] = record
@@ -58,7 +60,7 @@ _Hardware = _section("_Hardware", HardwareConfig, "Fields of `HardwareConfig`.")
 
 
 class SlamSection(_Filter):  # type: ignore[misc, valid-type]
-    """The filter's settings, SI units."""
+    """Settings of the SLAM filter, SI units."""
 
 
 class NestedSection(_Nested):  # type: ignore[misc, valid-type]
@@ -78,52 +80,54 @@ class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
 
 
 class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
-    """The receiver's settings, SI units; its slot is `budget.measure_s`, its panels the room's."""
+    """Settings of the receiver, SI units; its measurement slot is `budget.measure_s`, its panels are the scene's."""
 
 
 class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
-    """What the real front end does wrong (`receiver.estimator = "waveform"`); an ideal one by default."""
+    """Impairments of the receiver's front end (with `receiver.estimator = "waveform"`); none by default."""
 
 
 def _check_channel(name: str) -> str:
+    """Return `name` if it is that of a built-in channel or of a user's own."""
     if name not in CHANNELS and not is_own(name):
         raise ValueError(f"give one of {', '.join(CHANNELS)}, or module:Class of your own")
     return name
 
 
 CHANNELS = ("traced", "image_source")
+"""Names of the built-in channels."""
 SchemeName = Annotated[str, AfterValidator(check_scheme), Choices(SCHEMES)]
 ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
 
 
 class DesignerSection(_Designers):  # type: ignore[misc, valid-type]
-    """A designer and its settings."""
+    """Designer of phase codes and its settings."""
 
     method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]
     """Designer of the codes: the paper's genetic algorithm, the exact single-target optimum, coordinate descent, ..."""
 
 
 class DesignSection(DesignerSection):
-    """How the scheme `optimized` chooses codes."""
+    """How the scheme `optimized` designs phase codes from the belief."""
 
     samples: Annotated[int, Field(ge=1, le=10_000)] = 4
-    """Positions of the belief over which the objective is averaged; 1 designs on the mean."""
+    """Positions drawn from the belief over which the objective is averaged; 1 designs on the mean."""
     landmark_uncertainty: bool = False
-    """Whether each landmark's covariance discounts its path."""
+    """Whether a landmark's covariance reduces the information of its path."""
     gradient: Literal["exact", "paper", "appendix"] = "exact"
-    """How the design holds a path's length to change with the agent; the last two are the paper's."""
+    """Gradient of a path's length with the agent's position in the design; the last two are the paper's."""
     least_snr_db: Decibel | None = None
-    """SNR over all antennas at which the receiver detects a path every other time, for a design that knows what will be
-    missed; the paper's objective counts the information of every path."""
+    """SNR over all antennas at which the receiver detects a path every other time, for a design that weights paths by
+    their detection probability; without it every path counts in full, as in the paper."""
 
     @property
     def least_snr(self) -> float:
-        """Least SNR of the design's section, linear; 0 if there is none."""
+        """SNR (linear) at which the design takes a path to be detected every other time; 0 if not set."""
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
 class BudgetSection(Section):
-    """Time [s] of the cycle's four steps; together they are the scene's cycle."""
+    """Time budget [s] of the cycle's four steps; their sum is the scene's cycle time."""
 
     optimise_s: NotNegative = 0.04
     """To design the code."""
@@ -136,94 +140,95 @@ class BudgetSection(Section):
 
 
 class ControlSection(Section):
-    """The message that carries a code to the panel's controller."""
+    """Settings of the control link, whose messages carry phase codes to the panel's controller."""
 
     levels: Annotated[int, Field(ge=2, le=65536)] | None = None
     """Phase levels that the message can name, a divisor of the panel's; all of them by default."""
     rate_bits_s: Positive = 1e6
-    """Of the link to the controller."""
+    """Bit rate of the link to the controller."""
     loss_probability: Probability = 0.0
     """Probability that a message is lost; the panel then keeps its code and the agent does not know."""
     delay_cycles: Annotated[int, Field(ge=0, le=1000)] = 0
-    """Cycles from sending to effect, known to the agent."""
+    """Cycles from sending a code to its use, known to the agent."""
 
 
 class StartSection(Section):
-    """What the agent is told of its start: the truth plus one draw of these errors."""
+    """Standard deviations of the start prior, whose mean is the true start plus one draw of these errors."""
 
     position_std_m: Wide = 0.01
-    """Of each coordinate of the start."""
+    """Standard deviation of each coordinate of the start."""
     velocity_std_m_s: Wide = 0.01
-    """Of each component of the first velocity."""
+    """Standard deviation of each component of the first velocity."""
     heading_std_deg: NotNegative = 0.0
-    """Where the heading is estimated."""
+    """Standard deviation of the first heading, where the heading is estimated."""
 
 
 class MotionSection(Section):
-    """How the true motion departs from the scene's trajectory."""
+    """Random accelerations of the true motion beside the scene's trajectory."""
 
     sigma_a_m_s2: NotNegative = 0.0
-    """White acceleration in the horizontal plane, drawn anew for every seed (see `pipeline.room`); 0 leaves the
-    trajectory as it is. Estimators whose own `sigma_a` is not given are told this one."""
+    """Standard deviation of the white acceleration in the horizontal plane, drawn anew for every seed (see
+    `pipeline.room`); 0 leaves the trajectory as it is. Estimators whose own `sigma_a` is not given assume this one."""
 
 
 class PanelSection(Section):
-    """What the real panel does wrong; the agent knows nothing of it."""
+    """Hardware errors of the RIS panel, unknown to the agent."""
 
     amplitude_std: NotNegative = 0.0
-    """Of an element's amplitude, relative."""
+    """Standard deviation of an element's amplitude, relative."""
     phase_std_deg: NotNegative = 0.0
-    """Of an element's phase."""
+    """Standard deviation of an element's phase."""
     dead: Probability = 0.0
     """Probability that an element reflects nothing."""
     stuck: Probability = 0.0
     """Probability that an element stays at a level of its own."""
     bit_flip: Probability = 0.0
-    """Probability that a bit of a message arrives turned over."""
+    """Probability that a bit of a control message arrives flipped."""
 
     @property
     def tolerance(self) -> PanelTolerance:
-        """Tolerances of the panel's section in radians."""
+        """Hardware tolerances of the RIS panel, phases in radians."""
         return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 
 class RoomSection(Section):
-    """What of the scene is replaced; nothing by default."""
+    """Overrides of the scene: size of the panel, scatterers, wall scattering; none by default."""
 
     panel_rows: Annotated[int, Field(ge=1, le=256)] | None = None
-    """Rows of elements."""
+    """Rows of elements of the panel."""
     panel_cols: Annotated[int, Field(ge=1, le=256)] | None = None
-    """Columns of elements. The spacing of the elements and the panel's centre stay as they are."""
+    """Columns of elements of the panel. Spacing of the elements and centre of the panel stay as they are."""
     panel_levels: Annotated[int, Field(ge=2, le=65536)] | None = None
     """Phase levels of an element."""
     scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
-    """Their number: the scene's first ones, and then spheres at places drawn for every seed (`pipeline.room`)."""
+    """Number of scatterers: the scene's first ones, and then spheres at places drawn for every seed
+    (`pipeline.room`)."""
     scattering: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    """Share of the reflected field that every wall scatters: what it reflects like a mirror is weaker for it."""
+    """Share of the reflected field that every wall scatters; its specular reflection is weaker for it."""
 
 
 class PipelineSpec(Section):
-    """A whole pipeline file of the main job."""
+    """Specification of a SLAM run: all tables of a pipeline file of kind `slam`."""
 
     kind: Literal["slam"] = "slam"
-    """What the file is: the main job."""
+    """Kind of the pipeline file: a SLAM run."""
     name: Name
-    """Of run folders and pages."""
+    """Name of the pipeline, in run folders and on pages."""
     description: str = ""
-    """For readers alone."""
+    """Text for readers alone."""
     scene: str | None = None
-    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
-    """Of every random draw; the same seed gives the same result."""
+    """Seed of every random draw; the same seed gives the same result."""
     cycles: Count | None = None
     """Only the first so many cycles of the scene's trajectory; all of them by default."""
     channel: ChannelName = "traced"
-    """Ray tracer, exact image sources, or `module:Class` of one's own."""
+    """Channel model: ray tracer, exact image sources, or `module:Class` of one's own."""
     depth: Annotated[int, Field(ge=0, le=4)] = 2
     """Largest number of wall bounces on a path, both legs together."""
     schemes: list[SchemeName] = Field(default=["optimized", "random"], min_length=1)
-    """What is compared: who chooses the panel's codes, and who estimates; under the same motion, channel and noise.
-    Also `module:function`, a designer or an estimator of one's own."""
+    """Schemes compared under the same motion, channel and noise: each has a designer of the panel's codes and an
+    estimator. Also `module:function`, a designer or an estimator of one's own."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
     hardware: HardwareSection = HardwareSection()
@@ -245,7 +250,7 @@ class PipelineSpec(Section):
     @model_validator(mode="before")
     @classmethod
     def _tell_all_estimators(cls, content: Any) -> Any:
-        """What no file says of one estimator is as for the others: process noise and what is known of the height."""
+        """Copy process noise, `height` and `use_vt` to every estimator for which the file does not give them."""
         return share_settings(content) if isinstance(content, dict) else content
 
     @model_validator(mode="after")
@@ -271,14 +276,14 @@ ESTIMATOR_SECTIONS = {
     "bp_slam_aoa": ("sigma_a", "use_vt"),
     "channel_slam": ("sigma_a", "height"),
 }
-"""Sections of the estimators that are not the project's own, and what they are told unless they are told their own."""
+"""Tables of the other published estimators, and the settings that they take over from `[slam]` unless given."""
 
 
 def share_settings(content: dict[str, Any]) -> dict[str, Any]:
-    """A pipeline's content with `sigma_a`, `height`, `use_vt` handed on to every estimator not told its own.
+    """Copy `sigma_a`, `height` and `use_vt` in a pipeline's content to every estimator for which they are not given.
 
     The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for the
-    validation to complain about.
+    validation to refuse.
     """
     motion, slam = content.get("motion", {}), content.get("slam", {})
     if not isinstance(motion, dict) or not isinstance(slam, dict):
@@ -294,7 +299,7 @@ def share_settings(content: dict[str, Any]) -> dict[str, Any]:
 
 
 class Settings(NamedTuple):
-    """A specification turned into the records that the parts of a run take, in SI units."""
+    """Settings of a run in SI units: configuration of radio, receiver, sensor model, estimators and code design."""
 
     radio: RadioConfig
     receiver: ReceiverConfig
@@ -304,18 +309,18 @@ class Settings(NamedTuple):
     bp_slam_aoa: BpSlamAoaConfig
     channel_slam: ChannelSlamConfig
     sensor: SensorModel
-    """What the estimators are told of the receiver."""
+    """Sensor model of the receiver, for the estimators."""
     hardware: HardwareConfig
-    """What the front end does wrong."""
+    """Impairments of the receiver's front end."""
 
 
 def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
-    """Settings in SI units of a pipeline's specification: radio, receiver, filters, in a room of so many panels.
+    """Convert a pipeline's specification to settings in SI units, for a room with that number of RIS panels.
 
     Raises
     ------
     ConfigError
-        A value is out of the range that the record itself checks.
+        A value is out of range.
     """
     own = {"slot": spec.budget.measure_s, "panels": panels}
     radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump() | own)
@@ -333,6 +338,7 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
 
 
 def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
+    """Impairments of the front end; an error if the receiver simulates no signal."""
     hardware = HardwareConfig(**section.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
@@ -342,11 +348,11 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
 
 
 def build_design(section: DesignerSection) -> DesignConfig:
-    """Designer's settings of a specification; no certificate, which takes longer than a cycle has.
+    """Configuration of the phase code designer; without the certificate of optimality, which takes longer than a cycle.
 
     Raises
     ------
     ConfigError
-        A value is out of the range that the record itself checks.
+        A value is out of range.
     """
     return DesignConfig(**{name: getattr(section, name) for name in _Designers.model_fields}, certify=False)

@@ -1,1 +1,1 @@
-"""The folder of a run, and the identity that decides whose it is."""
+"""The run folder: all files of a run, and the identity (hash of settings, scene, code) by which it is recognised."""

@@ -1,4 +1,4 @@
-"""Exports of a run, in forms that others read: trajectories, maps, configuration, scores, and its room."""
+"""Exports of a run in common formats: trajectories (TUM), maps and scores (JSON), configuration (TOML), scene."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,10 +11,12 @@ from rislam_rt.storage.files import json_file
 from rislam_rt.toml import toml_bytes
 
 SUMMARY_FILE = "summary.json"
+ROOM = "scene"
+"""Folder of an exported room; the exported configuration names it, so that the run can be repeated from its folder."""
 
 
 def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Files that a run exports: trajectories, maps, room, configuration and summary, name -> content."""
+    """Exported files of a run by name: trajectories, maps, scene, configuration and scores."""
     motion = result.scene.agent
     files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
     for name, scheme in result.schemes.items():
@@ -23,15 +25,16 @@ def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, by
 
 
 def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Exported record of a result: maps, configuration, summary and its room, name -> content."""
+    """Exported files of a run by name that do not grow with its cycles: maps, configuration, scores and scene."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
-    files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(_without_none({**result.config}))}
-    files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
+    settings = _without_none({**result.config, "scene": ROOM})
+    files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(settings)}
+    files |= {f"{ROOM}/{name}": content for name, content in scene_files(scene).items()}
     return files | {SUMMARY_FILE: json_file(summary, indent=2)}
 
 
 def map_table(estimate: MapEstimate) -> dict[str, Any]:
-    """An exported map as plain lists: landmarks, their images, walls."""
+    """Table of an estimated map for JSON: landmarks, their mirror images, walls."""
     std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
     features = [
         {
@@ -53,7 +56,7 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    """Exported configuration without what is not set: TOML has no null."""
+    """Configuration without the settings that are None: TOML has no null."""
     return {
         key: _without_none(value) if isinstance(value, dict) else value
         for key, value in table.items()

@@ -1,4 +1,4 @@
-"""Identity of a run: what decides its numbers, and the name that its folder has from it."""
+"""Identity of a run: all that its numbers depend on, the hash over it, and the name of the run folder."""
 
 import hashlib
 import os
@@ -15,13 +15,13 @@ from rislam_rt.scene.file_names import safe_name
 from rislam_rt.storage.seal import SCHEMA, checksum
 
 SHORT = 8
-"""Digits of the hash in a folder's name; the marker inside has all of them."""
+"""Number of the hash's digits in a run folder's name; the marker file inside has all of them."""
 
 BACKEND = ("RISLAM_RT_DEVICE", "RISLAM_RT_THREADS")
-"""Environment that the tracer's last digits depend on."""
+"""Environment variables that the last digits of traced paths depend on."""
 
 NO_NUMBERS = ("cli", "report")
-"""Folders of the package that decide how numbers are shown, and none of them."""
+"""Folders of the package that only show numbers, so that changes there make no new run."""
 
 
 class RunIdentity(NamedTuple):
@@ -34,18 +34,18 @@ class RunIdentity(NamedTuple):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of it, 64 hexadecimal digits."""
+        """SHA-256 of the identity, 64 hexadecimal digits."""
         return checksum(self.content)
 
     @property
     def folder(self) -> str:
-        """`<pipeline>-<scene>-<seed>-<hash>`."""
+        """Name of the run folder: `<pipeline>-<scene>-<seed>-<hash>`."""
         config = self.content["config"]
         name = f"{config['name']}-{safe_name(self.content['scene']['name'])}-{config['seed']}"
         return short_name(name, self.digest)
 
     def difference(self, other: Mapping[str, Any]) -> str:
-        """One entry in which another run differs, as `key is A there and B here`."""
+        """Describe the first setting in which another run differs, as `key is A there and B here`."""
         here, there = dict(_flat(self.content)), dict(_flat(other))
         for key in sorted(here):
             if here[key] != there.get(key):
@@ -54,7 +54,7 @@ class RunIdentity(NamedTuple):
 
 
 def run_identity(spec: PipelineSpec, scene: Scene) -> RunIdentity:
-    """The identity of a run of the main job; where its room lies and how it is described are no part of it."""
+    """Identity of a SLAM run from its specification and scene; the scene's folder and the description do not count."""
     return RunIdentity(
         {
             "schema": SCHEMA,
@@ -69,14 +69,13 @@ def run_identity(spec: PipelineSpec, scene: Scene) -> RunIdentity:
 
 
 def short_name(name: str, digest: str) -> str:
-    """Name of a run's folder, with the first digits of its identity's hash."""
+    """Name of a run folder: `name` and the first digits of the identity's hash."""
     return f"{name}-{digest[:SHORT]}"
 
 
 @cache
 def code_digest(root: Path = Path(__file__).parents[2]) -> str:
-    """SHA-256 in a run's identity over this package's files but those that only show numbers: an edit is another
-    version."""
+    """SHA-256 over all files of this package but those that only show numbers: part of a run's identity."""
     digest = hashlib.sha256()
     for file in sorted(root.rglob("*")):
         parts = file.relative_to(root).parts
@@ -88,6 +87,7 @@ def code_digest(root: Path = Path(__file__).parents[2]) -> str:
 
 
 def _flat(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Entries of nested tables with dotted keys."""
     for key, value in content.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{above}{key}.")

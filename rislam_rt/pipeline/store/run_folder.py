@@ -1,8 +1,8 @@
-"""The run folder: everything of a run, readable without this package, and never anybody else's.
+"""The run folder: writes and reads all files of a run, and refuses folders that hold anything else.
 
 `run.json` is its marker: it holds the run's whole identity, whether the run is `running` or `done`, and the SHA-256 of
-every file. A scheme's file appears as soon as the scheme is complete, so that a run that was stopped in any way goes on
-where it was. One process at a time writes there.
+every file. A scheme's file appears as soon as the scheme is complete, so that an interrupted run goes on where it was.
+One process at a time writes there.
 """
 
 import hashlib
@@ -34,16 +34,16 @@ from rislam_rt.storage.seal import file_digest, read_sealed, seal
 
 RUN_FILE, PATHS_FILE = "run.json", "paths.nc"
 RUNNING, DONE = "running", "done"
-"""States of a run."""
+"""States of a run in its marker file."""
 OWN_FOLDERS = ("", "figures", "scene", "scene/meshes")
-"""In which files of ours grow."""
+"""Folders below the run folder in which files are written."""
 
 
 class RunFolder(MutableMapping[str, SchemeResult]):
-    """Schemes of a run that is under way, on disk. One that is not as it was written counts as not there."""
+    """Results of a run's schemes on disk, by name; writes them, and treats a file that was changed as missing."""
 
     def __init__(self, folder: Path, identity: RunIdentity, files: Mapping[str, str] | None = None) -> None:
-        """`files`: SHA-256 by name of what was written before."""
+        """Open a folder of a run of that identity; `files` are the SHA-256 by name of files written before."""
         self.folder, self.identity, self.files = folder, identity, dict(files or {})
 
     def __getitem__(self, name: str) -> SchemeResult:
@@ -85,11 +85,11 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     @property
     def spoiled(self) -> list[str]:
-        """Schemes that were written and are not as they were; they run again."""
+        """Names of schemes whose files were changed since they were written; they run again."""
         return [name for name in self if name not in self]
 
     def mark(self, state: str, more: Mapping[str, Any] | None = None) -> None:
-        """Say where the run stands.
+        """Write the run's marker file with its state, identity, the SHA-256 of all files, and `more`.
 
         Raises
         ------
@@ -100,7 +100,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         write_atomic(self.folder / RUN_FILE, json_file(seal({**about, "files": self.files}), indent=2))
 
     def complete(self, result: SlamResult, summary: Mapping[str, Any]) -> Path:
-        """Add what the schemes' files do not hold; the last step is the marker. Returns the folder.
+        """Write true paths, exports and, last, the marker of a run whose schemes are all there; return the folder.
 
         Raises
         ------
@@ -124,23 +124,23 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         return self.folder
 
     def put(self, name: str, content: bytes) -> None:
-        """Write a file of the run."""
+        """Write a file of the run, and note its SHA-256."""
         self._write(name, content)
 
     def adopt(self, names: Iterable[str]) -> None:
-        """Count files that were written here already among the run's, and say so in the marker."""
+        """Note the SHA-256 of files that are in the folder already, and write the marker."""
         self.files |= {name: file_digest(self.folder / name) for name in names}
         self.mark(RUNNING)
 
     def holds(self, names: Iterable[str]) -> bool:
-        """Whether files of a run are there as they were written."""
+        """Whether all these files of the run are there, unchanged since they were written."""
         try:
             return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
         except ResultError:
             return False
 
     def abandon(self) -> None:
-        """Take the run's marker away if no scheme was completed."""
+        """Remove the run's marker file if no file was completed."""
         if not self.files:
             (self.folder / RUN_FILE).unlink(missing_ok=True)
 
@@ -153,7 +153,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
 
 def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
-    """What the marker of a folder says; None if there is no folder, or nothing in it.
+    """Read the marker of a run folder and check that its identity is this one; None if the folder is missing or empty.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
 
 
 def read_marker(folder: Path) -> dict[str, Any]:
-    """The marker of a run, with its state, identity and the digests of its files.
+    """Read the marker file of a run folder: its state, identity and the SHA-256 of its files.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def read_marker(folder: Path) -> dict[str, Any]:
 
 @contextmanager
 def open_run(folder: Path, identity: RunIdentity) -> Iterator[RunFolder]:
-    """The folder of a run, to be gone on with or begun; nobody else writes there meanwhile.
+    """Open or create the folder of a run for writing, locked against other processes.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def open_run(folder: Path, identity: RunIdentity) -> Iterator[RunFolder]:
 
 @contextmanager
 def hold_run(folder: Path) -> Iterator[None]:
-    """Keep others out of the folder of a run, and remove what a killed process was writing there.
+    """Lock a run folder against other processes, and remove temporary files that a killed process left there.
 
     Raises
     ------
@@ -243,17 +243,17 @@ def hold_run(folder: Path) -> Iterator[None]:
 
 
 def is_left_locked(folder: Path) -> bool:
-    """Whether somebody is at work in a folder, or died there."""
+    """Whether a run folder has a lock file: another process writes there, or ended without removing it."""
     return (folder / LOCK_FILE).exists()
 
 
 def check_files(folder: Path, about: Mapping[str, Any]) -> None:
-    """Whether every file of a completed run is as it was written.
+    """Check that no file of a completed run was changed since it was written.
 
     Raises
     ------
     ResultError
-        One is not. One line that names it.
+        One was, or is missing. One line that names it.
     """
     for name, digest in about["files"].items():
         if file_digest(folder / name) != digest:
@@ -261,29 +261,29 @@ def check_files(folder: Path, about: Mapping[str, Any]) -> None:
 
 
 def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
-    """The scores of a completed run, every file of which is as it was written.
+    """Read the scores of a completed run from its folder, after checking all files.
 
     Raises
     ------
     ResultError
-        One is not.
+        A file was changed.
     """
     check_files(folder, about)
     return dict(json.loads((folder / SUMMARY_FILE).read_bytes()))
 
 
 def scheme_file(folder: Path, name: str) -> Path:
-    """Where a scheme's data set lies in the run folder."""
+    """Path of a scheme's NetCDF file in the run folder."""
     return folder / f"scheme_{name}.nc"
 
 
 def given_file(folder: Path, name: str) -> Path:
-    """Where the run folder holds what a scheme's estimator was given."""
+    """Path of the NetCDF file with the inputs of a scheme's estimator in the run folder."""
     return folder / f"measurements_{name}.nc"
 
 
 def read_run(folder: Path) -> SlamResult:
-    """A completed run, every file of which is as it was written.
+    """Read a completed run from its folder, after checking all files.
 
     Raises
     ------
@@ -328,7 +328,7 @@ def read_run(folder: Path) -> SlamResult:
 
 @contextmanager
 def reading_run(folder: Path) -> Iterator[None]:
-    """Around the reading of a run: whatever a damaged file raises becomes one line.
+    """Turn whatever a damaged file raises while a run is read within this context into a one-line error.
 
     Raises
     ------
@@ -345,7 +345,7 @@ def reading_run(folder: Path) -> Iterator[None]:
 
 
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
-    """A scheme's data set, which must be of this scheme and run."""
+    """Read a scheme's result from its NetCDF file, and check that it is of this scheme and run."""
     data = read_dataset(file)
     check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
     return dataset_to_scheme(data)

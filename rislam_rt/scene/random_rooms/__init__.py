@@ -1,4 +1,4 @@
-"""Rooms and motions drawn at random, each from one integer seed: what a filter has never seen."""
+"""Random rooms and motions, each drawn from one integer seed: what a filter has never seen."""
 
 from rislam_rt.scene.random_rooms.floor_plan import SHAPES
 from rislam_rt.scene.random_rooms.random_motion import CYCLES, MOTIONS

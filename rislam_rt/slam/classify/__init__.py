@@ -1,4 +1,4 @@
-"""Which multipath components came over a landmark: a small network, its features, and a geometric baseline."""
+"""Classifiers that tell tracks of landmark paths from wall returns: a small network, its features, a baseline."""
 
 from rislam_rt.slam.classify.geometric import classify_geometric
 from rislam_rt.slam.classify.network import (

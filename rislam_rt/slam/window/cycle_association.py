@@ -1,4 +1,5 @@
-"""What a belief makes of a cycle's components: what is expected, who is which, how well that explains it."""
+"""Data association of one cycle: predicted returns, clusters of unresolved ones, the best assignment of components, and
+its likelihood."""
 
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_reach
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses, poses_of
+from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
@@ -20,44 +21,48 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
 
 
 class CycleAssociation(NamedTuple):
-    """A cycle as a belief sees it."""
+    """Data association of one cycle under one belief: predicted returns, the components assigned to them, and the
+    likelihood."""
 
     mean: Floats
-    """(7 + 3F,) of the present..."""
+    """(7 + 3F,) mean of the present pose, velocity, compass offset and features..."""
     covariance: Floats
-    """(7 + 3F, 7 + 3F)."""
+    """(7 + 3F, 7 + 3F) ...and their covariance."""
     poses: Poses
+    """Tx and Rx positions of the present pose."""
     expected: ExpectedComponents
+    """Predicted returns, R of them."""
     groups: UnresolvedClusters
+    """Their clusters, C of them."""
     clear: Floats
-    """(R,) probability that nothing stands in the way of each return..."""
+    """(R,) probability that nothing occludes each return..."""
     scatter: Floats
-    """(R,) ...and its scatter."""
+    """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
-    """(C,) probability that each cluster shows."""
+    """(C,) detection probability of each cluster, occlusion included."""
     extra: Floats
-    """(C, 3) variance of each beside the belief's own and the reported one."""
+    """(C, 3) variance of each cluster's prediction besides the belief's own and the reported one."""
     side: Integers
-    """(C,) which are heard over a panel (see `slam.observations`)."""
+    """(C,) panel that each cluster's path runs over, `OTHER` or `UNTOLD` (see `slam.observations`)."""
     row: Integers
-    """(A,) clusters that were seen..."""
+    """(A,) clusters that were detected..."""
     pick: Integers
-    """(A,) ...and the components that they were seen as."""
+    """(A,) ...and the components assigned to them."""
     score: float
-    """Log likelihood of the cycle over that of strangers alone."""
+    """Log likelihood ratio of the cycle's components under this belief against clutter alone."""
     surprise: float
-    """Standard deviations by which fewer of the returns that should show did."""
+    """Standard deviations by which fewer returns were detected than predicted."""
 
 
 def echoes(observed: Observations, cell: Floats) -> Booleans:
-    """(M,) components that are others over again: what motion within the slot leaves of a strong one in the difference
-    of two alternated codes.
+    """Whether each component (M,) is an echo: what motion within the slot leaves of a strong component in the
+    difference of two alternated codes.
 
     Two paths of one cell come out as one; a second component there comes from the difference, and if it did not run
     over the panel it is the stronger one.
@@ -73,7 +78,7 @@ def echoes(observed: Observations, cell: Floats) -> Booleans:
 
 
 FAR_STRONGER = 1.0
-"""Log amplitude by which a component's echo is weaker: a turn of a fifth of a radian leaves a tenth."""
+"""Least difference in log amplitude between a component and its echo: a turn of a fifth of a radian leaves a tenth."""
 
 
 def associate_cycle(
@@ -81,7 +86,8 @@ def associate_cycle(
     scene: KnownEnvironment, code: RisCode | None,
     observed: Observations, strangers: Floats,
 ) -> CycleAssociation:  # fmt: skip
-    """Expect, cluster, associate."""
+    """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters;
+    `strangers` is the density of clutter at each component."""
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
@@ -109,16 +115,17 @@ def associate_cycle(
 
 
 def _median(values: Floats) -> Floats:
-    """(A,) of columns (M, A): numpy's own takes ten times as long for so few."""
+    """Median (A,) of each column of values (M, A); numpy's own takes ten times as long for so few."""
     values, middle = np.sort(values, axis=0), len(values) // 2
     return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 
 
 def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) -> Floats:
-    """Covariance of the present, the height's with what it may be off by beyond the window's own variance.
+    """Covariance of the present with the height's variance widened by what the motion model may be off by, where wall
+    returns are used.
 
-    Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
-    returns next to nothing measures the height: a gate as wide as it may be off holds anything.
+    Across, a livelier motion is looked at beside the one that is held (`filter._associate_over_motions`); upwards none
+    is. Without wall returns next to nothing measures the height: a gate as wide as it may be off holds anything.
     """
     if not scene.use_vt:
         return covariance
@@ -130,13 +137,15 @@ def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) ->
 def score_again(
     view: CycleAssociation, mean: Floats, covariance: Floats, observed: Observations, strangers: Floats
 ) -> float:
-    """The cycle's score under another belief: what is expected moves with it to first order, clusters stay."""
+    """Log likelihood ratio of an associated cycle under another mean and covariance: predictions move to first order,
+    clusters stay."""
     seen = view.expected.seen + view.expected.jacobian @ (mean - view.mean)
     return _associate(view, seen, covariance, observed, strangers)[2]
 
 
 def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
-    """(R,) which of the forms (R, 5) run over a panel; what does not is known for that once all panels are."""
+    """Panel that each form (R, 5) runs over: `PANEL` + q, `OTHER` for none, or `UNTOLD` for a point that may yet prove
+    a panel."""
     held = [panel for panel in enumerate(landmarks.panels) if panel[1] >= 0]
     if not held:
         return np.full(len(forms), UNTOLD)
@@ -149,8 +158,8 @@ def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
 def _associate(
     view: CycleAssociation, places: Floats, covariance: Floats, observed: Observations, strangers: Floats
 ) -> tuple[Integers, Integers, float]:
-    """Rows of the clusters that were seen, the components that they were seen as, and the log likelihood of the cycle
-    over that of strangers alone: the best assignment, with returns at `places` (R, 3)."""
+    """Best assignment of components to clusters with returns at `places` (R, 3): rows of the clusters detected, their
+    components, and the log likelihood ratio of the cycle against clutter alone."""
     (expected, groups), shows = (view.expected, view.groups), view.shows
     missed = groups.by_itself == 1.0
     if not len(groups.leader) or not len(observed.seen):

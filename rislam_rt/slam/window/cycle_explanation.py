@@ -1,4 +1,5 @@
-"""What explains a cycle's components: returns of the map, or tracks; and what of these is born or taken back."""
+"""Explanation of a cycle's components by paths of the map or by tracks, and the landmark updates, births and removals
+that follow."""
 
 from typing import NamedTuple
 
@@ -9,19 +10,19 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Measurement, RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, is_los, observations_of
-from rislam_rt.slam.returns import TX
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
-from rislam_rt.slam.window.births.feature_removal import condemned, release
+from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
-from rislam_rt.slam.window.landmarks.landmark_update import learn
+from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
-from rislam_rt.slam.window.rim import bring_back
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
@@ -30,17 +31,20 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 class HeardCycle(NamedTuple):
-    """M components of a cycle that need an explanation: neither the direct path nor echoes."""
+    """Components of one cycle, M of them, that association has to explain: all but the direct path and echoes of
+    alternated codes."""
 
     observed: Observations
+    """These components in the filter's units."""
     free: Integers
-    """(M,) which component of the measurement each is."""
+    """(M,) index of each in the measurement."""
     landmark: Integers
-    """(N,) label of every component of the measurement."""
+    """(N,) label of every component of the measurement: `REMOVED` for the direct path, else `UNUSED`."""
 
 
-def listen(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
-    """What a measurement leaves to explain, by delay and direction, so that nothing hangs on its order."""
+def components_to_explain(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
+    """Select a measurement's components that need an explanation, without direct path and echoes, sorted by delay and
+    direction so that nothing hangs on their order."""
     observed = observations_of(measurement, scene.radio)
     landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
     order = np.lexsort(observed.seen.T[::-1])
@@ -49,10 +53,13 @@ def listen(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
     return HeardCycle(observed.take(free), free, landmark)
 
 
-def take_in(state: WindowState, observed: Observations, view: CycleAssociation) -> tuple[WindowState, Booleans]:
-    """The log with the cycle's components and what they were taken for; which of those seen (A,) move the belief.
+def log_associations(
+    state: WindowState, observed: Observations, view: CycleAssociation
+) -> tuple[WindowState, Booleans]:
+    """Append a cycle's components to the log with the paths that they were associated with, and mark which of the
+    associated ones (A,) update the Gaussian.
 
-    Wall returns that are thrown away are known for what they are, and move nothing.
+    With `use_vt = false` wall returns are recognised, but update nothing.
     """
     forms, row, pick = view.expected.forms, view.row, view.pick
     used = np.ones(len(row), dtype=np.bool_) if state.scene.use_vt else forms[view.groups.leader[row], 0] != TX
@@ -62,15 +69,15 @@ def take_in(state: WindowState, observed: Observations, view: CycleAssociation) 
 
 
 def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) -> tuple[Floats, Floats]:
-    """Measured less predicted (N, 3) of what moves the belief, and the prediction's jacobian (N, 3, 7 + 3F) by the
-    present, both in standard deviations; the log holds what the cycle's components were taken for."""
+    """Innovations (N, 3) of a cycle's associated components, measured less predicted, and the predictions' jacobian
+    (N, 3, 7 + 3F) by the present, both in standard deviations; the log already holds the associations."""
     row, at = view.row[used], int(np.searchsorted(log.cycle, cycle)) + view.pick[used]
     lead, mate, share = view.groups.leader[row], view.groups.partner[row], log.share[at, None]
     seen = view.expected.seen[lead] + share * view.groups.gap[row]
     slope = view.expected.jacobian[lead]
     slope = slope + share[..., None] * (view.expected.jacobian[mate] - slope)
     left = log.seen[at] - seen
-    bring_back(seen, log.std[at], left, slope)
+    correct_horizon_bias(seen, log.std[at], left, slope)
     std = np.sqrt(log.std[at] ** 2 + log.extra[at])
     return left / std, slope / std[..., None]
 
@@ -79,10 +86,11 @@ def learn_cycle(
     state: WindowState, heard: HeardCycle, view: CycleAssociation, used: Booleans, left: Residuals, dt: float,
     turn: float, bend: float, code: RisCode | None,
 ) -> tuple[WindowState, Integers]:  # fmt: skip
-    """All that a cycle tells beside pose and places: tracks, whether the agent is lost, what is hidden, strengths, the
-    panel; and the labels (N,) of the measurement. `left` are the components' residuals once the belief has moved.
+    """Update all but poses and places after a cycle: tracks, odds of being lost, occlusion, strengths, panel
+    identities; also returns the landmark labels (N,) of the measurement.
 
-    `turn` [rad] is what the compass told of the turn, `bend` [m/s^2] how much a step's velocity may change.
+    `left` are the components' residuals after the update, `turn` [rad] the turn that the compass told, `bend` [m/s^2]
+    how much a step's velocity may change.
     """
     observed, expected, groups, row, pick = heard.observed, view.expected, view.groups, view.row, view.pick
     landmarks, log = state.landmarks, state.log
@@ -99,7 +107,7 @@ def learn_cycle(
         state = state._replace(lost_log_odds=odds)
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
-    visibility, landmarks = learn(
+    visibility, landmarks = update_landmarks(
         state.visibility, landmarks, state.window, expected, groups, view.clear, view.scatter, view.shows, row, pick,
         raw, observed, view.poses,
         state.scene, code,
@@ -110,7 +118,7 @@ def learn_cycle(
 
 
 def _explain(log: Log, view: CycleAssociation, landmarks: WindowTable, row: Integers, at: Integers) -> Log:
-    """The log with its components `at` (A,) held for clusters `row` (A,)."""
+    """Record in the log that its components `at` (A,) were associated with clusters `row` (A,) of predicted returns."""
     if not len(row):
         return log
     expected, groups = view.expected, view.groups
@@ -124,15 +132,16 @@ def _explain(log: Log, view: CycleAssociation, landmarks: WindowTable, row: Inte
 
 
 def scatter_variance(scatter: Floats, std: Floats) -> Floats:
-    """Variances (A, 3) beyond the reported ones of components whose residuals have a mean square `scatter` (A,)."""
+    """Extra variance (A, 3) beyond the reported one of components on paths whose residuals have the mean square
+    `scatter` (A,), in reported deviations."""
     return np.asarray(CONSTANTS.memory * (np.maximum(scatter, 1.0) - 1.0)[:, None] * std**2)
 
 
-def weigh_again(log: Log, left: Residuals, num_poses: int) -> Log:
-    """The log with every wall return's scatter as its form shows it before and after; at first nothing is known of it.
+def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
+    """Re-estimate the extra variance of all wall returns in the log from the residuals of the same path in earlier and
+    later cycles.
 
-    Who a point is hangs on what it is held to scatter by: those stay as they were weighed. What is known beforehand
-    (`crowd`) counts as one measurement.
+    Points keep theirs, as their panel identity was weighed with it. The prior (`crowd`) counts as one measurement.
     """
     left = left.take(log.form[left.row, 0, 0] == TX)
     if not len(left.row):
@@ -152,7 +161,7 @@ def weigh_again(log: Log, left: Residuals, num_poses: int) -> Log:
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
-    """Mean squares (A,) of the residuals of some explained rows of the log, in reported deviations."""
+    """Mean squared residuals (A,) of explained rows of the log, in reported standard deviations."""
     if not len(rows):
         return np.zeros(0)
     at = np.searchsorted(left.row, rows)
@@ -160,7 +169,8 @@ def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
 
 
 def unexplained(state: WindowState, observed: Observations) -> float:
-    """Components per metre, unit of each cosine and e-fold that nothing explained in the cycle before."""
+    """Density of components that nothing explained in the last cycle, per metre of length, unit of each cosine and
+    e-fold of amplitude."""
     if not len(observed.seen):
         return 0.0
     sensor = state.scene.sensor
@@ -171,20 +181,20 @@ def unexplained(state: WindowState, observed: Observations) -> float:
 
 
 class _Followed(NamedTuple):
-    """Tracks after a cycle, and the log that names them."""
+    """Tracks after a cycle, the log that names them, and how many of the last cycle's tracks went on."""
 
     tracks: WindowTracks
     log: Log
     followed: int
-    """Tracks of the last cycle..."""
+    """Number of tracks that were detected in the last cycle..."""
     kept: int
-    """...and those among them that go on."""
+    """...and of those among them that are detected in this one."""
 
 
 def _follow(
     state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
 ) -> _Followed:
-    """Tracks extended, begun and ended by the components that nothing explains."""
+    """Continue, begin and end tracks with the components of a cycle that no path of the map explains."""
     speed = float(np.linalg.norm(mean[3:6]))
     length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
@@ -208,7 +218,8 @@ def _follow(
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Ident (A,) of what threw each form (A, 5): a point, its image in a wall, a wall, two walls in either order."""
+    """Landmark label (A,) of forms (A, 5): the ident of a point or wall, or a combined one of a point's image in a wall
+    and of two walls in either order."""
     if not len(forms):
         return np.zeros(0, dtype=np.int64)
     point, first, second = forms[:, 0] >= 0, forms[:, 3], forms[:, 4]
@@ -219,17 +230,19 @@ def _names(landmarks: WindowTable, forms: Integers) -> Integers:
     return np.where(pair | (point & (wall >= 0)), named, own)
 
 
-def grow(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:
-    """With what the evidence has turned against taken back, or else with what is born."""
+def remove_or_add_features(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:
+    """Remove features that the evidence contradicts or, in a cycle without removals, let tracks give birth to
+    features."""
     fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
-        gone = condemned(state.landmarks, left, state.log)
-        state, fresh = release(state, ~gone), not gone.any()
+        gone = features_to_remove(state.landmarks, left, state.log)
+        state, fresh = remove_from_map(state, ~gone), not gone.any()
     return births(state, view) if fresh else state
 
 
 def outcome_of(heard: int, features: int, lost: bool) -> StepOutcome:
-    """How a cycle went, in which so many components were heard and so many features are known."""
+    """Outcome of a cycle, from the number of components heard, the number of features known, and whether the filter is
+    lost."""
     if not heard:
         return StepOutcome.NO_MEASUREMENTS
     if lost:

@@ -1,4 +1,5 @@
-"""One cycle of the window filter: predict, expect, associate, solve, learn, births and deaths."""
+"""Window filter, one cycle: motion, measurement prediction, association, Gauss-Newton, landmark update, births,
+removals."""
 
 import numpy as np
 
@@ -13,23 +14,23 @@ from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
 from rislam_rt.slam.window.cycle_explanation import (
-    grow,
+    components_to_explain,
     innovations,
     learn_cycle,
-    listen,
+    log_associations,
     outcome_of,
-    take_in,
+    remove_or_add_features,
+    reweigh_wall_returns,
     unexplained,
-    weigh_again,
 )
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log
-from rislam_rt.slam.window.relinearisation import renew
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH, STILL
 from rislam_rt.slam.window.state import WindowState
@@ -39,7 +40,7 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> WindowState:  # fmt: skip
-    """The start prior, and an empty map."""
+    """State of the window filter before the first cycle: one pose at the start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
     offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
@@ -62,7 +63,11 @@ def step(
     state: WindowState, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> tuple[WindowState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied."""
+    """Advance the window filter by one cycle's measurement, `dt` [s] after the last; returns the state and diagnostics.
+
+    `heading` [rad] is what a compass tells, and counts only if the heading is "known"; `code` is the phase code that
+    the agent believes was applied.
+    """
     check_step(dt, heading, code, state.scene.ris)
     check_sides(measurement, state.scene.ris)
     if config.heading != "known":
@@ -73,19 +78,19 @@ def step(
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
-    heard = listen(measurement, scene)
+    heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
-    state, view = _notice(state, heading, code, observed, strangers)
+    state, view = _associate_over_motions(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
-    state, used = take_in(state, observed, view)
+    state, used = log_associations(state, observed, view)
     state, left, nis = _solve(state, view, used)
     jumped = state.lost_log_odds == 0.0
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
     if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
-        state = state._replace(log=weigh_again(state.log, left, state.window.num_poses))
-    state, wrong = recovery.ask(state)
-    state = grow(state, left, view)
+        state = state._replace(log=reweigh_wall_returns(state.log, left, state.window.num_poses))
+    state, wrong = recovery.check_motion(state)
+    state = remove_or_add_features(state, left, view)
     outcome = outcome_of(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
@@ -94,7 +99,7 @@ def step(
 
 
 def _move(state: WindowState, dt: float, heading: float) -> WindowState:
-    """The window with a new pose, without its oldest one when it is full."""
+    """Add a pose `dt` [s] after the last to the window, and marginalise the oldest when the window is full."""
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
@@ -114,14 +119,16 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
 
 
 def smoothed(state: WindowState) -> Floats:
-    """(K, 3) [m] positions of all cycles with hindsight: of the window's length, less for the last ones."""
+    """Smoothed positions (K, 3) [m] of all cycles so far, each from a window's length of later cycles, fewer for the
+    last ones."""
     return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 
-def _notice(
+def _associate_over_motions(
     state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
 ) -> tuple[WindowState, CycleAssociation]:
-    """What is seen, and the belief that explains it best: as it was, with a manoeuvre in the last steps, or a jump.
+    """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, or a jump in
+    position, and return the state and association of the likeliest.
 
     A jump has to explain the cycle better than being lost does, which explains nothing.
     """
@@ -145,25 +152,26 @@ def _notice(
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
-            return recovery.landed(state, by), view
+            return recovery.after_jump(state, by), view
     return state._replace(window=window), best
 
 
 def _livelier(precision: Floats) -> Floats:
-    """(K - 1, A) with the last steps as lively as can be, but for climbs."""
+    """Prior precisions (K - 1, A) of the window's accelerations, the last steps' lowered to the liveliest motion mode,
+    but not vertically."""
     found, lively = precision.copy(), COLUMNS[: precision.shape[1]] != 1
     found[-LATELY:, lively] = np.minimum(found[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
     return found
 
 
 GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
-"""Axes that are as lively as each other: an agent that turns does not climb."""
+"""Axes that share one chain of motion modes: the two horizontal ones, the vertical one, and the rate of turn."""
 COLUMNS = np.array([0, 0, 1, 2])
-"""Group of each axis."""
+"""Index into `GROUPS` of each axis."""
 
 
 def _likelihoods(window: Window, count: int) -> Floats:
-    """Log likelihoods (N, K, L) of the levels of the N groups' first K steps."""
+    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes."""
     size, free = len(window.head), window.accel.shape[1]
     every = np.arange(count)
     inside = window.covariance[size : size + count * free, size : size + count * free]
@@ -179,37 +187,42 @@ def _likelihoods(window: Window, count: int) -> Floats:
 
 
 def _precisions(levels: Floats) -> Floats:
-    """(..., A) prior precisions of accelerations whose groups have levels (N, ..., L)."""
+    """Prior precisions (..., A) of accelerations along A axes, from motion-mode probabilities (N, ..., L) of N groups
+    of axes."""
     each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
     return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
 def _surplus(precision: Floats, levels: Floats) -> Floats:
-    """(..., A) variance of the slopes of priors (..., A) that levels (N, ..., L) have beyond their precisions."""
+    """Variance (..., A) of the slopes of acceleration priors beyond their precisions (..., A), from motion-mode
+    probabilities (N, ..., L) of N groups of axes (see `now_with_excess`)."""
     variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
     return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
 
 
 def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
-    """(A,) of a step's white acceleration and, if the compass is not trusted, rate of turn, as the agent is told."""
+    """Prior precisions (A,) of one step's acceleration, and of its rate of turn where the heading is estimated, under
+    told motion."""
     upwards = config.sigma_a if config.height == "estimated" else STILL
     rates = (config.turn_std / np.sqrt(dt),) if turns else ()
     return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
 def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[WindowState, Residuals, float]:
-    """The window after this cycle's components: two Gauss-Newton steps, the first on what the association expected; the
-    whole of it again now and then."""
+    """Update the window with a cycle's associated components by two Gauss-Newton steps, the first on the association's
+    predictions; re-linearises all poses every few cycles, else the last one. Also returns residuals and squared
+    innovation."""
     innovation, jacobian = innovations(view, state.log, used, state.cycle)
     window = window_gaussian.with_present(state.window, innovation, jacobian)
     window = window_gaussian.solve(window, spread=False)
-    window, left = renew(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else window.num_poses - 1)
+    window, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else window.num_poses - 1)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
 
 
 def widen_motion(state: WindowState) -> WindowState:
-    """The prior of every step's acceleration, by what the measurements say of its liveliness."""
+    """Re-estimate every step's motion-mode probabilities by forward-backward smoothing, and the prior precision of its
+    acceleration from them."""
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state

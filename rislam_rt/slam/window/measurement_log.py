@@ -1,4 +1,4 @@
-"""Log of the window's measurements, and what each is held to be."""
+"""Log of the window's measurements, and the paths that each was associated with."""
 
 from typing import Any, NamedTuple
 
@@ -11,66 +11,69 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 
 
 class Log(NamedTuple):
-    """N components, in the order of their cycles."""
+    """Components measured in the window's cycles, N of them in the order of time, and the path that each was associated
+    with."""
 
     cycle: Integers
-    """(N,)."""
+    """(N,) number of the cycle."""
     seen: Floats
-    """(N, 3) length [m] and two cosines."""
+    """(N, 3) measured length [m] and two direction cosines."""
     std: Floats
-    """(N, 3)."""
+    """(N, 3) their reported standard deviations."""
     log_amplitude: Floats
-    """(N,)."""
+    """(N,) measured log amplitude."""
     log_amplitude_std: Floats
-    """(N,)."""
+    """(N,) its reported standard deviation."""
     side: Integers
-    """(N,) (see `slam.observations`)."""
+    """(N,) panel that the component ran over, `OTHER` or `UNTOLD` (see `slam.observations`)."""
     track: Integers
     """(N,) ident of the track that it belongs to, -1 for none."""
     form: Integers
-    """(N, 2, 5) feature idents of the form that it is, and of the partner that it came out as one with; the base is
-    `UNKNOWN` where there is none."""
+    """(N, 2, 5) forms, by feature idents, of the path that it was associated with and of an unresolved partner; the
+    base is `UNKNOWN` where there is none."""
     share: Floats
-    """(N,) of the partner in its place."""
+    """(N,) weight of the partner in the predicted place: 0 is the path alone, 1 the partner."""
     extra: Floats
-    """(N, 3) variance beyond the reported one..."""
+    """(N, 3) variance of length and cosines beyond the reported one..."""
     shared: Floats
-    """(N, 3) ...and its part by what the map knows in the component's cell: the rest is scatter."""
+    """(N, 3) ...and its part by other paths of the map in the component's cell: the rest is scatter by paths that the
+    map lacks."""
 
     def take(self, rows: Any) -> "Log":
-        """Only some of the components."""
+        """Measurement log with only some of the components."""
         return Log._make(field[rows] for field in self)
 
     def explain(
         self, rows: Integers, forms: Integers, share: Floats | float, shared: Floats | float, scatter: Floats
     ) -> "Log":
-        """With rows (A,) held to be forms (A, 2, 5) of idents, with the partners' shares (A,) and variances (A, 3): by
-        what the map knows in their cells, and by scatter."""
+        """Measurement log with components `rows` (A,) associated with forms (A, 2, 5) of idents, with partners' shares
+        (A,) and extra variances (A, 3): by paths of the map in their cells, and by scatter."""
         form, shares, variance, known = self.form.copy(), self.share.copy(), self.extra.copy(), self.shared.copy()
         form[rows], shares[rows], variance[rows], known[rows] = forms, share, shared + scatter, shared
         return self._replace(form=form, share=shares, extra=variance, shared=known)
 
     @property
     def momentary(self) -> Floats:
-        """(N, 3) variance of one cycle's measurement by itself: scatter counts `memory` times in `extra`, as its pull
-        keeps its sign for as long."""
+        """Variance (N, 3) of each measurement taken alone: scatter counts `memory` times in `extra`, as its pull keeps
+        its sign for as many cycles."""
         return np.asarray(self.std**2 + self.shared + (self.extra - self.shared) / CONSTANTS.memory)
 
     @property
     def explained(self) -> Booleans:
-        """(N,) whether it is held to be a form."""
+        """Whether each component (N,) was associated with a path of the map."""
         return np.asarray(self.form[:, 0, 0] != UNKNOWN)
 
 
 def empty_log() -> Log:
-    """No components."""
+    """Measurement log without measurements."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
     wide = np.zeros((0, 3))
     return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide, wide)
 
 
 def append(log: Log, observed: Observations, cycle: int, first: int) -> Log:
-    """The log with a cycle's components, unexplained as yet, and without those before cycle `first`."""
+    """Measurement log with a cycle's components appended, not yet associated, and without those of cycles before
+    `first`."""
     count, old = len(observed.seen), log.take(slice(np.searchsorted(log.cycle, first), None))
     fresh = Log(
         np.full(count, cycle), observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std,
@@ -82,22 +85,22 @@ def append(log: Log, observed: Observations, cycle: int, first: int) -> Log:
 
 
 class Residuals(NamedTuple):
-    """A components that are held to be forms."""
+    """Residuals of A components of the log that were associated with paths of the map."""
 
     row: Integers
-    """(A,) in the log."""
+    """(A,) row of each in the log."""
     slot: Integers
-    """(A,) pose of the window."""
+    """(A,) index of its pose in the window."""
     left: Floats
-    """(A, 3) measured less predicted, in standard deviations."""
+    """(A, 3) measured less predicted length and cosines, in standard deviations."""
 
     def take(self, rows: Any) -> "Residuals":
-        """Only some of the residuals."""
+        """Only some of the measurements' residuals."""
         return Residuals._make(field[rows] for field in self)
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
-    """Distinct forms (U, 5), and which of them each (N, 5) is."""
+    """Distinct forms (U, 5) among forms (N, 5), and the index (N,) of each among them."""
     base = int(forms.max(initial=0)) + 3
     code = (forms + 1) @ base ** np.arange(forms.shape[1])[::-1]
     _, first, place = np.unique(code, return_index=True, return_inverse=True)

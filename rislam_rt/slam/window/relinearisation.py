@@ -1,21 +1,21 @@
-"""Relinearisation: the quadratics of the window's measurements on poses and features, at the present estimate."""
+"""Relinearisation of the window's measurements: quadratic costs on poses and features at the present estimate."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import linearise_each, poses_of
+from rislam_rt.slam.predicted_returns import linearise_each, poses_of
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
-from rislam_rt.slam.window.rim import bring_back
-from rislam_rt.slam.window.smoother.steps import POSE
+from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 from rislam_rt.slam.window.state import WindowState
 
 
-def renew(state: WindowState, first: int) -> tuple[Window, Residuals]:
-    """The window with the quadratics of the slots from `first` on as they are at its estimate; the last pose is that of
-    the cycle."""
+def relinearise(state: WindowState, first: int) -> tuple[Window, Residuals]:
+    """Re-linearise the measurements of the poses from `first` on at the window's estimate, whose last pose is that of
+    the cycle; returns the window and its residuals."""
     window, log = state.window, state.log
     slot = log.cycle - (state.cycle - window.num_poses + 1)
     rows, place = (log.explained & (slot >= first)).nonzero()[0], poses(window)
@@ -35,8 +35,8 @@ def renew(state: WindowState, first: int) -> tuple[Window, Residuals]:
 
 
 def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats) -> tuple[Residuals, Floats]:
-    """Of some explained rows of the log, heard at those of the poses (K, 4), with the slopes (A, 3, 4 + 3F) of the
-    predictions by pose and features, likewise in standard deviations."""
+    """Residuals (A, 3) of explained rows of the log, heard at slots (A,) of the poses (K, 4), and the predictions'
+    jacobians (A, 3, 4 + 3F) by pose and features, both in standard deviations."""
     window, log, scene, form = state.window, state.log, state.scene, state.log.form[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
@@ -56,11 +56,11 @@ def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats)
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
     left = log.seen[rows] - seen
     left[:, 0] = scene.sensor.nearest(left[:, 0])
-    bring_back(seen, log.std[rows], left, slopes)
+    correct_horizon_bias(seen, log.std[rows], left, slopes)
     slopes /= std[..., None]
     return Residuals(rows, slot, left / std), slopes
 
 
 def trust(left: Floats) -> Floats:
-    """(A,) weight that Student's t gives residuals (A, 3)."""
+    """Weights (A,) of residuals (A, 3) under Student's t, for iteratively reweighted least squares."""
     return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))

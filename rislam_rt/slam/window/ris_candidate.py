@@ -1,54 +1,57 @@
-"""The RIS candidate, a panel that the map does not hold: tracks are weighed as points are; the design aims at the
-best."""
+"""RIS candidates: tracks weighed as panels that the map does not hold yet, and the best one, at which the phase design
+aims."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
-from rislam_rt.slam.arrival_rays import places
+from rislam_rt.slam.arrival_rays import scatterer_positions
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER
-from rislam_rt.slam.returns import Poses, reflect
+from rislam_rt.slam.predicted_returns import Poses, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import DRAWS
 from rislam_rt.slam.window.tracks import WindowTracks
 
 DISMISSAL = -2.0
-"""Log odds of panel against scatterer below which a suspect is none: under one code they tell little."""
+"""Log odds of panel against scatterer below which a point or track is no RIS candidate: under one code they tell
+little."""
 DEEP = 0.5
-"""Distance [m] behind a mirror at which what is seen there is held for an image; the panel hangs on a mirror itself."""
+"""Distance [m] behind a wall beyond which a track counts as a mirror image; the panel itself hangs on a wall."""
 PATIENCE = 2
-"""Cycles for which a track that is silent is still a suspect, if it was seen more often than that."""
+"""Cycles for which an undetected track remains a RIS candidate, if it was detected more often than that."""
 
 
 def weigh_tracks(
     tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None
 ) -> WindowTracks:
-    """The tracks after what this cycle tells of each, were it a point: is it a panel?"""
+    """Update each track's odds of being a RIS panel, were it a point heard over no wall, by this cycle's amplitude or
+    missed detection under the phase code."""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks
     spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
     looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
-    place, _ = places(looks, poses)
+    place, _ = scatterer_positions(looks, poses)
     count = len(rows)
     sight = PanelObservation(
         place, np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)), np.ones(count),
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).converged()
+    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
 def find_candidate(
     tracks: WindowTracks, landmarks: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
 ) -> PanelCandidate | None:
-    """The point or track that is the likeliest to be a panel; None if nothing is likelier the panel than not.
+    """Point or track that is the likeliest to be RIS panel number `panel`, or None if none is likely enough
+    (`DISMISSAL`).
 
     A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
     """
@@ -59,7 +62,7 @@ def find_candidate(
     few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
     told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
-    spots, _ = places(tracks.mean[rows, :, 0], poses)
+    spots, _ = scatterer_positions(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
         out = features[walls] - mean[:3]
         image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])

@@ -1,4 +1,4 @@
-"""Numerics: steps of the solver and limits of what is worth a look.
+"""Numerical limits of the window filter: solver steps, gates, and bounds beyond which an alternative is not examined.
 
 Some belong to the model and are not in its table: `EDGE`, `ALIGNED`, `LATELY`, `MISSED`.
 """
@@ -10,58 +10,59 @@ GATE = 16.3
 REFRESH = 5
 """Cycles between two re-linearisations of the whole window."""
 DAMPING = 0.3
-"""Share of the new in each step's log precision."""
+"""Weight of the new value in each update of a step's log acceleration precision."""
 STEPS = 4
-"""Gauss-Newton steps: the first guesses are within the linear range of the truth."""
+"""Gauss-Newton steps of a hypothesis's fit: initial values are within the linear range of the truth."""
 HOPELESS = 30.0
-"""Log likelihood behind the best hypothesis of a track from which on one is not followed."""
+"""Log likelihood behind the best hypothesis of a track from which on another is not fitted any further."""
 RIDGE = 1e-3
-"""Information [1/m^2] that keeps blind directions finite: (30 m)^-2."""
+"""Information [1/m^2] that keeps unobservable directions of a fit finite: (30 m)^-2."""
 POINTS = 8
-"""Most normal points of a history."""
+"""Most normal points to which a track's history is condensed."""
 NEAR = np.array([0.3, 0.15, 0.15])
-"""Gap in length [m] and cosines up to which a return of the map is weighed as a track's explanation."""
+"""Gap in length [m] and cosines up to which a predicted return of the map is weighed as a track's explanation."""
 MOST = 2
-"""Explanations of one track by the map that are weighed, the nearest."""
+"""Most predicted returns of the map, the nearest, that are weighed as explanations of one track."""
 STRIDE = 3
-"""Cycles between two examinations."""
+"""Cycles between two examinations of tracks for births."""
 NEARBY = 2.0
-"""Distance [m] beyond which two places are not compared."""
+"""Distance [m] beyond which two hypothetical features are not compared."""
 LATELY = 5
-"""Last steps that may all have been as lively as can be: what began within half a second."""
+"""Number of last steps that a manoeuvre may cover: one that began within half a second."""
 MISSED = 1.5
-"""Standard deviations by which fewer returns show than should, from which on a jump is looked for."""
+"""Standard deviations by which fewer returns are detected than predicted, from which on a jump is looked for."""
 DRAWS = 12
-"""Places of the belief over which the panel's predicted gain is averaged."""
+"""Samples of a place over which a panel's predicted gain is averaged."""
 CERTAIN = 30.0
-"""Log odds beyond which an identity is no longer in question."""
+"""Log odds to which those of a panel's identity are clipped."""
 FEWEST = 15
-"""Measurements of a feature within the window from which on their residuals speak against it."""
+"""Measurements of a feature within the window from which on their residuals may remove it."""
 RECENT = 5
-"""Cycles within which a form must have been seen for its measurements to go on as a track."""
+"""Cycles within which a removed feature's path must have been detected for its measurements to go on as a track."""
 FAINT = 0.5
-"""SNR below which a return is not looked for: it moves nothing in its cell by more than the noise does."""
+"""Integrated SNR below which a return is not predicted: it moves nothing in its cell by more than the noise does."""
 EDGE = 1.15
-"""Distance in cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
+"""Distance in resolution cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
 LOUDEST = 1e3
-"""Mean square of a residual in reported deviations beyond which it counts no more: 30 dB of SNR beside it."""
+"""Mean square to which residuals are limited, in reported deviations: a neighbour of 30 dB SNR."""
 MODES = 7
-"""Motion modes, half a decade apart."""
+"""Number of motion modes, half a decade of acceleration apart."""
 ALIGNED = 0.2
-"""Share of the paths over unknown walls that have them on the Tx leg alone."""
+"""Share of the paths over unknown walls that have them on the Tx leg alone, and so keep their direction of arrival."""
 STILL = 1e-5
-"""[m/s^2] Acceleration of an axis that is known to be still."""
+"""[m/s^2] acceleration along an axis that is known not to move."""
 ASTRAY = 0.3
-"""[m] by which a step of a fit may go where nothing is measured."""
+"""[m] by which a step of a fit may go along directions in which a length alone tells nothing."""
 BEARINGS = 8
-"""Initial values, all around, of an upright wall whose bearing only a length tells."""
+"""Number of initial bearings, all around, of an upright wall of which only a path length tells."""
 REACH = 5.0
-"""Standard deviations by which a track may come from elsewhere than the point of which it may be an image."""
+"""Standard deviations of direction within which a track may be an image of a point on the Tx leg."""
 APART = 0.5
-"""Distance [m] between two fits of one kind below which they are one."""
+"""Distance [m] between two fits of one kind below which they are the same solution."""
 STEP = 1e-6
-"""[m] by which walls are moved for the slope of a margin: its second derivative is of the order of one over metres."""
+"""[m] step of the finite differences of a path's margins by its walls: second derivatives are of the order of one over
+metres."""
 PERIODS = 3
-"""Most periods of the sounding by which a path may be longer than it is heard: 115 m at 128 tones over 1 GHz."""
+"""Most periods of the sounding that an ambiguous delay may hide of a path's length: 115 m at 128 tones over 1 GHz."""
 STRENGTHS = 13
-"""Strengths of a neighbour over which a track's expected scatter is averaged."""
+"""Number of strengths of an unresolved neighbour over which a track's expected scatter is averaged."""

@@ -14,32 +14,41 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 class WindowState(NamedTuple):
-    """All that the filter knows."""
+    """State of the window filter: poses and map as one Gaussian, landmark table, measurement log, tracks, motion modes,
+    and the odds of being lost."""
 
     cycle: int
+    """Number of cycles that have passed."""
     config: SlamConfig
+    """Settings of the filter."""
     window: Window
+    """Gaussian of the last K poses and the map."""
     landmarks: WindowTable
+    """What is known of the features besides their places."""
     log: Log
+    """Measurements of the window's cycles, and the paths that they were associated with."""
     tracks: WindowTracks
+    """Components that no path of the map explains, followed over cycles."""
     visibility: VisibilityObservations
+    """Occlusion and scatter of each path that was looked for."""
     motion_mode: Floats
-    """(2, L) probabilities of the liveliness of the step before the window's first, across and upwards; (3, L) with
-    the rate of turn, where the heading is not known."""
+    """(2, L) probabilities of the motion modes in the step before the window's first, horizontal and vertical; (3, L)
+    with the rate of turn, where the heading is not known."""
     level: Floats
-    """(2, L) or (3, L) of the last step's, filtered."""
+    """(2, L) or (3, L) filtered probabilities of the motion modes in the last step."""
     heading: Floats
-    """(K,) [rad] that the compass told; where it is not asked, what offsets are against."""
+    """(K,) [rad] headings of the poses as the compass told; without one, what the estimated offsets are relative to."""
     shift: Floats
-    """(3,) [m] standard deviation of the start's position: what no measurement tells."""
+    """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
     scene: KnownEnvironment
+    """What the filter is told beforehand: body, radio, sensor, panels."""
     lost_log_odds: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
-    asked: bool
-    """Whether the first tracks told that the start is another."""
+    start_was_wrong: bool
+    """Whether the first tracks have shown that the start's velocity or heading was told wrong."""
     turned: float
-    """[rad] by which the compass was found to be wrong."""
+    """[rad] correction of the compass since it was found to be wrong."""
     codes: tuple[RisCode | None, ...]
-    """(K,) as the agent believes they were applied."""
+    """(K,) phase codes of the window's cycles, as the agent believes they were applied."""
     passed: Floats
-    """(P, 3) [m] positions that left the window, each with the hindsight of its whole length."""
+    """(P, 3) [m] smoothed positions of the poses that have left the window."""

@@ -1,4 +1,5 @@
-"""Tracks: components that no form explains, followed from cycle to cycle until they are understood."""
+"""Tracks: components that no path of the map explains, followed from cycle to cycle by Kalman filters until a birth
+explains them."""
 
 from typing import NamedTuple
 
@@ -12,52 +13,55 @@ from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, un
 from rislam_rt.slam.window.solver_limits import GATE
 
 WANDER = 1.0
-"""Spread of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
+"""Standard deviation of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
 CYCLE = 0.1
-"""Time [s] that may pass from cycle to cycle where the clock says that none does."""
+"""Time [s] assumed between two cycles whose time step is told as zero."""
 
 
 class WindowTracks(NamedTuple):
-    """T tracks, each a Kalman filter of constant rate in length and either cosine of the room's axes."""
+    """Tracks of unexplained components, T Kalman filters of constant rate in length and both direction cosines of the
+    body frame."""
 
     ident: Integers
-    """(T,)."""
+    """(T,) number for life."""
     mean: Floats
-    """(T, 3, 2) value and rate."""
+    """(T, 3, 2) value and rate of length [m] and cosines; rates leave out the body's turn."""
     covariance: Floats
-    """(T, 3, 2, 2)."""
+    """(T, 3, 2, 2) of value and rate, for each of the three."""
     log_amplitude: Floats
     """(T,) of the last measurement."""
     side: Integers
-    """(T,)."""
+    """(T,) panel that the track runs over, `OTHER` or `UNTOLD` (see `slam.observations`)."""
     born: Integers
     """(T,) cycle of the first measurement."""
     last: Integers
     """(T,) cycle of the last one."""
     hits: Integers
-    """(T,)."""
+    """(T,) number of measurements."""
     looked: Integers
-    """(T,) hits at the last examination."""
+    """(T,) number of measurements at the last examination for a birth."""
     log_grid: Floats
-    """(T, G) log posterior of its strength, were it a scatterer that it comes straight from (see `panel`)."""
+    """(T, G) log posterior of its strength (root of a cross-section), were it a scatterer heard over no wall
+    (see `panel_evidence`)."""
     log_ris: Floats
     """(T, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
-    """(T, Q + 1) probability that something stands in its way, were it each of the panels, and a scatterer."""
+    """(T, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
     next_ident: int
+    """Number of the next track."""
 
     @property
     def identity(self) -> PanelIdentity:
-        """(T,) what the tracks would be, were they points."""
+        """Panel identities (T,) of the tracks, were they points heard over no wall."""
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     def keep(self, rows: Booleans) -> "WindowTracks":
-        """Only some of the tracks."""
+        """Only the tracks that are marked in `rows` (T,)."""
         return self if rows.all() else WindowTracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 
 def no_tracks(panels: int = 1) -> WindowTracks:
-    """Nothing seen yet, in a room of so many panels."""
+    """Empty set of tracks, for a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
@@ -66,7 +70,8 @@ def no_tracks(panels: int = 1) -> WindowTracks:
 
 
 def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats) -> WindowTracks:
-    """Predict over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the drift of the rates a second."""
+    """Kalman prediction of the tracks over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the root of
+    the rates' variance per second."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
     if dt <= 0.0:  # time passes from cycle to cycle, whatever a coarse clock says
@@ -81,7 +86,8 @@ def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats) -> Windo
 def match(
     tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float
 ) -> tuple[Integers, Integers]:
-    """Rows of tracks and the free components that continue them; `strangers` is the density of new ones."""
+    """Assign components `free` of a cycle to the tracks that they continue: rows of the tracks, and their components;
+    `strangers` is the density of new paths."""
     count = len(tracks.ident)
     if not count or not len(free):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -97,7 +103,7 @@ def match(
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
-    """Tracks `rows` (A,) updated by components `picks` (A,)."""
+    """Kalman update of tracks `rows` (A,) by components `picks` (A,) of a cycle."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     prior, spread = mean[rows], covariance[rows]
     gain = spread[..., 0] / (spread[..., 0, 0] + observed.std[picks] ** 2)[..., None]
@@ -112,7 +118,8 @@ def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: 
 def start(
     tracks: WindowTracks, observed: Observations, picks: Integers, rate: Floats, cycle: int
 ) -> tuple[WindowTracks, Integers]:
-    """One new track for each of the components `picks` (A,), and their idents; `rate` (A, 3) is the rates' spread."""
+    """Begin a track for each of the components `picks` (A,) of a cycle, with rates of standard deviation `rate` (A, 3);
+    also returns the new idents (A,)."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)
     if not count:
@@ -130,7 +137,8 @@ def start(
 
 
 def alive(tracks: WindowTracks, cycle: int) -> Booleans:
-    """(T,) not silent for longer than their past lets expect: 4 cycles, more for what comes and goes.
+    """Whether each track (T,) has been missed for no longer than its share of detections lets expect: 3 cycles, or more
+    for what comes and goes.
 
     What is likelier the panel than not may be silent for long: its codes make it so.
     """
@@ -141,7 +149,8 @@ def alive(tracks: WindowTracks, cycle: int) -> Booleans:
 
 
 def due(tracks: WindowTracks, cycle: int) -> Integers:
-    """Tracks to examine: after 6 measurements, and whenever their number has grown by a half since."""
+    """Rows of the tracks to examine for a birth, the shortest first: after 6 measurements, and whenever their number
+    has grown by a half."""
     grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + CONSTANTS.window // 2))
     rows = (grown & (cycle - tracks.last <= 1)).nonzero()[0]
     return rows[np.argsort(tracks.mean[rows, 0, 0])]

@@ -52,7 +52,7 @@ class SweptSpec(Section):
 
 class _OneRoom(SweptSpec):
     scene: str | None = None
-    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
 
 
 class Fig4bSpec(_OneRoom):

@@ -1,1 +1,2 @@
-"""Births and deaths: hypotheses for a track, their evidence, and features that the evidence has turned against."""
+"""Births and removals of map features: hypotheses of what caused a track, their evidence, and features that residuals
+contradict."""

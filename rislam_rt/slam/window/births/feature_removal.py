@@ -1,15 +1,15 @@
-"""Taking back: features that the evidence has turned against leave, and their measurements are tracks again."""
+"""Removal of features that the evidence contradicts, whose measurements become tracks again."""
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE
+from rislam_rt.slam.predicted_returns import NONE
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals
-from rislam_rt.slam.window.relinearisation import renew
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
@@ -17,15 +17,17 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
-    """Gauss-Newton over the whole window."""
+    """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns it and the last step's
+    residuals."""
     for _ in range(steps):
-        window, left = renew(context, 0)
+        window, left = relinearise(context, 0)
         context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
     return context.window, left
 
 
-def release(context: WindowState, keep: Booleans) -> WindowState:
-    """The map without some features; what they explained is unexplained, and goes on as tracks."""
+def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
+    """Remove features (those not marked in `keep`) from the map; the measurements that they explained go on as
+    tracks."""
     if keep.all():
         return context
     landmarks, log = context.landmarks, context.log
@@ -40,7 +42,7 @@ def release(context: WindowState, keep: Booleans) -> WindowState:
 
 
 def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
-    """One track for each form among the lost rows that was seen lately."""
+    """Begin a track for each recently detected path among the rows `lost` of the measurement log."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
     fresh: list[tuple[object, ...]] = []
@@ -69,8 +71,9 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
     return WindowTracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
-    """(F,) features to take back: that do not exist, or that their measurements contradict."""
+def features_to_remove(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
+    """Which features (F,) of the map to remove: those that probably do not exist, and those that their residuals
+    contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     form = log.form[left.row, 0]
     bounces = (form[:, 1:] != NONE).sum(axis=1)

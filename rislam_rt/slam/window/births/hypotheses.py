@@ -1,4 +1,5 @@
-"""Every hypothesis that a track is tried against, with its first guess; walls of the map as affine maps."""
+"""Hypotheses of what caused a track: every kind of path with one new feature, with initial values; known walls as
+affine maps."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.gaussian_draws import square_roots
-from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -16,7 +17,8 @@ KINDS = (
     "two walls", "wall beside its edge", "image of known point", "the same on the tx leg", "image, known tx wall",
     "image of image", "image over known wall", "tx image, known rx wall",
 )  # fmt: skip
-"""Names of the kinds, by their number; the last six in new walls (`image_hypotheses`)."""
+"""Names of the kinds of hypotheses, by their number; the last six are images of known points in new walls
+(`image_hypotheses`)."""
 WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(9)
 IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES = range(9, 15)
 
@@ -27,41 +29,44 @@ WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES)
 IS_WALL, IS_IMAGE, IS_FAR, IS_POINT = (
     np.isin(np.arange(len(KINDS)), some) for some in (WALLS, IMAGES, FAR, (POINT, OVER_RX, OVER_TX, OVER_SAME))
 )
-"""Of which kinds (15,) that is, which are images of known points, on the leg to the Tx, and new points."""
+"""Which kinds (15,) have a wall for a new feature, are images of known points, are such images on the Tx leg, and have
+a point for a new feature."""
 
 
 class KnownFeatures(NamedTuple):
-    """Features of the map as affine maps and places; walls as images of the agent's present place."""
+    """Features of the map, F of them: places and, for walls, reflections as affine maps."""
 
     place: Floats
-    """(F, 3)."""
+    """(F, 3) [m] place of a point; of a wall, the mirror image of the agent's present position."""
     root: Floats
-    """(F, 3, 3) square roots of their covariances."""
+    """(F, 3, 3) square roots of the places' covariances."""
     turn: Floats
-    """(F, 3, 3) reflection of each wall; the identity for points."""
+    """(F, 3, 3) linear part of each wall's reflection; the identity for points."""
     shift: Floats
-    """(F, 3)."""
+    """(F, 3) [m] its translation; zero for points."""
 
 
 class Hypotheses(NamedTuple):
-    """H hypotheses for T tracks."""
+    """Hypotheses of what caused T tracks, H in all: kind, known features on the path, and what the fit needs."""
 
     kind: Integers
-    """(H,)."""
+    """(H,) number in `KINDS`."""
     known: Integers
     """(H,) row of the known wall (of the known point, for its image in a wall), -1 for none."""
     over: Integers
-    """(H,) row of the known wall that an image of a known point runs over besides, -1 for none."""
+    """(H,) row of a second known wall, on the path of a known point's image, -1 for none."""
     trials: Trials
+    """Inputs of the fits."""
 
     def take(self, rows: Any) -> "Hypotheses":
-        """Only some of the hypotheses."""
+        """Only some of the hypotheses of what caused a track."""
         trials = Trials._make(field[rows] for field in self.trials)
         return Hypotheses(self.kind[rows], self.known[rows], self.over[rows], trials)
 
 
 def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, middle: Floats) -> KnownFeatures:
-    """The map's features (F, 3), walls as images of `middle`, with their covariances (3F, 3F) block by block."""
+    """Places, covariance roots and reflections of the map's features (F, 3), walls as images of `middle`, from their
+    covariance (3F, 3F)."""
     place, count = mean.copy(), len(mean)
     blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
     turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))
@@ -77,10 +82,11 @@ def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, mid
     return KnownFeatures(place, square_roots(blocks), turn, shift)
 
 
-def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
-    """Every kind for every track, with its first guess; images of known points stand in `image_hypotheses`."""
-    (seen, tx, rx), ray, count = digest.mean, digest.direction, len(digest.seen)
-    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, digest.middle
+def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
+    """Hypotheses of every kind of what caused each track, with initial values of the new feature; images of known
+    points in new walls stand in `image_hypotheses`."""
+    (seen, tx, rx), ray, count = summary.mean, summary.direction, len(summary.seen)
+    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, summary.middle
     walls, once = landmarks.walls, np.array([NONE])
     turn, shift = known.turn[walls], known.shift[walls, None]
 
@@ -123,13 +129,13 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
 
 
 def _every(kinds: list[Any], column: int, shape: tuple[int, ...]) -> Any:
-    """A column of the table of kinds, of that shape for each of their walls."""
+    """One column of the table of hypothesis kinds, broadcast to a shape for each of their known walls."""
     return np.concatenate([np.broadcast_to(kind[column], (len(kind[1]), *shape)) for kind in kinds])
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
-    """Turns (N, T, 2, 3, 3), shifts (N, T, 2, 3) and covariances (N, T, 2, 3, 3) of the walls that N kinds go over on
-    either leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
+    """Linear parts (N, T, 2, 3, 3), translations (N, T, 2, 3) and error roots (N, T, 2, 3, 3) of the reflections in
+    known walls on either leg (N, 2) of N hypotheses, `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
     count, nowhere = spots.shape[2], (middle + 1.0, np.zeros((3, 3)), AXES, np.zeros(3))
     place, root, turn, shift = (np.concatenate([field, none[None]]) for field, none in zip(known, nowhere, strict=True))
     slope = by_wall(spots, place[legs][:, :, None], middle)
@@ -139,7 +145,8 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
 
 
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
-    """(H, 3, 4) turn and shift of the known walls beside whose edges walls are sought; zero elsewhere."""
+    """Linear part and translation (H, 3, 4) of the reflection in the known wall of hypotheses of a new wall whose
+    return is unresolved from its edge with that one; zero elsewhere."""
     found, rows = np.zeros((len(kind), 3, 4)), (kind == BESIDE).nonzero()[0]
     if len(rows):
         found[rows, :, :3], found[rows, :, 3] = known.turn[walled[rows]], known.shift[walled[rows]]
@@ -147,11 +154,12 @@ def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
 
 
 ALIGNED_TURN = 0.9
-"""Part of the vertical that a reflection keeps or turns over, from which on its wall is upright or level."""
+"""Vertical part of a reflection, kept or turned over, from which on its wall is upright or level."""
 
 
 def _pairs(ray: Floats) -> Floats:
-    """(3, T, 3, 3) what two walls do to the Tx: opposite ones, two upright ones, an upright and a level one."""
+    """Linear parts (3, T, 3, 3) of reflections in two unknown walls: opposite ones, two upright ones, an upright and a
+    level one."""
     count = len(ray)
     corner = np.broadcast_to(np.diag([-1.0, -1.0, 1.0]), (count, 3, 3))
     edge = np.stack([-ray[:, 1], ray[:, 0], np.zeros(count)], axis=1)
@@ -160,7 +168,8 @@ def _pairs(ray: Floats) -> Floats:
 
 
 def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
-    """Points (..., 3) on rays (..., 3) from Rx whose way from (mirrored) Tx positions (..., 3) has that length."""
+    """Points (..., 3) on arrival rays (..., 3) from Rx at which a path from Tx positions (..., 3), mirrored or not, has
+    the given length."""
     base = tx - rx
     reach = (length**2 - np.vecdot(base, base)) / np.maximum(2.0 * (length - np.vecdot(base, ray)), 1e-3)
     return np.asarray(rx + np.maximum(reach, 0.05)[..., None] * ray)

@@ -1,4 +1,5 @@
-"""Prior and evidence of what tracks may be: kind, place, amplitude, what stands in the way, what others speak for."""
+"""Prior and evidence of the hypotheses of what caused a track: kind, place, amplitude, occlusion, and support by other
+tracks."""
 
 from typing import NamedTuple
 
@@ -7,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, NONE, TX
+from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     ALIGNED_TURN,
     BESIDE,
@@ -31,21 +32,23 @@ from rislam_rt.slam.window.solver_limits import NEARBY
 from rislam_rt.slam.window.state import WindowState
 
 MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
-"""Walls on the way of each kind beyond the first one of a wall return: each takes its share of the power, and so of the
-paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
+"""Number of walls on a path of each kind beyond the one of a wall return: each takes its share of the power, and so of
+the paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
 MORE_UNKNOWN = 2
-"""The same of a path of no kind here: over walls that the map lacks. Without wall returns most walls stay unknown:
-such paths are as frequent as points at least, and it counts none."""
+"""The same of a path of none of these kinds: over walls that the map lacks. Without wall returns most walls stay
+unknown: such paths are as frequent as points at least, and it counts none."""
 CLOSE = 0.8
-"""Gap in cells below which two paths come out as one beyond doubt."""
+"""Gap in resolution cells below which two paths come out as one component beyond doubt."""
 LOG_APART = np.log(1e-4)
-"""Log probability that two that lie apart come out as one."""
+"""Log probability that two paths more than a cell apart come out as one component."""
 ASIDE = 10.0
-"""Log evidence behind a track's best from which on a hypothesis does not speak for others, nor is asked for more."""
+"""Log evidence behind a track's best hypothesis from which on another does not speak for other tracks, nor is asked for
+more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
-    """(H,) log prior of the kinds: walls on the way; over known features, of all of them together."""
+    """Log prior (H,) of the kinds of hypotheses: each wall on the path costs power, and kinds over a known feature
+    share their probability among all such features."""
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     rivals[IS_IMAGE[table.kind]] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
@@ -53,7 +56,8 @@ def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
 
 
 def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
-    """(H,) log prior density [1/m^3] of the places: points anywhere in a ball, what two walls do in one twice as wide.
+    """Log prior density (H,) [1/m^3] of the new features' places: points anywhere in a ball, the shift by two walls in
+    one twice as wide.
 
     Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
     """
@@ -64,20 +68,21 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     )
 
 
-def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """(H,) log probability that a wall's return comes out by itself, or as one with its edge at another wall.
+def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
+    """Log probability (H,) that a new wall's return is resolved from the return over its edge with a known level or
+    upright wall, or is unresolved from it, as the hypothesis has it.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
     so does its edge.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
-    length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
+    length, cell = summary.mean[0][track, 0], float(scene.sensor.cell_length[0])
     aligned = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > ALIGNED_TURN]
     forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in aligned], dtype=np.int64).reshape(-1, 5)
     heard, _ = recall_forms(context.visibility, forms, np.ones(len(aligned), dtype=np.int64), landmarks)
     for wall, clear in zip(aligned, heard, strict=True):
-        rise = float(np.linalg.norm(known.place[wall] - digest.middle))
+        rise = float(np.linalg.norm(known.place[wall] - summary.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
@@ -89,7 +94,7 @@ def log_shared(
     table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats,
     concurrent: Booleans,
 ) -> Floats:  # fmt: skip
-    """Gain (H,) of hypotheses whose new feature other tracks ask for as well: shared planes and points decide.
+    """Gain (H,) in log evidence of hypotheses whose new feature other tracks' hypotheses ask for as well.
 
     A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
     that of one place given the other, against all else that it may be.
@@ -124,21 +129,22 @@ def log_shared(
     return gain
 
 
-def concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
-    """(T, T) which tracks, rows of the log each, were heard in one cycle."""
+def concurrent(context: WindowState, track_rows: list[Integers]) -> Booleans:
+    """Whether each pair of T tracks (T, T), given as rows of the log, were detected in a common cycle."""
     cycle = context.log.cycle - context.log.cycle.min()
-    heard = np.zeros((len(ats), cycle.max() + 1))
-    for row, at in enumerate(ats):
+    heard = np.zeros((len(track_rows), cycle.max() + 1))
+    for row, at in enumerate(track_rows):
         heard[row, cycle[at]] = 1.0
     return np.asarray(heard @ heard.T > 0.0)
 
 
 def log_amplitudes(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, fits: Fits, summary: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
-    """(H,) log density of the tracks' mean amplitudes, given what walls leave and how points scatter."""
+    """Log density (H,) of the tracks' mean amplitudes under their hypotheses, given walls' reflectivity and points'
+    strengths."""
     radio, track = scene.radio, table.trials.track
-    level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
+    level, seen, rx = summary.log_amplitude[track], summary.mean[0][track], summary.mean[2][track]
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
     has = (table.known >= 0) & (table.kind != BESIDE)
     ratio = np.where(has, landmarks.ratio[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
@@ -160,25 +166,26 @@ def log_amplitudes(
     double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
-    rows, image = image_amplitudes(table, digest, landmarks, scene.radio)
+    rows, image = image_amplitudes(table, summary, landmarks, scene.radio)
     amplitude[rows] = image
     return amplitude
 
 
 def log_opacity(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
+    table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """(H,) log prior by what stands between the agent and the new feature, or the new wall and what is known.
+    """Log prior (H,) of occlusion: against new features behind known walls, and against new walls in front of known
+    features.
 
     With wall returns a new wall that is heard over a known one stands where its path meets it.
     """
-    middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
-    pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
+    middle, walls, wall = summary.middle, landmarks.walls, table.trials.is_wall
+    pair, tx = table.trials.is_pair[:, None], summary.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
     if use_vt:
-        rows, spot = bounces(table, fits.place, digest, known)
+        rows, spot = bounces(table, fits.place, summary, known)
         foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total, small = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
@@ -199,14 +206,14 @@ def log_opacity(
 
 
 LEVEL_RISE, UPRIGHT_RISE = 0.9, 0.35
-"""Share of its height in the way to a wall's image above which it may be level, and below which it may be upright."""
+"""Vertical share of the way to a wall's image above which the wall may be level, and below which it may be upright."""
 
 
 def direction_beliefs(
-    place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+    place: Floats, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> DirectionPriors:
-    """What may be held beforehand of a wall at `place` (3,): upright, at right angles to another; or level."""
-    span = place - digest.middle
+    """Direction priors of a new wall at `place` (3,): upright, at right angles to a known wall, or level."""
+    span = place - summary.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
@@ -217,20 +224,20 @@ def direction_beliefs(
     elif rise < UPRIGHT_RISE:
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        rows, along = _square_axes(span[None], known.place[landmarks.walls] - digest.middle)
+        rows, along = _square_axes(span[None], known.place[landmarks.walls] - summary.middle)
         axes += list(along)
         log_odds += [float(_log_square(np.asarray(reach)))] * len(rows)
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
     return DirectionPriors(
-        np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
+        np.zeros(count, dtype=np.int64), axis, axis @ summary.middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip
 
 
 def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
-    """Those of N upright walls with images at `span` (N, 3) that nearly are at right angles to an upright one of
-    `others` (W, 3), or alike: rows (A,), and the axes (A, 3) along which their images do not lie if they are."""
+    """Upright walls, of N with images at `span` (N, 3), that are nearly parallel or at right angles to one of `others`
+    (W, 3): rows (A,), and the axes (A, 3) along which their images do not lie if they exactly are."""
     flat = others[np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)]
     if not len(flat):
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
@@ -244,37 +251,40 @@ def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
 
 
 def _log_square(reach: Floats) -> Floats:
-    """Log odds that a wall so far off is at right angles to another, times the width of the prior if it is not."""
+    """Prior log odds that a wall at distance `reach` [m] is at right angles to another, times the width [m] of the
+    prior if it is not."""
     return np.asarray(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
 
 
 class HeldWalls(NamedTuple):
-    """H hypotheses by what walls are beforehand."""
+    """Effect of direction priors on H hypotheses: gain in evidence, and new walls' places if they are upright or
+    level."""
 
     gain: Floats
-    """(H,) in log evidence."""
+    """(H,) gain in log evidence."""
     place: Floats
-    """(H, 3) of new walls that are upright or level, as they are held to be..."""
+    """(H, 3) [m] of new walls, given that they are upright or level..."""
     covariance: Floats
-    """(H, 3, 3) ...and theirs."""
+    """(H, 3, 3) [m^2] ...the covariances then..."""
     log_odds: Floats
-    """(H,) of that."""
+    """(H,) ...and the log odds that they are."""
 
 
 def log_upright(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
+    table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> HeldWalls:
-    """What walls are beforehand: upright, level, at right angles to another, or in any direction alike.
+    """Gain in log evidence of new walls by the directions that walls have beforehand (upright, level, at right angles
+    to another, or any), and their places given these.
 
     Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
     along each axis: rivals that are rarer let ghosts of points through.
     """
     trials, pair, spread = table.trials, table.trials.is_pair, fits.covariance
     held = HeldWalls(np.zeros(len(pair)), fits.place.copy(), spread.copy(), np.full(len(pair), -np.inf))
-    turn, tx = trials.turn[:, 0], digest.mean[1][trials.track]
+    turn, tx = trials.turn[:, 0], summary.mean[1][trials.track]
     # what two walls do together goes across them both; an edge under the ceiling: any elevation
     mirror = (turn @ tx[..., None])[..., 0] - tx
-    span = fits.place - digest.middle + np.where(pair[:, None], digest.middle + mirror, 0.0)
+    span = fits.place - summary.middle + np.where(pair[:, None], summary.middle + mirror, 0.0)
     asked = np.isfinite(fits.cost) & np.where(pair, turn[:, 2, 2] >= 0.0, trials.is_wall)
     reach = np.maximum(np.sqrt(np.vecdot(span, span)), 0.1)
     rise, width = np.abs(span[:, 2]) / reach, np.log(reach)
@@ -300,7 +310,7 @@ def log_upright(
         held.covariance[rows] -= pull @ across
         held.log_odds[rows] = each[own, 0]
     rows = (upright & ~(pair & (turn[:, 0, 0] < 0.0))).nonzero()[0]
-    square, axis = _square_axes(span[rows], known.place[landmarks.walls] - digest.middle)
+    square, axis = _square_axes(span[rows], known.place[landmarks.walls] - summary.middle)
     rows = rows[square]
     variance = np.vecdot(axis, (spread[rows] @ axis[..., None])[..., 0]) + noise[rows]
     each = _log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)
@@ -309,5 +319,6 @@ def log_upright(
 
 
 def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
-    """Log odds that a wall is as it may be held to be, its image being so far off that and uncertain by so much."""
+    """Posterior log odds that a direction prior holds of a wall, from the prior ones and the offset [m] of the wall's
+    image with its variance [m^2]."""
     return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))

@@ -1,4 +1,5 @@
-"""Whether a new wall's path over a known one can be: bounces in its order, on one side of each wall, heard from above.
+"""Path feasibility: whether a path over a known and a new wall bounces in order, on one side of each, and arrives from
+above.
 
 A return over a known and a new wall has a twin: the known wall's mirror image of the new one, met in the other order,
 throws the same path. Which of the two it is nothing that is measured tells, but only one of them can throw it.
@@ -9,7 +10,7 @@ import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.predicted_returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.path_forms import crossing, margins, planes
@@ -17,21 +18,21 @@ from rislam_rt.slam.window.solver_limits import STEP
 
 
 def over_known(table: Hypotheses) -> Booleans:
-    """(H,) which are wall returns over a known wall and a new one."""
+    """Which hypotheses (H,) are wall returns over a known wall and a new one."""
     return np.isin(table.kind, (KNOWN_WALL, WALL_KNOWN))
 
 
 def log_possible(
-    table: Hypotheses, place: Floats, spread: Floats, digest: TrackSummary, known: KnownFeatures
+    table: Hypotheses, place: Floats, spread: Floats, summary: TrackSummary, known: KnownFeatures
 ) -> Floats:
-    """(H,) log probability that the path can be, over that beforehand, with new walls at `place` (H, 3) [m] within
-    covariances `spread` (H, 3, 3) [m^2], known ones as uncertain as they are; 0 where it is not over a known and a new
-    wall. Beforehand it is one half: of twins one can."""
+    """Log probability (H,) that the path over a known and a new wall is geometrically possible, over that beforehand,
+    with new walls at `place` (H, 3) [m] within covariances `spread` (H, 3, 3) [m^2], known ones as uncertain as they
+    are; 0 for other hypotheses. Beforehand it is one half: of two orders one is possible."""
     found, rows = np.zeros(len(table.kind)), over_known(table).nonzero()[0]
     if not len(rows):
         return found
     track, wall = table.trials.track[rows], table.known[rows]
-    _, tx, rx = (field[track] for field in digest.mean)
+    _, tx, rx = (field[track] for field in summary.mean)
     first = (table.kind[rows] == WALL_KNOWN)[:, None]
     value, vector = np.linalg.eigh(spread[rows])
     roots = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :]
@@ -40,17 +41,18 @@ def log_possible(
     new[1:4] += np.moveaxis(roots, 2, 0)
     old[4:] += np.moveaxis(known.root[wall], 2, 0)
     inner, outer = (np.where(first, one, two).reshape(-1, 3) for one, two in ((new, old), (old, new)))
-    margin, *moved = _margins(np.tile(tx, (7, 1)), np.tile(rx, (7, 1)), inner, outer, digest.middle).reshape(7, -1, 3)
+    margin, *moved = _margins(np.tile(tx, (7, 1)), np.tile(rx, (7, 1)), inner, outer, summary.middle).reshape(7, -1, 3)
     std = np.sqrt(((np.array(moved) - margin) ** 2).sum(axis=0) + STEP**2)
     found[rows] = np.log(2.0) + scipy.special.log_ndtr(margin / std).sum(axis=1)
     return found
 
 
-def bounces(table: Hypotheses, place: Floats, digest: TrackSummary, known: KnownFeatures) -> tuple[Integers, Floats]:
-    """Hypotheses (N,) over a known and a new wall, and where (N, 3) [m] their paths meet the new one at `place`."""
+def bounces(table: Hypotheses, place: Floats, summary: TrackSummary, known: KnownFeatures) -> tuple[Integers, Floats]:
+    """Rows (N,) of the hypotheses over a known and a new wall, and the points (N, 3) [m] where their paths meet the new
+    wall at `place`."""
     rows = over_known(table).nonzero()[0]
-    track, wall, middle = table.trials.track[rows], table.known[rows], digest.middle
-    _, tx, rx = (field[track] for field in digest.mean)
+    track, wall, middle = table.trials.track[rows], table.known[rows], summary.middle
+    _, tx, rx = (field[track] for field in summary.mean)
     first = (table.kind[rows] == WALL_KNOWN)[:, None]
     inner, outer = np.where(first, place[rows], known.place[wall]), np.where(first, known.place[wall], place[rows])
     image = reflect(tx, inner, middle)
@@ -59,15 +61,15 @@ def bounces(table: Hypotheses, place: Floats, digest: TrackSummary, known: Known
 
 
 def _met(start: Floats, stop: Floats, wall: Floats, middle: Floats) -> Floats:
-    """(N, 3) where the ways between places (N, 3) meet walls (N, 3), images of `middle`."""
+    """Points (N, 3) where segments between places (N, 3) meet walls (N, 3), given as mirror images of `middle`."""
     normal, offset = planes(wall, middle)
     return crossing(start, stop, *(np.vecdot(spot, normal) - offset for spot in (start, stop)))
 
 
 def _margins(tx: Floats, rx: Floats, inner: Floats, outer: Floats, middle: Floats) -> Floats:
-    """(N, 3) [m] by how much a path from `tx` over walls `inner` and then `outer` (N, 3), images of `middle`, to `rx`
-    can be: its image before the last wall on the Rx's side of that, the last bounce on the Tx's side of the first wall,
-    and how far above the horizon it arrives."""
+    """Margins (N, 3) [m] by which paths from `tx` over walls `inner` and then `outer` (N, 3), images of `middle`, to
+    `rx` are possible: the image before the last wall on the Rx's side of that, the last bounce on the Tx's side of the
+    first wall, and how far above the horizon the path arrives."""
     ahead, _, deep, own = margins(tx, rx, middle, np.stack([inner, outer], axis=1))
     ray = reflect(reflect(tx, inner, middle), outer, middle) - rx
     rise = ray[:, 2] + 2.0 * CONSTANTS.dip * np.linalg.norm(ray, axis=1)

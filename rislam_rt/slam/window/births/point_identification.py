@@ -1,4 +1,4 @@
-"""Points that tracks may be: each as a scatterer and as a panel, by amplitudes and silence over the whole history."""
+"""Point identification: each point that a track may be, weighed as scatterer and as RIS panel by its whole history."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.returns import poses_of
+from rislam_rt.slam.predicted_returns import poses_of
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -27,24 +27,28 @@ from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
 ASIDE = 12.0
-"""Log evidence behind a track's best point from which on another place is not asked whether it is the panel's."""
+"""Log evidence behind a track's best point hypothesis from which on another is not weighed as a panel."""
 
 
 class Identified(NamedTuple):
-    """H hypotheses for T tracks."""
+    """Panel identities of the points of H hypotheses, and what they add to the evidence of T tracks."""
 
     gain: Floats
-    """(H,) in log evidence, of points that may be the panel instead of a scatterer."""
+    """(H,) gain in log evidence, of points that may be a panel instead of a scatterer."""
     identity: PanelIdentity
-    """(H,) who each is then."""
+    """(H,) panel identity of each point."""
     elsewhere: Floats
-    """(T, Q) log odds that a track runs over each panel by a way that is none of these, against none over it."""
+    """(T, Q) log odds that a track runs over each panel by a path that is none of these hypotheses, against over
+    none."""
 
 
-def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
-    """The tracks whose components are the log's rows `ats`: what comes of its being a panel that throws them."""
+def identify(
+    context: WindowState, track_rows: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats
+) -> Identified:
+    """Weigh every point that a track may be as RIS panel and as scatterer, by each track's components (`track_rows` of
+    the log), and return the gain in evidence."""
     scene, landmarks, panels = context.scene, context.landmarks, context.scene.num_panels
-    elsewhere = np.full((len(ats), panels), -CERTAIN)
+    elsewhere = np.full((len(track_rows), panels), -CERTAIN)
     found = Identified(np.zeros(len(evidence)), unknown(len(evidence), panels), elsewhere)
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
@@ -53,7 +57,7 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
     taken = -np.logaddexp.reduce(
         np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
     )  # but one
-    for track, at in enumerate(ats):
+    for track, at in enumerate(track_rows):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
             found.identity.log_ris[rows] = -CERTAIN
@@ -67,11 +71,12 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
     found.identity.hidden[table.kind != POINT] = 1.0
-    return found._replace(identity=found.identity.converged())
+    return found._replace(identity=found.identity.clipped())
 
 
 def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
-    """Identities of the hypotheses `rows` (R,) of a track whose components are the log's rows `at`.
+    """Panel identities (scatterer or RIS panel) of the points of a track's hypotheses `rows` (R,) after its whole
+    history, its components being the log's rows `at`.
 
     The last row stands for a panel anywhere else: amplitudes scatter as they do.
     """
@@ -105,11 +110,12 @@ def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, 
 
 
 LOOKS = 60
-"""At so many places at a time: numpy's calls cost no more than the numbers then, which stay in the cache."""
+"""Observations weighed at a time: numpy's calls cost no more than the numbers then, which stay in the cache."""
 
 
 def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
-    """Slots of the window from the first on, in blocks of at most so many, of all or none of which a code is told."""
+    """Cycles of the window from `first` on, in blocks of at most `most` cycles within which a phase code is told for
+    all or for none."""
     slots = list(range(first, len(told)))
     while slots:
         count = next((at for at, slot in enumerate(slots) if told[slot] != told[slots[0]]), len(slots))
@@ -118,14 +124,14 @@ def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
 
 
 def _codes(codes: list[RisCode | None], count: int) -> RisCode | None:
-    """The codes of some cycles, each for so many places; None where none is told."""
+    """Phase codes of some cycles as one `RisCode`, each repeated for so many places; None where none is told."""
     index = [code.index for code in codes if code is not None]
     levels = next((code.levels for code in codes if code is not None), 0)
     return RisCode(np.repeat(np.stack(index), count, axis=0)[:, None], levels) if index else None
 
 
 def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:
-    """(R,) amplitude that the known walls of hypotheses leave."""
+    """Share (R,) of the amplitude that known walls on the paths of hypotheses `rows` leave."""
     if not len(landmarks.ident):
         return np.ones(len(rows))
     known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)

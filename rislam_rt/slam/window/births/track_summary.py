@@ -1,4 +1,5 @@
-"""Histories of tracks, condensed: at most eight normal points each, with the scatter that they show themselves.
+"""Track summaries: each track's history condensed to at most eight normal points, with the scatter that its residuals
+show.
 
 What the map lacks shares cells with what a track is, and moves its measurements about, now here, now there, as phases
 turn. Their scatter about a smooth path tells by how much more than the receiver reports.
@@ -15,18 +16,18 @@ from rislam_rt.model import SensorModel
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, free_space
-from rislam_rt.slam.returns import poses_of
-from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.predicted_returns import poses_of
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.solver_limits import PERIODS, POINTS, STRENGTHS
 from rislam_rt.slam.window.state import WindowState
 
 TOGETHER = 10.0
-"""Measurements over which the pull of neighbours keeps its sign."""
+"""Measurements over which the error by unresolved neighbours keeps its sign."""
 
 
 class _Points(NamedTuple):
-    """T tracks, B normal points each; where `weight` is 0 there is none."""
+    """Condensed histories of T tracks, B normal points each; where `weight` is 0 there is none."""
 
     seen: Floats
     """(T, B, 3) length [m] and two cosines, these in the room's axes."""
@@ -35,34 +36,35 @@ class _Points(NamedTuple):
     time: Floats
     """(T, B) [s] from the present."""
     tx: Floats
-    """(T, B, 3) [m]."""
+    """(T, B, 3) [m] positions of the Tx."""
     rx: Floats
-    """(T, B, 3) [m]."""
+    """(T, B, 3) [m] positions of the Rx."""
     uncertainty: Floats
-    """(T, B, 3, 6) square root of the covariance of the poses' common errors of place and velocity."""
+    """(T, B, 3, 6) square root of the agent's position covariance, by the errors of present place and velocity that all
+    points share."""
     log_amplitude: Floats
-    """(T,) mean."""
+    """(T,) mean log amplitude."""
     scatter: Floats
-    """(T, 3) factor on the reported standard deviations."""
+    """(T, 3) factor on the reported standard deviations, by the scatter of the residuals."""
     middle: Floats
-    """(3,) where the agent is now: the anchor of new walls."""
+    """(3,) [m] the agent's present position: the anchor of new walls."""
     speed: float
-    """[m/s] of the agent, and something for its uncertainty."""
+    """[m/s] speed of the agent, and something for its uncertainty."""
     twist: Floats
     """(T, B, 3, H) square root of the covariance with which the heading's error moves what is seen; H = 0 if known."""
 
 
 class TrackSummary(_Points):
-    """T tracks, B normal points each, with what is read off them once."""
+    """Condensed histories of T tracks, B normal points each, with the averages that are computed once."""
 
     def take(self, rows: Integers) -> "TrackSummary":
-        """Only some of the tracks, or some more than once."""
+        """Summaries of only some of the tracks, or of some more than once."""
         per_track = {name: field[rows] for name, field in self._asdict().items() if name not in ("middle", "speed")}
         return self._replace(**per_track)
 
     def farther(self, sensor: SensorModel) -> tuple["TrackSummary", Integers]:
-        """With a row more for every longer path that a track may be, were it heard so many periods of the sounding too
-        early: as long as a perfect mirror would be as loud. Also the track (T + E,) of each row."""
+        """Summaries with more rows for the longer paths that tracks may be, whole periods of the sounding ambiguous, as
+        far as a perfect mirror would be as loud; and the track (T + E,) of each row."""
         period, count = SPEED_OF_LIGHT * sensor.period, len(self.seen)
         longest = np.exp(free_space(sensor.radio) - self.log_amplitude)
         more = np.clip(np.floor((longest - self.mean[0][:, 0]) / period), 0.0, PERIODS).astype(np.int64)
@@ -78,7 +80,7 @@ class TrackSummary(_Points):
 
     @cached_property
     def mean(self) -> tuple[Floats, Floats, Floats]:
-        """Averages: what is seen, Tx and Rx (T, 3)."""
+        """Mean measurement, Tx and Rx position, (T, 3) each, of every track."""
         weight = self.weight[..., :1] ** 2
         weight = weight / weight.sum(axis=1, keepdims=True)
         seen, tx, rx = ((weight * field).sum(axis=1) for field in (self.seen, self.tx, self.rx))
@@ -86,12 +88,13 @@ class TrackSummary(_Points):
 
     @cached_property
     def direction(self) -> Floats:
-        """(T, 3) mean directions of arrival in the room's axes."""
+        """Mean directions of arrival (T, 3) in the room's axes."""
         return rays(self.mean[0], 0.0)
 
 
 def summarise_tracks(state: WindowState, rows: list[Integers]) -> TrackSummary:
-    """The histories `rows` of T tracks (rows of the log each, in time)."""
+    """Condense the histories of T tracks, each given as rows of the log in time, to normal points with weights and pose
+    errors."""
     log, window = state.log, state.window
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
@@ -143,7 +146,8 @@ def summarise_tracks(state: WindowState, rows: list[Integers]) -> TrackSummary:
 
 
 def heading_roots(window: Window) -> Floats:
-    """(K, H) square root of the covariance of the headings, in its three strongest directions; H = 0 if known."""
+    """Square root (K, H) of the covariance of the window's headings, in its three strongest directions; H = 0 if they
+    are known."""
     if not window.turns:
         return np.zeros((window.num_poses, 0))
     value, vector = np.linalg.eigh(pose_covariance(window, TURN))
@@ -151,13 +155,15 @@ def heading_roots(window: Window) -> Floats:
 
 
 def _turned(seen: Floats, heading: Floats) -> Floats:
-    """Lengths and cosines (K, 3) with the cosines in the room's axes: a body that turns does not bend the history."""
+    """Lengths and cosines (K, 3) with the cosines rotated into the room's axes by headings (K,): a body that turns does
+    not bend the history."""
     cos, sin = np.cos(heading), np.sin(heading)
     return np.stack([seen[:, 0], cos * seen[:, 1] - sin * seen[:, 2], sin * seen[:, 1] + cos * seen[:, 2]], axis=1)
 
 
 def expected_scatter(shown: Floats, free: Floats, snr: Floats) -> Floats:
-    """Mean square (T, 3) to expect of residuals, in reported deviations, at a linear SNR `snr` (T, 1).
+    """Mean square (T, 3) to expect of tracks' residuals, in reported deviations, given what they have shown and their
+    linear SNR (T, 1).
 
     `shown` (T, 3) is the mean square that the tracks have shown over so many independent residuals `free` (T, 1).
 
@@ -175,12 +181,14 @@ def expected_scatter(shown: Floats, free: Floats, snr: Floats) -> Floats:
 
 
 def _terms(number: Integers | int) -> Integers:
-    """Numbers that a smooth path takes on each axis of so many measurements: a line's, a quadratic's from nine on."""
+    """Number of polynomial terms of a smooth path through so many measurements: a line's, or a quadratic's from nine
+    on."""
     return np.where(np.asarray(number) >= 9, 3, 2)
 
 
 def scatter_of(seen: Floats, std: Floats, time: Floats) -> Floats:
-    """(3,) root mean square about a quadratic in time (a line, for short ones), in reported deviations; 1 at least.
+    """Root mean square (3,) of a track's residuals about a quadratic in time (a line, for short ones), in reported
+    deviations; 1 at least.
 
     Weights of Student's t keep single outliers from speaking for all.
     """

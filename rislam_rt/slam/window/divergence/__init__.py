@@ -1,1 +1,1 @@
-"""Lost or not, and what becomes of the belief then."""
+"""Divergence: whether the filter has lost the agent, and how its belief then recovers."""

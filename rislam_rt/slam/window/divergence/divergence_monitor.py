@@ -1,9 +1,10 @@
-"""Monitor of divergence, lost or not: a chain of two hidden states, jumps, and a start that was told wrong.
+"""Divergence monitor: a hidden Markov chain of tracked and lost, jumps in position, and a check of the start against
+the tracks.
 
-While the agent is tracked, the map foresees what is heard; once it is lost, all is strangers'. The log likelihood of a
-cycle under the one against the other (`look`) moves the log odds of a hidden chain, which passes from tracked to lost
-at a rate of its own. Before it is held for lost, the belief is given what might explain the cycle: livelier motion, and
-a jump to where the map's returns and what is heard agree.
+While the agent is tracked, the map predicts what is heard; once it is lost, all is clutter. The log likelihood ratio of
+a cycle (`CycleAssociation.score`) moves the log odds of a hidden chain, which passes from tracked to lost at a rate of
+its own. Before it is held for lost, the belief is given what might explain the cycle: livelier motion, and a jump to
+where the map's returns and what is heard agree.
 """
 
 import numpy as np
@@ -16,25 +17,27 @@ from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.cholesky import inverse
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
 
 CELL = 0.01
-"""Distance [m] within which two places are one: as far as a cycle's returns tell."""
+"""Distance [m] within which two positions are one: as far as a cycle's returns tell."""
 FEWEST = 3
-"""Pairs without which nothing is told of a jump."""
+"""Pairs of a predicted return and a component without which no jump is estimated."""
 CUT, END = 0.7, 0.1
-"""Shares of the tracks that end with a jump, and else."""
+"""Probabilities that a track ends in a cycle with a jump, and in any other."""
 PAIRS = 60
-"""Pairs of returns and components of which a jump is asked."""
+"""Most pairs of a predicted return and a component from which a jump is estimated."""
 ALIKE = 0.1
-"""Difference of cosines, and of log amplitudes in units of ten times that, within which a component may be a return."""
+"""Difference of cosines within which a component may be a return shifted by a jump; for log amplitudes, ten times
+that."""
 
 
 def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
-    """Log odds of being lost, a cycle on: one that the map explains better than strangers do by `score`.
+    """Log odds of being lost after one more cycle, which the map explains better than clutter by the log likelihood
+    ratio `score`.
 
     Of `followed` tracks `kept` ones go on. They need no pose: if many end at once, the agent may be elsewhere.
     """
@@ -47,7 +50,8 @@ def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
 
 
 def jump(view: CycleAssociation, observed: Observations) -> Floats:
-    """(3,) [m] by which an agent that hears this is elsewhere than thought: on which most returns agree; 0 for here."""
+    """Displacement (3,) [m] of the agent on which most pairs of predicted and measured path lengths agree; 0 where
+    there is none."""
     lead = view.groups.leader
     expected, heard = view.expected.seen[lead], observed.seen
     off = np.maximum(*(np.abs(heard[:, axis] - expected[:, axis, None]) for axis in (1, 2)))
@@ -60,17 +64,18 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
     found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
-    by = egomotion.agreed(found)
+    by = egomotion.agreed_velocity(found)
     return by if float(by @ by) > CELL**2 else np.zeros(3)
 
 
 def log_jump() -> float:
-    """Log probability of a jump to one certain place, as far as the agent walks in a second."""
+    """Prior log probability of a jump to one certain place (`CELL`), as far as the agent walks in a second."""
     return CONSTANTS.log_lost + 2.0 * float(np.log(CELL / CONSTANTS.walk))
 
 
 def shifted(window: Window, by: Floats) -> Window:
-    """The window with the last pose elsewhere, its velocity as it was: for a look, not for a solution."""
+    """Sliding window with its last position moved by `by` (3,) [m] and its velocity kept: for a trial association, not
+    for a solution."""
     accel, dt = window.accel.copy(), window.step[-2:]
     # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
@@ -79,8 +84,9 @@ def shifted(window: Window, by: Floats) -> Window:
     return window._replace(accel=accel)
 
 
-def landed(window: Window, by: Floats) -> Window:
-    """The window after a jump: its last pose alone, elsewhere within a second's walk; velocity and map as they were."""
+def after_jump(window: Window, by: Floats) -> Window:
+    """Sliding window after the agent's jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk;
+    velocity and map as they were."""
     while window.num_poses > 1:
         window = window_gaussian.slide(window)
     head, size = window.head.copy(), len(window.head)
@@ -94,8 +100,8 @@ def landed(window: Window, by: Floats) -> Window:
     return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
 
 
-def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
-    """What the first tracks say of the start, once there are enough of them."""
+def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
+    """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
     found = egomotion.rates(log, heading, step, baseline)
@@ -107,10 +113,11 @@ def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> eg
     return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 
-def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
-    """Log likelihood ratio of the last cycles' picture moving in any way against moving as the agent is thought to.
+def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
+    """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
+    from the rates at which path lengths changed.
 
-    `lively` [m/s^2] of that motion.
+    `lively` [m/s^2] is the standard deviation of its acceleration.
     """
     if len(window.step) < PAST:
         return 0.0
@@ -126,11 +133,12 @@ def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, live
 
 
 PAST = 10
-"""Cycles over which the picture's motion is looked at."""
+"""Cycles over which the estimated motion is checked against the rates of path lengths."""
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
-    """Before anything is born: with another level velocity at its start, within `std` [m/s] or what was told."""
+    """Sliding window with another horizontal velocity at its start, before any birth, within `std` [m/s] or the told
+    deviation, whichever is larger."""
     head, hessian = window.head.copy(), window.prior.hessian.copy()
     # the tracks will be asked again, as features: their word is not to count twice
     head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], np.minimum(hessian[[3, 4], [3, 4]], std**-2.0)
@@ -138,7 +146,8 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
 
 
 def with_free_compass(window: Window, std: float) -> Window:
-    """Before anything is born: with an offset of the compass within `std` [rad], which turns as little as may be."""
+    """Sliding window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the
+    least rate of turn."""
     hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
@@ -147,9 +156,10 @@ def with_free_compass(window: Window, std: float) -> Window:
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
+    """Sliding window with another head and Hessian of its prior, solved anew."""
     return window_gaussian.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
 
 
 def is_lost(log_odds: float) -> bool:
-    """Whether the map is given up."""
+    """Whether the log odds of being lost are such that the map is given up."""
     return log_odds > CONSTANTS.log_born

@@ -1,4 +1,5 @@
-"""Egomotion: does the picture move as the agent is told that it moves? Asked of the first tracks, before any birth.
+"""Egomotion: check of the told velocity and compass against the rates at which the path lengths of the first tracks
+change.
 
 Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
 agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What goes to and fro between opposite walls
@@ -18,41 +19,43 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
 MEASURED = 6
-"""Measurements of a track from which on it has a rate: as many as births ask for."""
+"""Measurements of a track from which on it has a rate of length: as many as births ask for."""
 FEWEST = 5
-"""Tracks with a rate from which on they are asked."""
+"""Tracks with a rate of length from which on the motion is checked."""
 
 
 class Rates(NamedTuple):
-    """T tracks."""
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival."""
 
     toward: Floats
     """(T, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
     rate: Floats
-    """(T,) [m/s] of the length."""
+    """(T,) [m/s] rate at which the path length changes."""
     variance: Floats
-    """(T,)."""
+    """(T,) [m^2/s^2] of the rate."""
     blur: Floats
     """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
 
 
 class StartCheck(NamedTuple):
-    """What the tracks say of the start."""
+    """Result of checking the told start against tracks: the odds that it is wrong, and the velocity and turn that they
+    agree on."""
 
     log_odds: float
-    """That it was told wrong."""
+    """Log odds that the start was told wrong."""
     is_compass: bool
     """Whether it is the compass that is wrong, rather than the speed."""
     velocity: Floats
-    """(3,) [m/s] that they agree on, as the compass shows it."""
+    """(3,) [m/s] velocity that the tracks agree on, in the axes that the compass shows."""
     std: float
-    """[m/s] of it, or, if the compass is wrong, of what was told."""
+    """[m/s] standard deviation of that velocity; where the compass is wrong, with the told one's included."""
     turn: float
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
 
 def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
-    """Of all that was heard often enough, understood or not, in the log's last K cycles of `step` [s].
+    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over the log's last K
+    cycles of `step` [s].
 
     `heading` (K,) [rad] of these; `baseline` [m] between Tx and Rx.
     """
@@ -91,7 +94,8 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
 
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
-    """The velocity `told` (3,) within `std` (3,), against any other, and against the same one turned by any angle."""
+    """Log evidence of the told velocity (3,) [m/s] within `std` (3,), from the rates of path lengths, against any other
+    velocity and against the told one turned by a wrong compass."""
     near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + CONSTANTS.walk**2)
     # the told velocity has a maximum of its own near it, which others, if louder, would draw to themselves
     starts = _starts(found, told)
@@ -115,26 +119,30 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     )  # fmt: skip
 
 
-def agreed(found: Rates) -> Floats:
-    """(3,) level velocity, or way, that most agree on; near to nothing if it may be."""
+def agreed_velocity(found: Rates) -> Floats:
+    """Horizontal velocity (3,), or displacement, on which most rates of path length agree; near zero if it may be."""
     every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), CONSTANTS.walk**2 * np.eye(2))
     return np.append(every.velocity[int(np.argmax(every.evidence))], 0.0)
 
 
 def _log_normal(off: Floats, spread: Floats) -> Floats:
-    """Log densities (S,) of offsets (S, 2) under a covariance (2, 2)."""
+    """Log densities (S,) of offsets (S, 2) under a centred Gaussian of covariance (2, 2)."""
     inside = np.vecdot(off, np.linalg.solve(spread, off.T).T)
     return -0.5 * inside - 0.5 * np.linalg.slogdet(spread)[1] - np.log(2.0 * np.pi)
 
 
 class _Modes(NamedTuple):
+    """Maxima of a velocity's posterior: S horizontal velocities (S, 2), covariances (S, 2, 2) and Laplace log evidences
+    (S,)."""
+
     velocity: Floats
     covariance: Floats
     evidence: Floats
 
 
 def _starts(found: Rates, told: Floats) -> Floats:
-    """(S, 2) velocities from which to look for agreement: those on which two tracks agree, and what is told."""
+    """Initial horizontal velocities (S, 2) of the search for agreement: the told one, and those on which two tracks
+    agree."""
     first, second = np.triu_indices(len(found.rate), 1)
     pair = np.stack([found.toward[first], found.toward[second]], axis=1)
     aim = np.stack([found.rate[first], found.rate[second]], axis=1) - pair[..., 2] * told[2]
@@ -150,11 +158,12 @@ def _starts(found: Rates, told: Floats) -> Floats:
 
 
 NEAR, MOST = 0.01, 8
-"""Difference [m/s] up to which velocities are one to look at, and how many are looked at closely."""
+"""Difference [m/s] up to which initial velocities are one, and how many of them are refined."""
 
 
 def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
-    """Log likelihoods (S, T) of tracks under level velocities (S, 2), and the weights (S, T) with which they agree."""
+    """Log likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and the weights (S, T)
+    with which they agree."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
@@ -165,8 +174,8 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
-    """From velocities (S, 2): the nearest that tracks agree on, under a prior about `told` (3,) of covariance `spread`
-    (2, 2), and Laplace's evidence there."""
+    """Nearest maxima of the velocity's posterior from initial velocities (S, 2), under a prior about `told` (3,) of
+    covariance `spread` (2, 2), with Laplace's evidence there."""
     flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * told[2]
     v, prior = start.copy(), np.linalg.inv(spread)
     for last in (False,) * 6 + (True,):

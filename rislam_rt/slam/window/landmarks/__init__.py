@@ -1,1 +1,2 @@
-"""What is known of landmarks besides their place, the returns predicted from them, and what a cycle teaches of them."""
+"""Landmarks: existence, strength, identity and occlusion of features, measurements predicted from them, and their
+update."""

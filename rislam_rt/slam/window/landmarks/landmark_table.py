@@ -1,4 +1,5 @@
-"""The landmark table, what is known besides the place: kind, existence, strength, and whether something hides it."""
+"""Landmark table: what the map knows of each feature besides its place: kind, existence, strength, reflectivity,
+occlusion."""
 
 from typing import Any, NamedTuple
 
@@ -11,53 +12,55 @@ from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
 
 
 class WindowTable(NamedTuple):
-    """F features."""
+    """Landmark table of F features: kind and existence, reflectivity of walls, strength, panel identity and occlusion
+    of points."""
 
     ident: Integers
     """(F,) number for life; rows are in its order."""
     is_wall: Booleans
-    """(F,)."""
+    """(F,) whether it is a wall, else a point."""
     anchor: Floats
     """(F, 3) [m] the point whose mirror image a wall's three numbers are; unused for points."""
     hits: Integers
     """(F,) cycles with a measurement of it."""
     log_odds: Floats
-    """(F,) of its existence."""
+    """(F,) log odds of its existence."""
     ratio: Floats
-    """(F,) log amplitude that a wall leaves of a path; 0 for points."""
+    """(F,) log amplitude reflection coefficient of a wall; 0 for points."""
     ratio_variance: Floats
-    """(F,)."""
+    """(F,) variance of that."""
     log_grid: Floats
-    """(F, G) log posterior of a point's strength (see `panel_evidence`)."""
+    """(F, G) log posterior of a point's strength, the root of its cross-section (see `panel_evidence`)."""
     log_ris: Floats
     """(F, Q) log odds of each of Q panels against scatterer; of no meaning for walls."""
     hidden: Floats
-    """(F, Q + 1) probability that something stands in its way, were it each of the panels, and a scatterer."""
+    """(F, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
     next_ident: int
+    """Number of the next feature."""
 
     @property
     def points(self) -> Integers:
-        """Rows of the points."""
+        """Rows of the features that are points."""
         return (~self.is_wall).nonzero()[0]
 
     @property
     def walls(self) -> Integers:
-        """Rows of the walls."""
+        """Rows of the features that are walls."""
         return self.is_wall.nonzero()[0]
 
     @property
     def ris_probability(self) -> Floats:
-        """(F, Q) of being each panel; 0 for walls."""
+        """Probability (F, Q) that each feature is each of the panels; 0 for walls."""
         return ris_probabilities(self.log_ris, self.points)
 
     @property
     def identity(self) -> PanelIdentity:
-        """(F,) what points are held to be."""
+        """Panel identities (F,) of the features; of no meaning for walls."""
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     @property
     def panels(self) -> tuple[int, ...]:
-        """(Q,) row of the point held for each panel, -1 without one."""
+        """Row (Q,) of the point that is held for each panel, -1 where there is none."""
         return panel_rows(self.ris_probability)
 
     @property
@@ -68,13 +71,13 @@ class WindowTable(NamedTuple):
         return found[0], found[1]
 
     def rows(self, idents: Integers) -> Integers:
-        """Rows of features by ident; negative ones (`TX`, `NONE`) stay as they are."""
+        """Rows of the landmark table for features of given idents; negative ones (`TX`, `NONE`) stay as they are."""
         place = np.searchsorted(self.ident, idents)
         return np.where(idents < 0, idents, place)
 
 
 def empty_table(panels: int = 1) -> WindowTable:
-    """Nothing known, in a room of so many panels."""
+    """Landmark table without features, for a room of so many panels."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
     return WindowTable(
         count, np.zeros(0, dtype=np.bool_), np.zeros((0, 3)), count, none, none, none,
@@ -85,7 +88,7 @@ def empty_table(panels: int = 1) -> WindowTable:
 def enter(
     landmarks: WindowTable, is_wall: bool, anchor: Floats, hits: int, log_odds: float, identity: PanelIdentity
 ) -> WindowTable:
-    """The table with one more feature, in the last row; `identity` (1,) of a point."""
+    """Landmark table with one more feature in the last row; `identity` (1,) is that of a point."""
     return landmarks._replace(
         ident=np.append(landmarks.ident, landmarks.next_ident),
         is_wall=np.append(landmarks.is_wall, is_wall),
@@ -100,19 +103,19 @@ def enter(
 
 
 def idents(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Forms (..., 5) of feature rows as forms of idents."""
+    """Forms (..., 5) of feature idents, from forms of feature rows."""
     if not len(landmarks.ident):
         return forms
     return np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms)
 
 
 def image_ident(point: Integers, wall: Integers) -> Integers:
-    """Numbers (...,) of the images of points in walls, from the numbers of both."""
+    """Idents (...,) of the mirror images of points in walls, from the idents of both."""
     return np.asarray(((point + 1) << 32) + wall)
 
 
 def remove_features(landmarks: WindowTable, keep: Booleans) -> WindowTable:
-    """The table without some of its features."""
+    """Landmark table with only the features marked in `keep` (F,)."""
     fields: dict[str, Any] = {
         name: getattr(landmarks, name)[keep] for name in landmarks._fields if name != "next_ident"
     }
@@ -120,7 +123,8 @@ def remove_features(landmarks: WindowTable, keep: Booleans) -> WindowTable:
 
 
 def learn_ratios(landmarks: WindowTable, walls: Integers, surplus: Floats) -> WindowTable:
-    """Walls' log amplitude ratios after returns over walls (N,), louder by `surplus` (N,) than these ratios foresaw."""
+    """Kalman update of the log reflection coefficients of walls (N,) by returns over each alone that were louder than
+    predicted by `surplus` (N,) in log amplitude."""
     ratio, variance, fading = landmarks.ratio.copy(), landmarks.ratio_variance.copy(), CONSTANTS.fading**2
     for wall, more in zip(walls.tolist(), surplus.tolist(), strict=True):
         gain = variance[wall] / (variance[wall] + fading)

@@ -1,4 +1,5 @@
-"""Update of landmarks by a cycle: strength, walls' losses, the panel, and what hides a path."""
+"""Landmark update by a cycle: existence, reflectivity of walls, strength and panel identity of points, occlusion of
+paths."""
 
 from typing import NamedTuple
 
@@ -8,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses
+from rislam_rt.slam.predicted_returns import TX, Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
@@ -16,45 +17,49 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 
 class VisibilityObservations(NamedTuple):
-    """V forms that were looked for, and whether something stands in the way of each."""
+    """Occlusion and scatter of the V paths that were looked for so far."""
 
     code: Integers
-    """(V,) forms by ident, packed, sorted."""
+    """(V,) form of each path by idents, packed into one number, sorted."""
     clear: Floats
-    """(V,) probability that nothing does."""
+    """(V,) probability that nothing occludes it."""
     scatter: Floats
-    """(V,) running mean square of its residuals in reported deviations: what the map lacks in its cell."""
+    """(V,) running mean square of its residuals in reported deviations: what paths that the map lacks do in its
+    cell."""
 
 
 def no_observations() -> VisibilityObservations:
-    """Nothing looked for yet."""
+    """Empty record of paths' occlusion and scatter."""
     return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
-    """Forms (R, 5) of rows as one number each, by ident."""
+    """One integer (R,) that encodes each of the forms (R, 5) of feature rows, by idents."""
     return np.asarray((idents(landmarks, forms) + 1) @ DIGITS)
 
 
 DIGITS = 4096 ** np.arange(4, -1, -1)
+"""Place values of the five idents of a form in its packed number."""
 
 
 def recall(
     visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable
 ) -> tuple[Floats, Floats]:
-    """Probability (R,) that nothing stands in the way of each return now, and its scatter (R,)."""
+    """Probability (R,) that nothing occludes each predicted return in this cycle, and the mean square (R,) of its past
+    residuals in reported deviations."""
     return recall_forms(visibility, expected.forms, expected.bounces, landmarks)
 
 
 def recall_forms(
     visibility: VisibilityObservations, forms: Integers, bounces: Integers, landmarks: WindowTable
 ) -> tuple[Floats, Floats]:
-    """The same of forms (R, 5) over so many walls (R,)."""
+    """Probability (R,) that nothing occludes each path of forms (R, 5) over so many walls (R,) in this cycle, and the
+    mean square (R,) of its past residuals in reported deviations."""
     first, scatter = CONSTANTS.steady ** (1.0 + bounces), np.full(len(forms), CONSTANTS.crowd)
     if len(visibility.code):
         code = pack(forms, landmarks)
@@ -65,33 +70,36 @@ def recall_forms(
     return np.asarray(first * (1.0 - CONSTANTS.rare) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
-def seed(
+def add_clear_paths(
     visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
 ) -> VisibilityObservations:
-    """A form that a new feature was found by: nothing hides it, and it scatters so much."""
+    """Record of paths' occlusion and scatter with the forms (N, 5) by which a new feature was found: not occluded, and
+    of mean squared residual `scatter`."""
     count = len(forms)
     return _joined(visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter)))
 
 
 def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
+    """Two records of paths' occlusion and scatter as one, sorted by code."""
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
     return VisibilityObservations._make(field[order] for field in every)
 
 
 def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
-    """(C,) probability that each cluster shows."""
+    """Probability (C,) that each cluster of unresolved returns is detected, occlusion included."""
     return np.asarray(CONSTANTS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
         1e-4, CONSTANTS.shown
     )
 
 
-def learn(
+def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
     groups: UnresolvedClusters, clear: Floats, scatter: Floats, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
-    """After clusters `row` (A,) were seen as components `pick` (A,) with residuals of mean square `raw` (A,).
+    """Update of occlusion, existence, strengths and panel identities after clusters `row` (A,) were detected as
+    components `pick` (A,) with residuals of mean square `raw` (A,), and the other clusters missed.
 
     `clear` (R,) and `scatter` (R,) are what was recalled of the returns.
     """
@@ -124,7 +132,8 @@ def _existence(
     missed: Booleans,
     shows: Floats,
 ) -> WindowTable:
-    """Every feature by the returns that only it explains: those over the fewest other features."""
+    """Update of features' existence odds: any detection of a resolved return speaks for its features, a missed one only
+    against the feature of a path over that feature alone."""
     odds, hits = landmarks.log_odds.copy(), landmarks.hits.copy()
     forms, bounces = expected.forms[groups.leader], expected.bounces[groups.leader]
     direct = bounces == (forms[:, 0] == TX)
@@ -142,7 +151,8 @@ def _strengths(
     pick: Integers,
     observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> WindowTable:  # fmt: skip
-    """Walls' losses, and who the points are, from components that came out alone."""
+    """Update of walls' reflection coefficients and of points' strengths and panel identities, from components that are
+    resolved from all others."""
     lead, alone = groups.leader[row], groups.partner[row] < 0
     quiet = (groups.disturbance[row] < 0.25 * scene.sensor.cell_length**2).all(axis=1)
     sure = (expected.forms[lead, 0] == TX) | (expected.log_amplitude_std[lead] < 0.5)
@@ -157,7 +167,8 @@ def _identities(
     pick: Integers,
     observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> WindowTable:  # fmt: skip
-    """What amplitude or silence of points that come straight, and alone, tells of who they are."""
+    """Update of points' strengths and panel identities by amplitudes and missed detections of their resolved paths over
+    no wall."""
     component = np.full(len(groups.leader), -1)
     component[row] = pick
     lead = groups.leader
@@ -174,5 +185,5 @@ def _identities(
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).converged()
+    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).clipped()
     return landmarks._replace(**landmarks.identity.put(points, fresh)._asdict())

@@ -1,4 +1,5 @@
-"""Prediction of measurements: which returns of the believed map should show now, where, how strong, which as one."""
+"""Measurement prediction: which returns of the believed map should be detected now, where, how strong, and which
+unresolved."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -13,49 +14,57 @@ from rislam_rt.model.sensor import detection_probability as detection_probabilit
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import EDGE, FAINT
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))
-"""Spread of the panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on millimetres."""
+"""Standard deviation of a panel's predicted log amplitude: that of a Rayleigh variable, as phases hang on
+millimetres."""
 
 
 class KnownEnvironment(NamedTuple):
-    """What the filter knows of the world beside its features."""
+    """What the filter is told beside its map: body, radio, sensor model, panels, and which paths to look for."""
 
     body: Body
+    """Offsets of Tx and Rx from the agent's position."""
     radio: RadioConfig
+    """Carrier, bandwidth, powers and noise."""
     sensor: SensorModel
+    """Resolution, window and detection threshold of the receiver."""
     ris: DataSheet | None
+    """Data sheet of the panels, None without any."""
     max_bounces: int
+    """Most walls on a predicted path."""
     use_vt: bool
+    """Whether wall returns, paths over walls alone, update the belief."""
 
     @property
     def num_panels(self) -> int:
-        """Q: panels that points may be; one, that none is, where there is no panel."""
+        """Number Q of panels that points may be; 1 where there is no panel, and no point is it."""
         return 1 if self.ris is None else len(self.ris.panels)
 
 
 class ExpectedComponents(NamedTuple):
-    """R returns worth looking for, at the mean belief."""
+    """Predicted returns at the mean belief, R of them: form, measurement, jacobian, amplitude and detection
+    probability."""
 
     forms: Integers
-    """(R, 5) feature rows."""
+    """(R, 5) forms of feature rows (see `path_forms`)."""
     seen: Floats
-    """(R, 3) length [m] as it is heard and two cosines."""
+    """(R, 3) length [m] as it is heard (less whole periods of the sounding) and two cosines."""
     jacobian: Floats
-    """(R, 3, 7 + 3F) by the present: position, velocity, compass offset, features."""
+    """(R, 3, 7 + 3F) derivatives by the present: position, velocity, compass offset, features."""
     log_amplitude: Floats
-    """(R,)."""
+    """(R,) predicted log amplitude."""
     log_amplitude_std: Floats
-    """(R,)."""
+    """(R,) its standard deviation."""
     bounces: Integers
-    """(R,)."""
+    """(R,) number of walls on the path."""
     detection: Floats
-    """(R,) probability that it shows, were nothing in its way and it alone."""
+    """(R,) detection probability, were nothing in its way and it alone."""
 
 
 def predict_returns(
@@ -67,7 +76,8 @@ def predict_returns(
     code: RisCode | None,
     covariance: Floats,
 ) -> ExpectedComponents:
-    """All forms that are possible, arrive from above, and may be detected; `covariance` (3F, 3F) of the features."""
+    """Predict all returns over the map that are geometrically possible, arrive from above and may be detected;
+    `covariance` (3F, 3F) is that of the features."""
     points, walls = tuple(landmarks.points.tolist()), tuple(landmarks.walls.tolist())
     returns, bounces = enumerate_forms(points, walls, scene.max_bounces)
     fine = possible_legs(returns.legs, features, covariance, landmarks.anchor, poses)
@@ -95,7 +105,8 @@ def amplitudes(
     scene: KnownEnvironment,
     code: RisCode | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """Log amplitude (R,) and its standard deviation (R,)."""
+    """Predicted log amplitudes (R,) of returns and their standard deviations (R,): free space, walls' reflectivity,
+    points' strengths, and panels under the phase code."""
     radio, legs = scene.radio, returns.legs
     if not len(returns.tx):
         return np.zeros(0), np.zeros(0)
@@ -130,7 +141,8 @@ def panel_gains(
     spec: RisSpec,
     code: RisCode,
 ) -> Floats:
-    """|gain| (R,) of a panel's returns with perfect walls."""
+    """Magnitudes (R,) of the path gains of returns over one panel under its phase code, with walls that reflect without
+    loss."""
     legs, center = returns.legs, features[returns.legs[:, 0]]
     ends = []
     for device, gain in ((poses.tx, radio.tx_gain), (poses.rx, radio.rx_gain)):
@@ -144,7 +156,8 @@ def panel_gains(
 
 
 def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorModel) -> Floats:
-    """(R,) averaged over a log amplitude of that spread: three points carry its mean and variance."""
+    """Detection probability (R,) averaged over a log amplitude of standard deviation `spread`: three points carry its
+    mean and variance."""
     level = log_amplitude[..., None] + spread[..., None] * np.sqrt(3.0) * np.array([-1.0, 0.0, 1.0])
     snr = sensor.radio.integrated_snr(np.exp(np.minimum(level, 10.0)))
     curve = _detection_curve(sensor.threshold)
@@ -155,42 +168,44 @@ def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorM
 
 
 ROOT_STEP = 2e-3
-"""Step of the root of the SNR in a table of the probability of detection."""
+"""Step of the square root of the SNR in the table of detection probabilities."""
 
 
 @lru_cache(maxsize=4)
 def _detection_curve(threshold: float) -> Floats:
-    """Probability of detection at roots of the SNR from 0 on, close enough for 1e-6 in between."""
+    """Table of the detection probability at square roots of the SNR from 0 on, close enough for 1e-6 in between."""
     return detection_probability_of(np.arange(0.0, np.sqrt(threshold) + 7.0, ROOT_STEP) ** 2, threshold)
 
 
 class UnresolvedClusters(NamedTuple):
-    """C components that R expected returns come out as: the strongest of each cell leads."""
+    """Clusters of R predicted returns that come out as C components; the strongest return of each resolution cell
+    leads."""
 
     leader: Integers
-    """(C,) rows of the returns."""
+    """(C,) row of the leading return."""
     partner: Integers
-    """(C,) the strongest other in the cell, -1 for none."""
+    """(C,) row of the strongest other return in the cell, -1 for none."""
     share: Floats
-    """(C,) of the partner in the place of the whole, before the amplitude is known: mean..."""
+    """(C,) weight of the partner in the place of the merged component, before its amplitude is known: mean..."""
     share_variance: Floats
     """(C,) ...and variance."""
     disturbance: Floats
-    """(C, 3) variance by what else is in the cell, or may be."""
+    """(C, 3) variance of length and cosines by other returns in the cell or at its edge."""
     log_amplitude: Floats
-    """(C,) of the whole."""
+    """(C,) log amplitude of the merged component."""
     log_amplitude_std: Floats
-    """(C,)."""
+    """(C,) its standard deviation."""
     by_itself: Floats
-    """(C,) probability that it comes out by itself: 1 for leaders, less for what a leader should take in."""
+    """(C,) probability that it comes out by itself: 1 for leaders, less for a return that a leader should absorb."""
     gap: Floats
-    """(C, 3) from the leader to its partner, in what is seen of them; 0 without one."""
+    """(C, 3) difference of length and cosines from the leader to its partner; 0 without one."""
 
 
 def cluster(
     expected: ExpectedComponents, cell: Floats, clear: Floats, sides: Integers | None = None
 ) -> UnresolvedClusters:
-    """From the strongest down, each return takes in all that is in its cell; neighbours on the cell's edge disturb."""
+    """Cluster predicted returns that the receiver cannot resolve: from the strongest down, each absorbs the weaker ones
+    in its cell, and those at the cell's edge add variance."""
     strength, power = expected.log_amplitude, np.exp(2.0 * expected.log_amplitude)
     first, second, gap = _neighbours(expected.seen / cell, strength, sides)
     inside = gap < 1.0
@@ -231,10 +246,8 @@ def cluster(
 
 
 def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tuple[Integers, Integers, Floats]:
-    """Pairs (P,) of returns at places (R, 3) [cells], each with a weaker one on its cell or its edge, and their gaps.
-
-    Row by row.
-    """
+    """Pairs (P,) of returns at places (R, 3) [cells], the second weaker and in the cell of the first or at its edge,
+    sorted by row, and the largest gap (P,) of each pair along an axis."""
     # along the first axis a return's neighbours behind it are the next ones, up to the first beyond its edge
     order = np.argsort(place[:, 0], kind="stable")
     axes = place[order].T
@@ -260,9 +273,9 @@ def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tupl
 def _taken_in(
     first: Integers, second: Integers, strength: Floats, power: Floats, clear: Floats
 ) -> tuple[Booleans, Integers, Floats, Floats]:
-    """Which of R returns are taken in, the strongest that each took in, the probability that each comes out by itself,
-    and its power with what it took in; `second` lies in the cell of `first` and is weaker.
-    """
+    """Absorption of weaker returns `second` by stronger ones `first` of the same cell: which of R returns are absorbed,
+    the strongest that each absorbed, the probability that each comes out by itself, and its power with what it
+    absorbed."""
     count, level, weaker = len(strength), strength.tolist(), second.tolist()
     owner, partner = [-1] * count, np.full(count, -1)
     crowded = np.flatnonzero(np.bincount(first, minlength=count))
@@ -285,11 +298,12 @@ TWIN_STD = 0.03
 
 
 def reciprocal(forms: Integers) -> Integers:
-    """Forms (R, 5) with their legs exchanged."""
+    """Forms (R, 5) of the reciprocal paths, with Tx and Rx legs exchanged."""
     return forms[:, [0, 3, 4, 1, 2]]
 
 
 def _above(z: Floats) -> Floats:
+    """Probability that a standard normal variable is below z, by a logistic approximation."""
     return np.asarray(1.0 / (1.0 + np.exp(-1.7 * np.clip(z, -20.0, 20.0))))
 
 
@@ -300,7 +314,7 @@ def conditioned_share(
     log_amplitude: Floats,
     log_amplitude_std: Floats,
 ) -> tuple[Floats, Floats]:
-    """Mean and variance (A,) of the partner's share in clusters `row` (A,), given the amplitudes measured.
+    """Mean and variance (A,) of the unresolved partner's share in clusters `row` (A,), given the measured amplitudes.
 
     Two paths of amplitudes a, b with the sum A come out at the share `(A^2 + b^2 - a^2) / (2 A^2)` from the first to
     the second: exact to first order in the gap, whatever the phase.

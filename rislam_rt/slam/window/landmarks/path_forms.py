@@ -1,8 +1,9 @@
-"""Forms: the ways by which a signal gets from Tx to Rx over the features of the map.
+"""Forms: the ways by which a path gets from Tx to Rx over features of the map, a point and up to two walls on either
+leg.
 
 A form is five feature rows: the base (a point, or `TX` where the Tx itself is mirrored), two walls on the Tx leg and
 two on the Rx leg, the one next to the base first, `NONE` where there is none. What a form looks like from a pose, and
-how that moves with pose and features, is `slam.returns`.
+how that moves with pose and features, is `slam.predicted_returns`.
 """
 
 from functools import lru_cache
@@ -12,21 +13,21 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns
 from rislam_rt.slam.window.solver_limits import STEP
 
 UNKNOWN = -9
-"""In a form's base: it is not known."""
+"""Base of a form that is not known."""
 
 
 def forms_apart(forms: Integers) -> Returns:
-    """Forms (R, 5) as returns of which each has legs of its own."""
+    """Returns of the forms (R, 5), with legs stored for each return separately, shared or not."""
     count = np.arange(len(forms))
     return Returns(np.concatenate([forms[:, :3], forms[:, [0, 3, 4]]]), count, len(forms) + count)
 
 
 def compile_forms(forms: Integers) -> Returns:
-    """Forms (R, 5) as returns over the legs that they need."""
+    """Returns of the forms (R, 5), with each distinct leg stored once."""
     legs, tx, rx = forms_apart(forms)
     base = int(legs.max(initial=0)) + 3
     code = ((legs[:, 0] + 1) * base + legs[:, 1] + 1) * base + legs[:, 2] + 1
@@ -35,14 +36,14 @@ def compile_forms(forms: Integers) -> Returns:
 
 
 def forms_of(returns: Returns) -> Integers:
-    """(R, 5)."""
+    """Forms (R, 5), base and walls on either leg, of some returns."""
     return np.concatenate([returns.legs[returns.tx], returns.legs[returns.rx][:, 1:]], axis=1)
 
 
 @lru_cache(maxsize=64)
 def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int) -> tuple[Returns, Integers]:
-    """Every point over every pair of legs, and the images of the Tx, over legs that many of them share; and the walls
-    (R,) on both legs of each together."""
+    """All returns over points and walls of the map with up to `max_bounces` walls, over legs that they share, and the
+    number of walls (R,) on each."""
     single = [(w, NONE) for w in walls] if max_bounces >= 1 else []
     double = [(a, b) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
     ways = [(NONE, NONE), *single, *double]
@@ -60,7 +61,8 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
 
 
 def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: Floats, poses: Poses) -> Booleans:
-    """(G,) whether each bounce of a leg (G, 3) has both its neighbours on one side of its wall; poses of one cycle.
+    """Whether each leg (G, 3) of a path is geometrically possible: every bounce has both its neighbours on one side of
+    its wall, at the poses of one cycle.
 
     Two walls at right angles throw a path back in one order or the other: the ray meets both near their edge, and which
     comes first hangs on the baseline between Tx and Rx, and on angles of which the features (F, 3) know no more than
@@ -91,9 +93,12 @@ def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: 
 
 
 def margins(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """By how much (N,) the ray that leaves `device` (3,) or (N, 3) for the wall `walls[:, 1]` and `walls[:, 0]`
-    (N, 2, 3), to `base` (N, 3), meets the one before the other; the depths (N,) of the base before `walls[:, 0]`, and
-    of its image and of the device before `walls[:, 1]`: on one side, if the path can be."""
+    """Margins (N,) [m] by which the bounce on the wall `walls[:, 1]` lies on the base's side of the wall `walls[:, 0]`,
+    for the ray from `device` (3,) or (N, 3) over both walls (N, 2, 3) to `base` (N, 3).
+
+    Also depths (N,): of the base before `walls[:, 0]`, and of its image and of the device before `walls[:, 1]`, which
+    are on one side if the path can be.
+    """
     normal, offset = planes(walls, anchor)
     near = np.vecdot(base, normal[:, 0]) - offset[:, 0]
     image = base - 2.0 * near[:, None] * normal[:, 0]
@@ -105,8 +110,8 @@ def margins(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tupl
 
 
 def crossing(start: Floats, stop: Floats, own: Floats, far: Floats) -> Floats:
-    """(N, 3) where the ways between places (N, 3) meet a wall before which these are so deep (N,); one of the two if
-    nowhere."""
+    """Points (N, 3) where the segments between places (N, 3) cross a wall, before which their ends lie at signed depths
+    (N,); one of the ends where they do not cross it."""
     share = np.clip(own / np.where(np.abs(own - far) > 1e-9, own - far, 1e-9), 0.0, 1.0)
     return np.asarray(start + share[:, None] * (stop - start))
 
@@ -114,7 +119,7 @@ def crossing(start: Floats, stop: Floats, own: Floats, far: Floats) -> Floats:
 def _margin_std(
     base: Floats, device: Floats, anchor: Floats, features: Floats, walls: Integers, covariance: Floats
 ) -> Floats:
-    """Standard deviations (N,) [m] of the margins over walls (N, 2), by what these are uncertain by."""
+    """Standard deviations (N,) [m] of the margins of legs over two walls (N, 2), from the covariance of these walls."""
     moves = STEP * np.concatenate([np.zeros((1, 6)), np.eye(6)]).reshape(7, 1, 2, 3)
     places = (features[walls] + moves).reshape(-1, 2, 3)
     every = margins(np.tile(base, (7, 1)), device, np.tile(anchor[walls], (7, 1, 1)), places)[0].reshape(7, -1)
@@ -125,7 +130,7 @@ def _margin_std(
 
 
 def _swapped(legs: Integers, two: Integers) -> Integers:
-    """Rows of the legs over the same two walls as legs `two` in the other order."""
+    """Rows of the legs that run over the same two walls as the legs `two`, in the other order."""
     base = int(legs.max(initial=0)) + 3
     code, other = (
         ((row[:, 0] + 1) * base + row[:, 1] + 1) * base + row[:, 2] + 1 for row in (legs, legs[two][:, [0, 2, 1]])
@@ -134,7 +139,8 @@ def _swapped(legs: Integers, two: Integers) -> Integers:
 
 
 def planes(wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
-    """Unit normals (..., 3) of walls (..., 3), images of anchors alike, and their offsets (...,): `n . x = offset`."""
+    """Unit normals (..., 3) and offsets (...,) of walls' planes, `n . x = offset`, from the mirror images (..., 3) of
+    anchors in them."""
     span = wall - anchor
     normal = np.asarray(span / np.sqrt(np.vecdot(span, span))[..., None])
     return normal, 0.5 * np.vecdot(wall + anchor, normal)

@@ -1,4 +1,5 @@
-"""Identification of the RIS, which point is which panel: Bayes from amplitudes under the codes, and from silence.
+"""RIS identification, which point is which panel: Bayesian update by amplitudes and missed detections under the phase
+codes.
 
 "Is the panel" predicts the amplitude with no free parameter; "is a scatterer" has one unknown cross-section for all
 cycles, integrated out. Silence under a code that would have made it loud speaks against the panel; what is blocked is
@@ -31,44 +32,44 @@ from rislam_rt.slam.window.solver_limits import CERTAIN, DRAWS
 
 
 class PanelIdentity(NamedTuple):
-    """What N points are held to be."""
+    """Belief about what N points are, a scatterer or each of Q panels: log odds, strength as a scatterer, occlusion."""
 
     log_grid: Floats
-    """(N, G) log posterior of their strength, were they scatterers (see `panel_evidence`)."""
+    """(N, G) log posterior of their strength (root of a cross-section), were they scatterers (see `panel_evidence`)."""
     log_ris: Floats
     """(N, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
-    """(N, Q + 1) probability that something stands in the way, were it each of the panels, and a scatterer."""
+    """(N, Q + 1) probability of being occluded, were it each of the panels, and a scatterer."""
 
     def take(self, rows: Integers | Booleans) -> "PanelIdentity":
-        """Only some of the points."""
+        """Panel identities of only some of the points."""
         return PanelIdentity(*(field[rows] for field in self))
 
     def put(self, rows: Integers, fresh: "PanelIdentity") -> "PanelIdentity":
-        """With some of the points replaced."""
+        """Panel identities with those of some points replaced."""
         fields = [field.copy() for field in self]
         for field, value in zip(fields, fresh, strict=True):
             field[rows] = value
         return PanelIdentity(*fields)
 
-    def converged(self) -> "PanelIdentity":
-        """With odds that new evidence can still turn."""
+    def clipped(self) -> "PanelIdentity":
+        """Panel identities with log odds clipped (`CERTAIN`), so that new evidence can still turn them."""
         return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
 
     def join(self, other: "PanelIdentity") -> "PanelIdentity":
-        """Both, one after the other."""
+        """Two sets of panel identities, one after the other."""
         return PanelIdentity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
 @lru_cache(maxsize=1)
 def _strength_prior(middle: float, spread: float) -> Floats:
-    """(G,) log probability of a point's strength beforehand."""
+    """Prior log probabilities (G,) of a scatterer's strength on its grid, log-normal about `middle`."""
     log = -0.5 * ((STRENGTHS - np.log(middle)) / spread) ** 2
     return np.asarray(log - np.logaddexp.reduce(log))
 
 
 def unknown(count: int, panels: int = 1) -> PanelIdentity:
-    """Points of which nothing is known but that panels are fewer than scatterers."""
+    """Prior panel identities of so many points: nothing is known but that panels are fewer than scatterers."""
     return PanelIdentity(
         np.tile(_strength_prior(CONSTANTS.strength, CONSTANTS.strength_std), (count, 1)),
         np.full((count, panels), np.log(CONSTANTS.panels)),
@@ -77,31 +78,32 @@ def unknown(count: int, panels: int = 1) -> PanelIdentity:
 
 
 class PanelObservation(NamedTuple):
-    """One cycle's look at N points."""
+    """Amplitudes or missed detections of N points in one cycle, with the geometry that predicts them."""
 
     place: Floats
-    """(N, S, 3) [m] equally likely places of each."""
+    """(N, S, 3) [m] equally likely samples of each point's place."""
     tx: Floats
     """(N, 3) [m] the Tx, or its image in the walls on the leg."""
     rx: Floats
-    """(N, 3) likewise."""
+    """(N, 3) [m] the Rx, or its image in the walls on the leg."""
     ratio: Floats
-    """(N,) amplitude that the walls on both legs leave."""
+    """(N,) share of the amplitude that the walls on both legs leave."""
     amplitude: Floats
-    """(N,) measured; what it is without a measurement does not matter."""
+    """(N,) measured amplitude; without a measurement any number."""
     side: Integers
-    """(N,) of the measurement (see `slam.observations`)."""
+    """(N,) panel that the component ran over, `OTHER` or `UNTOLD` (see `slam.observations`)."""
     seen: Booleans
     """(N,) whether there is a measurement."""
 
 
 def spread_places(mean: Floats, covariance: Floats) -> Floats:
-    """(N, S, 3) equally likely places of means (N, 3) and covariances (N, 3, 3)."""
+    """Equally likely samples (N, S, 3) of Gaussian places of means (N, 3) and covariances (N, 3, 3)."""
     return np.asarray(mean[:, None] + even_draws(DRAWS, mean.shape[1]) @ np.swapaxes(square_roots(covariance), 1, 2))
 
 
 def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
-    """Gains (Q, N, S) of each panel, were it at each of the places; None without a panel.
+    """Path gains (Q, N, S) of each panel under the phase code, were it at each of the sampled places; None without a
+    panel or a code.
 
     The code is the same for all places, or one for each of them, (N, 1, ...).
     """
@@ -113,9 +115,8 @@ def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, 
 
 
 def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None, sensor: SensorModel) -> PanelIdentity:
-    """The identities (N,) after one more cycle, or after several: `sight` then holds N rows a cycle, one after the
-    other. The panels have one of the gains (Q, K N, S).
-    """
+    """Update of the panel identities of N points by one cycle, or by several: `sight` then holds N rows a cycle, one
+    after the other, and `gain` (Q, K N, S) the panels' path gains."""
     if not len(sight.place):
         return before
     heard = sight.seen.reshape(-1, len(before.log_ris))
@@ -141,7 +142,8 @@ def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None
 def _log_likelihoods(
     sight: PanelObservation, gain: Complexes | None, panels: int, sensor: SensorModel
 ) -> tuple[Floats, Floats]:
-    """Of each of L looks, heard or silent: under every strength of a scatterer (L, G), and under every panel (L, Q)."""
+    """Log likelihoods of L amplitudes or missed detections, under every strength of a scatterer (L, G) and under every
+    panel (L, Q)."""
     radio, count = sensor.radio, len(sight.place)
     noise = amplitude_std(radio)
     threshold = float(np.sqrt(2.0 * sensor.threshold) * noise)

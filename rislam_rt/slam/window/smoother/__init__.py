@@ -1,1 +1,1 @@
-"""Fixed-lag smoothing: the Gaussian of the last poses and the map, its motion, and its linear algebra."""
+"""Fixed-lag smoother: the Gaussian of the last K poses and the map, its motion model, and its linear algebra."""

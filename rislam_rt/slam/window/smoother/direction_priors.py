@@ -1,4 +1,5 @@
-"""Direction priors: walls are believed to be upright, level, or at right angles to another, or are not."""
+"""Direction priors, mixtures by which a wall is upright, level or at right angles to another wall, or stands in any
+direction."""
 
 from typing import NamedTuple
 
@@ -8,31 +9,33 @@ from rislam_rt.arrays import Floats, Integers
 
 
 class DirectionPriors(NamedTuple):
-    """N beliefs about single directions of features: a wall is upright, level, at right angles to another, or not."""
+    """Priors on N single directions of wall features, each a mixture: the wall is upright, level or at right angles to
+    another, or stands anyhow."""
 
     feature: Integers
-    """(N,)."""
+    """(N,) index of the feature."""
     axis: Floats
-    """(N, 3) unit vectors."""
+    """(N, 3) unit vectors along which the prior tells where the feature lies."""
     aim: Floats
-    """(N,) [m] where the feature lies along the axis, if the belief is right..."""
+    """(N,) [m] place of the feature along the axis, if the prior holds..."""
     std: Floats
-    """(N,) [m] ...within so much."""
+    """(N,) [m] ...and the standard deviation of that."""
     log_odds: Floats
-    """(N,) beforehand: of "right" against a place anywhere along the axis, times its width [m]."""
+    """(N,) prior log odds that it holds, against a place anywhere along the axis, times the width [m] of that
+    alternative."""
     probability: Floats
-    """(N,) that it is right, at the last look: the weight with which it counts."""
+    """(N,) posterior probability that it holds, at the last evaluation: the weight with which it counts."""
 
     def pulls(self, places: Floats) -> tuple[Floats, Floats]:
-        """Gradients (N, 3) and information (N, 3, 3) of what is held of features at `places` (N, 3)."""
+        """Gradients (N, 3) and information (N, 3, 3) that the priors add to the cost of features at `places` (N, 3)."""
         weight = self.probability / self.std**2
         off = np.vecdot(self.axis, places) - self.aim
         along = weight[:, None] * self.axis
         return off[:, None] * along, along[:, :, None] * self.axis[:, None, :]
 
     def weighed(self, places: Floats, covariance: Floats) -> "DirectionPriors":
-        """Each by what all else tells of it (its cavity), the features being at `places` (N, 3) within `covariance`
-        (N, 3, 3): is it right?"""
+        """Priors with the posterior probability that each holds, from what all else tells of the features (the cavity),
+        which are at `places` (N, 3) within `covariance` (N, 3, 3)."""
         variance = np.vecdot(self.axis, (covariance @ self.axis[..., None])[..., 0])
         middle, own = np.vecdot(self.axis, places), self.probability / self.std**2
         left = np.maximum(1.0 / variance - own, 1e-3)
@@ -44,6 +47,6 @@ class DirectionPriors(NamedTuple):
 
 
 def no_holds() -> DirectionPriors:
-    """Nothing believed beforehand."""
+    """Empty set of direction priors."""
     none = np.zeros(0)
     return DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), none, none, none, none)

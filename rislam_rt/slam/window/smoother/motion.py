@@ -1,4 +1,5 @@
-"""Motion that is learnt: how lively each step was, by a Markov chain over a ladder of accelerations.
+"""Motion modes: a hidden Markov chain over levels of acceleration, by which the filter learns how strongly each step
+manoeuvres.
 
 Each step's acceleration has a standard deviation from a `ladder`; the level stays with a probability and else jumps
 anywhere. What the measurements tell of a step's acceleration without its own prior (the cavity of expectation
@@ -16,22 +17,25 @@ from rislam_rt.slam.window.solver_limits import MODES
 
 
 def ladder() -> Floats:
-    """(L,) standard deviations [m/s^2] of the modes."""
+    """Standard deviations (L,) [m/s^2] of acceleration of the motion modes, in equal ratios."""
     return _ladder(CONSTANTS.level, CONSTANTS.liveliest)
 
 
 @lru_cache(maxsize=4)
 def _ladder(calmest: float, liveliest: float) -> Floats:
+    """`ladder` between given ends [m/s^2], cached."""
     return np.geomspace(calmest, liveliest, MODES)
 
 
 def is_level_only() -> Booleans:
-    """(L,) modes that are for the height alone: a floor is level, but nothing that moves keeps its speed so well."""
+    """Which motion modes (L,) are for the height alone: a floor is level, but nothing that moves keeps its speed so
+    well."""
     return ladder() < CONSTANTS.calmest
 
 
 def first_motion_mode(sigma_a: float) -> Floats:
-    """The level nearest to the acceleration told is the likeliest, one three times as far off a third as likely."""
+    """Initial probabilities (L,) of the motion modes: highest for the one nearest to the told acceleration `sigma_a`
+    [m/s^2], a third as high for each mode farther off."""
     nearest = int(np.argmin(np.abs(np.log(ladder() / max(sigma_a, CONSTANTS.level)))))
     weight = 3.0 ** -np.abs(np.arange(MODES) - nearest).astype(np.float64)
     return np.asarray(weight / weight.sum())
@@ -39,7 +43,8 @@ def first_motion_mode(sigma_a: float) -> Floats:
 
 @lru_cache(maxsize=4)
 def transition(stay: float) -> Floats:
-    """(L, L): a step is as lively as the one before, or else more often a little different than much."""
+    """Transition probabilities (L, L) between motion modes: one stays with probability `stay`, and else changes, more
+    often by a little than by much."""
     count = MODES
     gap = np.abs(np.arange(count)[:, None] - np.arange(count))
     jump = np.where(gap > 0, 3.0**-gap, 0.0)
@@ -47,7 +52,8 @@ def transition(stay: float) -> Floats:
 
 
 def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
-    """Log likelihood (K, L) of each level from posterior means (K, A), covariances (K, A, A) and prior precisions."""
+    """Log likelihoods (K, L) of the motion modes in K steps, from posterior means (K, A) and covariances (K, A, A) of
+    the accelerations and the prior precisions (K,) within these."""
     spread, vector = principal_axes(spread)
     along = (np.swapaxes(vector, 1, 2) @ accel[..., None])[..., 0] / spread
     # N(m; 0, C + s^2 I) through the cavity's information C^-1, which may be singular
@@ -59,7 +65,8 @@ def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
 
 
 def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
-    """Variances (K, A) along the principal axes (K, A, A), columns, of covariances (K, A, A) of one or two numbers."""
+    """Variances (K, A) along the principal axes, and these axes (K, A, A) as columns, of covariances (K, A, A) of one
+    or two numbers."""
     if spread.shape[-1] == 1:
         return spread[..., 0], np.ones(spread.shape)
     one, two, both = spread[..., 0, 0], spread[..., 1, 1], spread[..., 0, 1]
@@ -71,13 +78,15 @@ def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
 
 
 def forward(before: Floats, log_like: Floats, stay: float) -> Floats:
-    """Probabilities (N, L) of the levels of N chains after one more step with log likelihoods (N, L)."""
+    """Filtered probabilities (N, L) of the motion modes of N chains after one more step with log likelihoods (N, L),
+    from those before it."""
     message = (before @ transition(stay)) * np.exp(log_like - log_like.max(axis=1, keepdims=True))
     return np.asarray(message / message.sum(axis=1, keepdims=True))
 
 
 def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Floats]:
-    """Posterior probabilities (N, K, L) of the levels of N chains, and the last step's (N, L), filtered."""
+    """Smoothed probabilities (N, K, L) of the motion modes of N chains by forward-backward recursion, and the last
+    step's filtered ones (N, L)."""
     move, (chains, count, levels) = transition(stay), log_like.shape
     like = np.exp(log_like - log_like.max(axis=2, keepdims=True)).swapaxes(0, 1)
     # forward and backward at once, side by side: what comes in, and what goes on with each step's own likelihood
@@ -97,15 +106,16 @@ def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Float
 
 
 def expected_precision(posterior: Floats) -> Floats:
-    """(...,) [s^4/m^2]."""
+    """Expected precision (...,) [s^4/m^2] of a step's acceleration, from motion-mode probabilities (..., L)."""
     return np.asarray(posterior @ ladder() ** -2.0)
 
 
 def prior_precision(posterior: Floats, is_turn: bool) -> Floats:
-    """(...,) of a step: the expected precision; of turns, of which nothing is told beforehand, by the variance."""
+    """Prior precision (...,) of a step's acceleration, from motion-mode probabilities (..., L): the expected precision;
+    of the rate of turn, which is told nothing beforehand, one over the expected variance."""
     return 1.0 / expected_variance(posterior) if is_turn else expected_precision(posterior)
 
 
 def expected_variance(posterior: Floats) -> Floats:
-    """(...,) [m^2/s^4]."""
+    """Expected variance (...,) [m^2/s^4] of a step's acceleration, from motion-mode probabilities (..., L)."""
     return np.asarray(posterior @ ladder() ** 2)

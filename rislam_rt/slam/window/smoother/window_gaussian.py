@@ -21,31 +21,42 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.factor import inverse, solution
-from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, ONE, POSE, TURN, TWO, basis, carry_on, latest, starts
+from rislam_rt.slam.window.smoother.motion_basis import (
+    FIRST,
+    HEAD,
+    ONE,
+    POSE,
+    TURN,
+    TWO,
+    basis,
+    head_order,
+    last_pose_matrix,
+    step_transition,
+)
 
 
 class Quadratic(NamedTuple):
-    """`g (x - m) + (x - m)^T H (x - m) / 2`; leading axes are cycles."""
+    """Quadratic cost `g (x - m) + (x - m)^T H (x - m) / 2` on D unknowns; leading axes are cycles."""
 
     hessian: Floats
-    """(..., D, D)."""
+    """(..., D, D) `H`."""
     gradient: Floats
-    """(..., D) at the middle."""
+    """(..., D) `g`, at the middle."""
     middle: Floats
-    """(..., D)."""
+    """(..., D) `m`, where it was linearised."""
 
     def slope(self, x: Floats) -> Floats:
-        """Gradient (..., D) at x (..., D)."""
+        """Gradient (..., D) of the cost at x (..., D)."""
         return self.gradient + (self.hessian @ (x - self.middle)[..., None])[..., 0]
 
 
 class Window(NamedTuple):
-    """The belief over the last K poses and F features, relative to the run's start."""
+    """Gaussian belief of the sliding window: the last K poses and F features, relative to the run's start."""
 
     head: Floats
-    """(7 + 3F,)."""
+    """(7 + 3F,) first position, its velocity, compass offset, and features."""
     accel: Floats
     """(K - 1, A) [m/s^2] over the steps between the poses, along the room's axes; of `TURN`, rates [rad/s]."""
     precision: Floats
@@ -55,35 +66,38 @@ class Window(NamedTuple):
     surplus: Floats
     """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `now_with_excess`)."""
     step: Floats
-    """(K - 1,) [s]."""
+    """(K - 1,) [s] times between the poses."""
     prior: Quadratic
-    """On the head."""
+    """Quadratic on the head: what is known beforehand and from poses that left the window."""
     noise: Floats
-    """(7 + 3F, 7 + 3F) the same of the head's prior, from steps that left the window."""
+    """(7 + 3F, 7 + 3F) variance of the slope of the head's prior that its Hessian leaves out, by steps that left the
+    window."""
     slots: Quadratic
-    """(K, 4 + 3F): on each pose and the features."""
+    """(K, 4 + 3F) quadratics of each cycle's measurements on its pose and the features."""
     covariance: Floats
     """(D, D) of head and accelerations, at the last solution."""
     holds: DirectionPriors
+    """Direction priors of the walls."""
 
     @property
     def num_poses(self) -> int:
-        """K."""
+        """Number K of poses in the window."""
         return len(self.step) + 1
 
     @property
     def features(self) -> Floats:
-        """(F, 3) [m]."""
+        """Features (F, 3) [m] of the map: places of points, and for walls the mirror images of their anchors."""
         return self.head[HEAD:].reshape(-1, 3)
 
     @property
     def turns(self) -> bool:
-        """Whether the heading moves freely: A is 4, and else 3."""
+        """Whether each step has a rate of turn, the heading being estimated: A is then 4, and else 3."""
         return self.accel.shape[1] > TURN
 
 
 def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = False) -> Window:
-    """One pose, no features; `std` (7,) of the head's numbers, 0 for what is held."""
+    """Belief of the sliding window with one pose and no features; `std` (7,) of the head's numbers, 0 for what is held
+    fixed."""
     head = np.concatenate([position, velocity, [0.0]])
     information = np.diag(np.maximum(std, 1e-6) ** -2.0)
     prior = Quadratic(information, np.zeros(HEAD), head)
@@ -98,7 +112,7 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
 def begin_with(
     position: Floats, velocity: Floats, std: Floats, features: Floats, covariance: Floats, *, turns: bool
 ) -> Window:
-    """One pose, and features (3F,) known beforehand, with a covariance (3F, 3F)."""
+    """Belief of the sliding window with one pose, and features (3F,) known beforehand with a covariance (3F, 3F)."""
     alone, count = begin(position, velocity, std, turns=turns), len(features)
     spread = scipy.linalg.block_diag(alone.covariance, covariance)
     information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
@@ -111,12 +125,12 @@ def begin_with(
 
 
 def _basis(window: Window) -> Floats:
-    """(A, K, K + 1) (see `steps.basis`)."""
+    """Matrices (A, K, K + 1) that give the window's poses from head and accelerations (see `motion_basis.basis`)."""
     return basis(window.step.tobytes(), window.turns)
 
 
 def poses(window: Window) -> Floats:
-    """(K, 4) positions [m] and compass offsets [rad]."""
+    """Positions [m] and compass offsets [rad] of the window's poses (K, 4)."""
     free = window.accel.shape[1]
     numbers = np.concatenate([window.head[[0, 1, 2, 6]][:free, None], np.zeros((free, 1)), window.accel.T], axis=1)
     numbers[:3, 1] = window.head[3:6]
@@ -126,18 +140,21 @@ def poses(window: Window) -> Floats:
 
 
 def _carried(window: Window, rows: Floats) -> Floats:
-    """(7, ...) last pose, velocity and compass offset of rows (D, ...) of all numbers of the window."""
-    size, design = len(window.head), latest(window.step.tobytes(), window.turns)
+    """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
+    its unknowns."""
+    size, design = len(window.head), last_pose_matrix(window.step.tobytes(), window.turns)
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
 def now(window: Window) -> tuple[Floats, Floats]:
-    """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
+    """Mean (7 + 3F,) and covariance of the sliding window's last pose, its velocity, the compass offset, and the
+    features."""
     return now_with_excess(window)[:2]
 
 
 def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
-    """`now`, and the covariance (6, 6) of position and velocity beyond what the window holds.
+    """Mean and covariance of the present as in `now`, and the excess covariance (6, 6) of position and velocity that
+    the acceleration priors leave out.
 
     The estimate takes each acceleration by a precision p, that of the calmest motion mode that may be; its error hangs
     on the variance q that the acceleration truly has. The slope `p a` of its prior then has the variance `p^2 q`, of
@@ -155,7 +172,8 @@ def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
 
 
 def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
-    """`now`, had the last solution had prior precisions (K - 1, A) that are not its own in a few steps.
+    """Mean and covariance of the present as in `now`, had the last solution had other prior precisions (K - 1, A) of
+    the accelerations in a few steps.
 
     `present` is `now`, where it is known. By Woodbury's identity, so that nothing is solved anew.
     """
@@ -169,8 +187,8 @@ def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] 
 
 
 def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
-    """The last slot's quadratic from residuals (A, 3) of the present, in deviations, and their jacobian (A, 3, 7 + 3F):
-    every component counts in full."""
+    """Sliding window with the last slot's quadratic made from the present cycle's innovations (A, 3), in standard
+    deviations, and their jacobian (A, 3, 7 + 3F), all at full weight."""
     spot = np.concatenate([poses(window)[-1], window.head[HEAD:]])
     # what is seen does not hang on the velocity
     flat = np.concatenate([jacobian[..., :3], jacobian[..., 6:]], axis=2).reshape(-1, len(spot))
@@ -180,7 +198,7 @@ def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
 
 
 def pose_covariance(window: Window, axis: int) -> Floats:
-    """(K, K) covariance of all poses along one axis."""
+    """Covariance (K, K) of all poses of the sliding window along one axis."""
     along, size, free = _basis(window)[axis], len(window.head), window.accel.shape[1]
     rate = [] if axis == TURN else [3 + axis]
     rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
@@ -189,8 +207,8 @@ def pose_covariance(window: Window, axis: int) -> Floats:
 
 
 def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:
-    """One more pose, a step of `dt` [s] on, with the prior precisions (A,) of the step's acceleration, and their
-    `surplus` (A,)."""
+    """Append a pose to the sliding window, `dt` [s] after the last, with prior precisions (A,) of the step's
+    acceleration, and their `surplus` (A,)."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -208,7 +226,7 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
 
 
 def slide(window: Window) -> Window:
-    """Marginalise the oldest pose, at the present estimate."""
+    """Marginalise the oldest pose of the sliding window at the present estimate."""
     size, free = len(window.head), window.accel.shape[1]
     first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
@@ -218,7 +236,7 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = float(window.step[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = carry_on(-dt, free)
+    back = step_transition(-dt, free)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
@@ -227,7 +245,7 @@ def slide(window: Window) -> Window:
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(window.surplus[0])
-    carry = carry_on(dt, free)
+    carry = step_transition(dt, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -244,20 +262,21 @@ def slide(window: Window) -> Window:
         surplus=window.surplus[1:],
         step=window.step[1:],
         prior=prior,
-        noise=_without(shaken, size, gain),
+        noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=covariance,
     )
 
 
-def _without(noise: Floats, size: int, gain: Floats) -> Floats:
-    """Covariance (size, size) of the slopes that are left, when the rest is taken out by `gain`."""
+def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
+    """Covariance (size, size) of the cost's gradient that is left when the other unknowns are eliminated by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
 
 
 def solve(window: Window, *, spread: bool = True) -> Window:
-    """One Gauss-Newton step on the present quadratics, and the covariance there (the old one, without `spread`)."""
+    """One Gauss-Newton step of the sliding window on its present quadratics, and the covariance there (the old one,
+    without `spread`)."""
     size = len(window.head)
     hessian, gradient = _normal(window)
     if spread:
@@ -274,14 +293,15 @@ def solve(window: Window, *, spread: bool = True) -> Window:
 
 
 def _normal(window: Window) -> tuple[Floats, Floats]:
-    """Hessian and gradient of all that is known, by the head and the accelerations."""
+    """Hessian and gradient of the sliding window's whole cost (priors and measurements) by the head and the
+    accelerations."""
     size, (steps, free) = len(window.head), window.accel.shape
     place = poses(window)
     spot = np.concatenate([place, np.broadcast_to(window.head[HEAD:], (len(place), size - HEAD))], axis=1)
     slope, slots = window.slots.slope(spot), window.slots.hessian
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
-    along, start, edge = _basis(window), starts(free), 2 * free
+    along, start, edge = _basis(window), head_order(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
@@ -310,7 +330,7 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
 
 
 def weigh_holds(window: Window) -> Window:
-    """With each belief about a direction weighed by what all else tells of it."""
+    """Sliding window with each direction prior's posterior probability, from what all else tells of its wall."""
     holds = window.holds
     if not len(holds.feature):
         return window
@@ -320,7 +340,8 @@ def weigh_holds(window: Window) -> Window:
 
 
 def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: float = 1e-6) -> Window:
-    """One more feature at `place` (3,), with what is held of it; all else is open, `ridge` [1/m^2] apart."""
+    """Sliding window with one more feature at `place` (3,), known by its direction priors `holds` and otherwise by next
+    to nothing (`ridge` [1/m^2])."""
     size = len(window.head)
     hessian = np.zeros((size + 3, size + 3))
     hessian[:size, :size], hessian[size:, size:] = window.prior.hessian, ridge * np.eye(3)
@@ -346,8 +367,8 @@ def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: fl
 
 
 def drop_features(window: Window, keep: Booleans) -> Window:
-    """Only the features (F,) that are kept: the others are marginalised from what left the window, and struck from the
-    rest, whose slots have to be made again."""
+    """Sliding window without the features not marked in `keep` (F,): marginalised from what left the window, deleted
+    from the slots, which have to be re-linearised."""
     size = len(window.head)
     stays = np.concatenate([np.ones(HEAD, dtype=np.bool_), np.repeat(keep, 3)])
     inside, out = np.flatnonzero(stays), np.flatnonzero(~stays)
@@ -368,7 +389,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
         holds=holds,
         head=window.head[inside],
         prior=prior,
-        noise=_without(window.noise[np.ix_(order, order)], len(inside), gain),
+        noise=_eliminated_noise(window.noise[np.ix_(order, order)], len(inside), gain),
         slots=slots,
         covariance=window.covariance[np.ix_(kept, kept)],
     )

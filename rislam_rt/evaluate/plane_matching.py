@@ -1,4 +1,5 @@
-"""Which estimated plane stands for which true wall, and which stands for none: the one criterion of all scores."""
+"""Matching of estimated wall planes with a room's true walls, and ghost planes that stand for none: the one criterion
+of all scores."""
 
 from typing import NamedTuple
 
@@ -8,26 +9,27 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.evaluate.set_distances import match_nearest
 
 NEAR_WALL = 0.5
-"""RMS distance [m] from a true wall, over its surface, beyond which an estimated plane is not held for it."""
+"""Largest RMS distance [m], over a true wall's surface, of an estimated plane that can stand for the wall."""
 NEAR_ANGLE = 10.0
-"""Angle [deg] from a true wall beyond which it is not either. Distance alone says nothing of a small surface: a plane
-at right angles to it is near all of it. A plane of random direction is within this by chance in 1 - cos 10 degrees =
-1.5 % of cases, and none is within it of two walls that stand more than 20 degrees apart."""
+"""Largest angle [deg] between a true wall and an estimated plane that can stand for it. Distance alone says nothing of
+a small surface: a plane at right angles to it is near all of it. A plane of random direction is within this by chance
+in 1 - cos 10 degrees = 1.5 % of cases, and none is within it of two walls that stand more than 20 degrees apart."""
 
 
 class Surfaces(NamedTuple):
-    """W true walls."""
+    """Surfaces of a room's W true walls, against which estimated planes are scored."""
 
     middle: Floats
-    """(W, 3) [m] centroid of each wall's surface."""
+    """Centroid (W, 3) [m] of each wall's surface."""
     normal: Floats
-    """(W, 3) unit normals."""
+    """Unit normals (W, 3) of the walls."""
     spread: Floats
-    """(W, 3, 3) [m^2] covariance of the points of its surface."""
+    """Covariance (W, 3, 3) [m^2] of the points of each wall's surface."""
 
 
 def plane_distance(surfaces: Surfaces, normal: Floats, offset: Floats) -> Floats:
-    """Score (W, M): RMS distance [m] of planes `normal . x = offset`, (M, 3) and (M,), from walls, over their surface.
+    """RMS distances (W, M) [m] of M planes `normal . x = offset`, (M, 3) and (M,), from the surfaces of W true
+    walls.
 
     The mean square of a distance is the square of its mean, that at the middle, and its variance, `n^T spread n`.
     """
@@ -37,13 +39,13 @@ def plane_distance(surfaces: Surfaces, normal: Floats, offset: Floats) -> Floats
 
 
 def plane_angle(surfaces: Surfaces, normal: Floats) -> Floats:
-    """Score (W, M): angle [deg], 0 to 90, between walls and planes of unit normals (M, 3)."""
+    """Angles (W, M) [deg], 0 to 90, between W true walls and M planes of unit normals (M, 3)."""
     across = np.cross(surfaces.normal[:, None], normal[None])
     return np.asarray(np.degrees(np.arctan2(np.linalg.norm(across, axis=-1), np.abs(surfaces.normal @ normal.T))))
 
 
 def match_planes(surfaces: Surfaces, normal: Floats, offset: Floats, heard: Booleans | None = None) -> Integers:
-    """Row (W,) of the plane, of M, that stands for each true wall that is `heard` (W,), -1 for none; one to one.
+    """Row (W,) of the estimated plane that stands for each true wall `heard` (W,), one to one; -1 for none.
 
     A plane can stand for a wall within `NEAR_WALL` over its surface and `NEAR_ANGLE`; of all ways to pair them the one
     with the least sum of distances is taken.
@@ -56,7 +58,7 @@ def match_planes(surfaces: Surfaces, normal: Floats, offset: Floats, heard: Bool
 
 
 def ghost_planes(surfaces: Surfaces, normal: Floats, offset: Floats) -> Booleans:
-    """Which planes (M,) stand for no true wall, heard or not, one to one: ghosts of a map, for its score.
+    """Whether each of M estimated planes is a ghost: it stands for no true wall, heard or not, one to one.
 
     A second plane for one wall is a ghost, as GOSPA counts a second point for one landmark as false.
     """
@@ -67,6 +69,6 @@ def ghost_planes(surfaces: Surfaces, normal: Floats, offset: Floats) -> Booleans
 
 
 def _allowed_distance(surfaces: Surfaces, normal: Floats, offset: Floats) -> Floats:
-    """Score (W, M): RMS distance [m], infinite where the angle forbids the pair."""
+    """RMS distances (W, M) [m] of planes from true walls, infinite where the angle between them forbids the pair."""
     distance, angle = plane_distance(surfaces, normal, offset), plane_angle(surfaces, normal)
     return np.where(angle <= NEAR_ANGLE, distance, np.inf)

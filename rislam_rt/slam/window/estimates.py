@@ -1,4 +1,4 @@
-"""The map and pose that others read, from the window's belief."""
+"""Estimates of the window filter: pose and map, the prediction for the phase design, and a start on an earlier map."""
 
 from dataclasses import replace
 
@@ -9,19 +9,20 @@ from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.gaussian_draws import even_draws, square_root
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
-from rislam_rt.slam.returns import AXES, poses_of
+from rislam_rt.slam.predicted_returns import AXES, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window.filter import init
+from rislam_rt.slam.window.landmarks.duplicate_walls import second_planes
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, image_ident
-from rislam_rt.slam.window.landmarks.same_wall import second_planes
 from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
 
 def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
-    """The belief carried over `dt` [s] without noise, to where the next cycle finds the agent; with the suspect."""
+    """Estimate of pose and map `dt` [s] ahead at constant velocity, without process noise, with candidates for RIS
+    panels that the map lacks."""
     ahead = estimate(state, config, dt)
     unknown = [panel for panel, row in enumerate(state.landmarks.panels) if row < 0]
     if state.scene.ris is None or not unknown:
@@ -33,7 +34,8 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
 
 
 def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> SlamEstimate:
-    """Mean and covariance of the pose, equally likely samples of it, and the map."""
+    """Pose estimate (mean, covariance, equally likely samples; `ahead` [s] at constant velocity) and map estimate of
+    the window filter."""
     mean, covariance, excess = window_gaussian.now_with_excess(state.window)
     spread = covariance.copy()
     spread[:6, :6] += excess
@@ -52,7 +54,8 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
 
 
 def shift_covariance(features: Floats, landmarks: WindowTable, shift: Floats) -> Floats:
-    """(3F, 3F) of features (F, 3) that all move with the start's error, of standard deviation `shift` (3,).
+    """Covariance (3F, 3F) of features (F, 3) caused by the start's position error alone, of standard deviation `shift`
+    (3,) [m], which moves them all together.
 
     A wall's three numbers, the image of an anchor that stays, move by `2 n n^T` of what the wall itself does.
     """
@@ -66,7 +69,8 @@ def shift_covariance(features: Floats, landmarks: WindowTable, shift: Floats) ->
 def revisit(
     state: WindowState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator
 ) -> WindowState:  # fmt: skip
-    """Another run, or another agent's, on the map of an earlier one: features and who they are stay known.
+    """State of the window filter for another run, or another agent's, on the map of an earlier one, identities of its
+    features included.
 
     The map keeps its covariance, the earlier start's error included; its frame is the earlier run's, and so must be
     the start's. What is measured tells of the start then, so that its error stands within the Gaussian.
@@ -87,7 +91,8 @@ def revisit(
 def build_map(
     features: Floats, covariance: Floats, landmarks: WindowTable, shift: Floats, middle: Floats
 ) -> MapEstimate:  # fmt: skip
-    """Points, their images in each wall, and the walls; the start's error moves all of it together.
+    """Map estimate of points, their mirror images in each wall, and walls; covariances include the start's error, which
+    moves all together.
 
     Of planes that are one wall, seen from `middle` (3,) [m], one is shown.
     """

@@ -1,4 +1,4 @@
-"""Poses as a linear function of the first one and the steps' accelerations: the window's motion without its noise."""
+"""Motion basis: the window's poses as a linear function of the first one, its velocity and the steps' accelerations."""
 
 from functools import lru_cache
 
@@ -7,16 +7,17 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 
 HEAD = 7
-"""Numbers of the head before the features: position, velocity, offset of the compass."""
+"""Number of the window's unknowns before the features: first position, its velocity, compass offset."""
 TURN = 3
-"""Axis of the rate of turn, after those of the room."""
+"""Index of the rate of turn among the axes, after the three of the room."""
 POSE = 4
-"""Numbers of a pose that measurements depend on: position, offset of the compass."""
+"""Number of a pose's unknowns that measurements depend on: position, compass offset."""
 
 
 @lru_cache(maxsize=4)
 def basis(steps: bytes, turns: bool) -> Floats:
-    """(A, K, K + 1): each axis of the poses by its first place, its first rate, and its accelerations."""
+    """Matrices (A, K, K + 1) that give K poses along each axis from the first place, the first rate and the
+    accelerations of the steps (a time [s] each, as bytes)."""
     step = np.frombuffer(steps)
     count = len(step) + 1
     time = np.concatenate([[0.0], np.cumsum(step)])
@@ -32,16 +33,18 @@ def basis(steps: bytes, turns: bool) -> Floats:
 ONE, TWO = np.tril_indices(POSE)
 """Every pair of axes once, those of the room first."""
 FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
-"""The head's numbers in the order of a basis: first places, then first rates."""
+"""Indices of the head's numbers in the order of a basis: first places, then first rates."""
 
 
-def starts(free: int) -> Integers:
-    """The head's numbers that a basis of so many axes spans, rate by rate after place by place."""
+def head_order(free: int) -> Integers:
+    """Indices of the window's unknowns that a motion basis of so many axes multiplies: first places, then first
+    rates."""
     return FIRST if free > TURN else np.arange(6)
 
 
-def carry_on(dt: float, free: int) -> Floats:
-    """(7, 7 + A): the next pose, velocity and offset from the last ones and the step's accelerations."""
+def step_transition(dt: float, free: int) -> Floats:
+    """Transition matrix (7, 7 + A) from pose, velocity and compass offset, and a step's accelerations, to those `dt`
+    [s] later."""
     found = np.eye(HEAD, HEAD + free)
     axes = np.arange(3)
     found[axes, 3 + axes] = found[3 + axes, HEAD + axes] = dt
@@ -52,8 +55,9 @@ def carry_on(dt: float, free: int) -> Floats:
 
 
 @lru_cache(maxsize=4)
-def latest(steps: bytes, turns: bool) -> Floats:
-    """(7, 7 + (K - 1) A): the last pose, velocity and offset from the head and all accelerations."""
+def last_pose_matrix(steps: bytes, turns: bool) -> Floats:
+    """Matrix (7, 7 + (K - 1) A) that gives the last pose, velocity and compass offset from the first ones and all
+    accelerations."""
     last, step, free = basis(steps, turns)[:, -1], np.frombuffer(steps), 3 + turns
     design = np.eye(HEAD, HEAD + len(step) * free)
     for axis in range(3):

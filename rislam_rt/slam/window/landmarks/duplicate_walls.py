@@ -1,4 +1,4 @@
-"""Which planes of the map are one wall: a comparison of one plane with two."""
+"""Duplicate walls: which planes of the map are one wall, by comparing one plane with two."""
 
 import numpy as np
 import scipy
@@ -7,18 +7,18 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import squared_distance
 from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, by_wall, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 
 def second_planes(
     features: Floats, covariance: Floats, landmarks: WindowTable, walls: Integers, middle: Floats
 ) -> Booleans:  # fmt: skip
-    """(W,) whether each of some walls, rows (W,) of the map, is a second plane of another of them, features (F, 3) [m]
-    being known within a covariance (3F, 3F) [m^2], and the agent at `middle` (3,) [m].
+    """Whether walls of the map, rows (W,), are duplicates of another of them, features (F, 3) [m] being known within a
+    covariance (3F, 3F) [m^2], and the agent at `middle` (3,) [m].
 
-    The plane of a wall is that whose expected square of lean, off upright or level, is least: what level returns do not
-    tell goes wrong first.
+    Of the planes of one wall, the first is that whose expected square of lean, off upright or level, is least: what
+    level returns do not tell goes wrong first.
     """
     second = np.zeros(len(walls), dtype=np.bool_)
     if len(walls) < 2:

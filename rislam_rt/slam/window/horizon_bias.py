@@ -1,4 +1,4 @@
-"""Cosines at the rim of the unit disc: what a receiver reports of rays near the horizon, which noise puts beyond it.
+"""Horizon bias of direction cosines: a receiver brings those that noise puts beyond the unit disc back to its rim.
 
 Directions lie within the unit disc, and a receiver that finds a pair of cosines beyond it brings them back to the rim.
 A ray of radius r (1 on the horizon), heard with noise of standard deviation s along it, is reported at `min(1, r + n)`:
@@ -13,12 +13,12 @@ import scipy
 from rislam_rt.arrays import Floats
 
 REACH = 4.0
-"""Standard deviations within the rim from which on noise puts nothing beyond it."""
+"""Distance from the rim, in standard deviations, from which on noise puts nothing beyond it."""
 
 
-def bring_back(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
-    """Measured less predicted `left` (A, 3) and slopes (A, 3, D) of the predictions `seen` (A, 3), length and cosines,
-    in place: as they are where the receiver brings cosines of noise `std` (A, 3) back into the unit disc.
+def correct_horizon_bias(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
+    """Correct residuals `left` (A, 3) and slopes (A, 3, D) of predictions `seen` (A, 3), length and cosines, in place
+    for a receiver that brings cosines of noise `std` (A, 3) back into the unit disc.
 
     Where noise is not small against the disc, as along an axis without aperture, they stay.
     """

@@ -1,4 +1,4 @@
-"""What a return of the map looks like to the agent: length and direction cosines, and how they move with the map.
+"""Predicted returns of the map's features: path lengths and direction cosines, and their derivatives by map and pose.
 
 The map is a list of features of three numbers each. A point is its position. A wall is the mirror image of a fixed
 anchor (a point of the agent's own choosing, off the wall): as smooth and as Gaussian as a point landmark, and never
@@ -19,62 +19,63 @@ TX = -1
 NONE = -1
 """In the wall columns of `Returns.legs`: no wall."""
 AXES = np.eye(3)
+"""Unit vectors of the three axes: the identity matrix."""
 
 
 class Returns(NamedTuple):
-    """R returns over G legs."""
+    """R paths (returns) over the map's features, each of a Tx leg and an Rx leg among G legs."""
 
     legs: Integers
-    """(G, 3) feature row of the point (or `TX`), of the wall next to it, and of the wall next to the device."""
+    """Feature rows (G, 3) of each leg's point (or `TX`), of the wall next to it, and of the wall next to the device."""
     tx: Integers
-    """(R,) row of the Tx leg."""
+    """Row (R,) of each return's Tx leg."""
     rx: Integers
-    """(R,) row of the Rx leg."""
+    """Row (R,) of each return's Rx leg."""
 
     @property
     def point(self) -> Integers:
-        """(R,) feature row of each return's point."""
+        """Feature row (R,) of each return's point."""
         return self.legs[self.rx, 0]
 
 
 class PredictedReturn(NamedTuple):
-    """Returns as seen from a pose."""
+    """Predicted length and direction of R returns, as seen from the agent's poses."""
 
     seen: Floats
-    """(..., R, 3) length [m] and the two direction cosines in the body frame."""
+    """Lengths [m] and the two direction cosines in the body frame (..., R, 3)."""
     tx_length: Floats
-    """(..., R) unfolded length of the Tx leg [m]."""
+    """Unfolded lengths (..., R) [m] of the Tx legs."""
     rx_length: Floats
-    """(..., R)."""
+    """Unfolded lengths (..., R) [m] of the Rx legs."""
     up: Floats
-    """(..., R) third direction cosine; the array is blind where it is negative."""
+    """Third direction cosine (..., R) of the arrival; the array is blind where it is negative."""
 
 
 class Poses(NamedTuple):
-    """Where the agent's ends are."""
+    """Positions of the agent's Tx and Rx, and its heading."""
 
     tx: Floats
-    """(..., 3) [m]."""
+    """Positions (..., 3) [m] of the Tx."""
     rx: Floats
-    """(..., 3) [m]."""
+    """Positions (..., 3) [m] of the Rx array's centre."""
     heading: Floats
-    """Broadcasts against the leading axes [rad]."""
+    """Headings [rad], which broadcast against the leading axes."""
 
 
 def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
-    """Ends of agents at positions (..., 3) with headings that broadcast against the leading axes."""
+    """Tx and Rx of agents at positions (..., 3) [m], with headings [rad] that broadcast against the leading axes."""
     return Poses(*body.ends(position, heading), np.asarray(heading))
 
 
 def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:
-    """Mirror images (..., 3) of points in walls given as images (..., 3) of anchors (..., 3)."""
+    """Mirror images (..., 3) of points in walls, which are given as the images (..., 3) of their anchors (..., 3)."""
     span = wall - anchor
     depth = np.vecdot(span, point - 0.5 * (wall + anchor)) / np.vecdot(span, span)
     return point - 2.0 * depth[..., None] * span
 
 
 def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) by the walls (..., 3)."""
+    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) with respect to the walls (..., 3)."""
     span = wall - anchor
     scaled = span / np.vecdot(span, span)[..., None]
     depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
@@ -83,13 +84,13 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
 
 
 def bounced(legs: Integers, column: int) -> tuple[Integers, Integers]:
-    """Rows of the legs (G, 3) that meet a wall in column 1 or 2, and the feature rows of those walls."""
+    """Rows of the legs (G, 3) that bounce off a wall in column 1 or 2, and the feature rows of those walls."""
     rows = (legs[:, column] != NONE).nonzero()[0]
     return rows, legs[rows, column]
 
 
 def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
-    """Apparent positions (..., G, 3) of the legs' far ends, from features (..., F, 3) and Tx positions (..., 3)."""
+    """Mirror images (..., G, 3) [m] of the legs' points in their walls, from features (..., F, 3) and Tx (..., 3)."""
     legs = returns.legs
     moving, base = legs[:, 0] == TX, features[..., legs[:, 0], :]
     if moving.any():  # only then do images differ from pose to pose
@@ -102,7 +103,7 @@ def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -
 
 
 def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> PredictedReturn:
-    """Predict every return from features (..., F, 3)."""
+    """Predicted lengths and direction cosines of all returns from the map's features (..., F, 3) and agent's poses."""
     image = leg_images(returns, features, anchor, poses.tx)
     # leg by leg, as many returns share one
     tx_length = _norm(image - poses.tx[..., None, :])[..., returns.tx]
@@ -120,29 +121,30 @@ def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) ->
 
 
 class Linear(NamedTuple):
-    """Returns and their derivatives."""
+    """Predicted returns and their derivatives with respect to the map's features and the agent's pose."""
 
     seen: Floats
-    """(..., R, 3)."""
+    """Lengths [m] and direction cosines (..., R, 3)."""
     wide: Floats
-    """(..., R, 3, S + 3F) with respect to the features, behind S spare columns of zeros."""
+    """Derivatives (..., R, 3, S + 3F) with respect to the features, behind S spare columns of zeros."""
     by_tx: Floats
-    """(..., R, 3, 3) with respect to the position of the Tx."""
+    """Derivatives (..., R, 3, 3) with respect to the position of the Tx."""
     by_rx: Floats
-    """(..., R, 3, 3) with respect to the position of the Rx."""
+    """Derivatives (..., R, 3, 3) with respect to the position of the Rx."""
 
     @property
     def by_feature(self) -> Floats:
-        """(..., R, 3, F, 3), where no column is spare."""
+        """Derivatives (..., R, 3, F, 3) of returns with respect to the features, where no column is spare."""
         return self.wide.reshape(*self.seen.shape, self.wide.shape[-1] // 3, 3)
 
     @property
     def by_pose(self) -> Floats:
-        """(..., R, 3, 3) derivatives of returns by the agent's position, which moves both ends."""
+        """Derivatives (..., R, 3, 3) of returns with respect to the agent's position, which moves both ends."""
         return self.by_tx + self.by_rx
 
     def by_heading(self, poses: Poses, position: Floats) -> Floats:
-        """(..., R, 3) with respect to the heading, which turns both ends about the agent's position, and the array."""
+        """Derivatives (..., R, 3) of returns with respect to the heading, which turns Tx, Rx, array about
+        `position`."""
         turned = np.zeros(self.seen.shape)
         turned[..., 1], turned[..., 2] = self.seen[..., 2], -self.seen[..., 1]
         for jacobian, end in ((self.by_tx, poses.tx), (self.by_rx, poses.rx)):
@@ -153,20 +155,23 @@ class Linear(NamedTuple):
 
 
 def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses, spare: int = 0) -> Linear:
-    """`observe(...).seen` with its derivatives by the features (..., F, 3) and by the agent's ends."""
+    """Predicted returns with their derivatives with respect to features (..., F, 3) and the positions of Tx and Rx."""
     ends = Poses(poses.tx[..., None, :], poses.rx[..., None, :], np.asarray(poses.heading)[..., None])
     return _linearise(returns, features, anchor, ends.tx, ends, spare)
 
 
 def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses, spare: int = 0) -> Linear:
-    """The same of R returns of which each has a pose of its own, of features (F, 3); a leg has one `TX` at most."""
+    """Predicted returns with derivatives as by `linearise`, each return as seen from a pose of its own.
+
+    Returns that share a leg which begins at the Tx itself (`TX`) must share the Tx's position.
+    """
     tx = np.empty((len(returns.legs), 3))
     tx[returns.tx] = tx[returns.rx] = poses.tx
     return _linearise(returns, features, anchor, tx, poses, spare)
 
 
 def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses, spare: int) -> Linear:
-    """With the Tx of each leg (..., G or 1, 3), and poses with an axis for the returns (..., R or 1)."""
+    """Predicted returns with derivatives, by the Tx of each leg (..., G or 1, 3) and poses (..., R or 1) of returns."""
     image, slopes = _leg_jacobian(returns.legs, features, anchor, leg_tx)
     seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
     count = features.shape[-2]
@@ -191,7 +196,7 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
 
 
 def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
-    """What is seen (..., R, 3); the length's derivative by the Tx leg's image (..., R, 3); all by the Rx leg's."""
+    """Lengths and cosines (..., R, 3) of returns, lengths' derivatives by the Tx legs' images, all by the Rx legs'."""
     to_tx, to_rx = image[..., returns.tx, :] - poses.tx, image[..., returns.rx, :] - poses.rx
     tx_length, rx_length = _norm(to_tx)[..., None], np.maximum(_norm(to_rx), 1e-9)[..., None]
     by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9), to_rx / rx_length
@@ -204,8 +209,8 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
 
 
 def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats]:
-    """Images (..., G, 3) of the legs and their derivatives (..., G, 3, 9) by all that moves them: the base, through
-    both mirrors, the wall next to it, through the other mirror, and that other wall."""
+    """Mirror images (..., G, 3) of the legs' points, and derivatives (..., G, 3, 9) by the point, the wall next to it
+    and the other wall."""
     moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx, image)
@@ -229,7 +234,7 @@ def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) 
 
 
 def compact(returns: Returns, rows: Integers) -> Returns:
-    """Some of the returns, with only the legs that they need."""
+    """Some of the returns, by row, with only the legs that they need."""
     tx, rx = returns.tx[rows], returns.rx[rows]
     used = np.zeros(len(returns.legs), dtype=np.bool_)
     used[tx] = used[rx] = True
@@ -238,4 +243,5 @@ def compact(returns: Returns, rows: Integers) -> Returns:
 
 
 def _norm(vector: Floats) -> Floats:
+    """Lengths (...,) of vectors (..., 3)."""
     return np.asarray(np.sqrt(np.vecdot(vector, vector)))

@@ -1,4 +1,5 @@
-"""Solutions and inverses of symmetric positive matrices by Cholesky's factor, whose errors no scaling changes."""
+"""Solution and inverse of symmetric positive definite matrices by Cholesky's factor, whose errors no scaling
+changes."""
 
 import numpy as np
 import scipy
@@ -7,7 +8,8 @@ from rislam_rt.arrays import Floats
 
 
 def _factorise(matrix: Floats) -> Floats:
-    """The factor, by a share of the diagonal damped where rounding made the matrix indefinite."""
+    """Cholesky factor of a symmetric matrix (D, D), damped by a share of its diagonal where rounding made it
+    indefinite."""
     factor, bad = scipy.linalg.lapack.dpotrf(matrix.T, lower=1)
     for damping in (1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3):
         if not bad:
@@ -18,13 +20,13 @@ def _factorise(matrix: Floats) -> Floats:
 
 
 def solution(matrix: Floats, right: Floats) -> Floats:
-    """The matrix's inverse times (D,)."""
+    """Solution (D,) of a symmetric positive definite linear system, from its matrix (D, D) and right-hand side (D,)."""
     found, _ = scipy.linalg.lapack.dpotrs(_factorise(matrix), right, lower=1)
     return np.asarray(found)
 
 
 def inverse(matrix: Floats) -> Floats:
-    """The matrix's inverse, symmetric."""
+    """Inverse (D, D) of a symmetric positive definite matrix, exactly symmetric."""
     inside, _ = scipy.linalg.lapack.dpotri(_factorise(matrix), lower=1, overwrite_c=1)
     full = inside + inside.T
     np.fill_diagonal(full, np.diag(inside))
