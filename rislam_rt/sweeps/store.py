@@ -24,9 +24,8 @@ from rislam_rt.storage.files import (
     write_atomic,
 )
 from rislam_rt.storage.lock import LOCK_FILE, hold
-from rislam_rt.storage.seal import read_sealed, seal
+from rislam_rt.storage.seal import flatten, read_sealed, seal
 from rislam_rt.sweeps.cell_work import CellOutcome
-from rislam_rt.sweeps.plain_data import flatten
 from rislam_rt.sweeps.sweep import Cell, Sweep
 
 SWEEP_FILE = "sweep.json"
