@@ -86,7 +86,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "half the deviations", "slam/window/mapping.py",
+        "half the deviations", "slam/window/estimates.py",
         "        spread[:6, :6],\n", "        0.25 * spread[:6, :6],\n",
         (
             "pipeline/recordings/test_own_measurements.py",
@@ -129,8 +129,8 @@ MUTANTS = (
     ),
     Mutant(
         "every second birth of a wrong kind", "slam/window/births/births.py",
-        "    landmarks = enter(context.landmarks, verdict.is_wall,",
-        "    landmarks = enter(context.landmarks, verdict.is_wall != bool(new % 2),",
+        "    landmarks = enter(context.landmarks, decision.is_wall,",
+        "    landmarks = enter(context.landmarks, decision.is_wall != bool(new % 2),",
         (
             "slam/window/test_far_walls.py",
             "slam/window/landmarks/test_window_panel.py",
@@ -172,7 +172,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "descent never steps", "design/coordinate.py",
+        "descent never steps", "design/coordinate_descent.py",
         "    found = [coordinate_descent(objective, codes[row], problem.levels, max_steps) for row in rank]",
         "    found = [coordinate_descent(objective, codes[row], problem.levels, 0) for row in rank]",
         (
@@ -183,7 +183,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "the receiver is twice as sure as it may be", "measurement/waveform.py",
+        "the receiver is twice as sure as it may be", "measurement/waveform_receiver.py",
         "        np.sqrt(variance[:, 0]) / radio.bandwidth,",
         "        0.5 * np.sqrt(variance[:, 0]) / radio.bandwidth,",
         (
@@ -193,7 +193,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "the receiver mirrors a cosine", "measurement/waveform.py",
+        "the receiver mirrors a cosine", "measurement/waveform_receiver.py",
         "clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))",
         "clip_to_unit_disc(unmirrored(parameters[:, 1:] * [1.0, -1.0], radio))",
         (
@@ -204,7 +204,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "errors drawn from the bound are half of it", "measurement/bound.py",
+        "errors drawn from the bound are half of it", "measurement/bound_receiver.py",
         "parts.cosines]) + errors.error", "parts.cosines]) + 0.5 * errors.error",
         (
             "measurement/test_measurement_panels.py",

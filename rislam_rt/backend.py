@@ -243,7 +243,7 @@ def _named_version(path: str) -> tuple[int, ...]:
 
 
 def _load(path: str) -> ctypes.CDLL:
-    """Open a libLLVM; the wheel's C++ runtime is opened by its full name first where its links are missing."""
+    """Open a libLLVM, the wheel's C++ runtime first, by its full name, where its links are missing."""
     try:
         return ctypes.CDLL(path)
     except OSError:

@@ -1,4 +1,4 @@
-"""Errors, each with the exit code that the command line ends with.
+"""Errors of this package, each with the exit code that the command line ends with.
 
 A message is one line: what was wrong, the value received, and what to do about it. An error may hold several, one for
 each fault.
@@ -9,12 +9,13 @@ MOST_LINES = 20
 
 
 class RislamError(Exception):
-    """Any failure that this package raises on purpose; exit code 1.
+    """Base of all errors that this package raises on purpose; exit code 1.
 
     Its text is one printable line, the first of its arguments, and says how many more there are.
     """
 
     exit_code = 1
+    """Exit code of the command line."""
 
     def __str__(self) -> str:
         more = f" (and {len(self.args) - 1} more)" if len(self.args) > 1 else ""
@@ -30,43 +31,44 @@ class RislamError(Exception):
 
 
 class ConfigError(RislamError):
-    """A pipeline, radio or command-line setting is unusable."""
+    """Error raised for an unusable setting of a pipeline, of the radio or on the command line; exit code 2."""
 
     exit_code = 2
 
 
 class SceneError(RislamError):
-    """A scene file or one of its meshes is unusable."""
+    """Error raised for an unusable scene file or mesh; exit code 2."""
 
     exit_code = 2
 
 
 class ResultError(RislamError):
-    """A result file is not as it was written: damaged, changed, or of another run."""
+    """Error raised for a result file that is not as it was written: damaged, changed, or of another run; exit code
+    2."""
 
     exit_code = 2
 
 
 class GeometryError(RislamError):
-    """Points, directions or planes that have no answer (zero length, wrong shape)."""
+    """Error raised for points, directions or planes that have no answer (zero length, wrong shape); exit code 2."""
 
     exit_code = 2
 
 
 class TraceError(RislamError):
-    """The tracer failed on a valid scene."""
+    """Error raised where the ray tracer failed on a valid scene; exit code 1."""
 
     exit_code = 1
 
 
 class SetupError(RislamError):
-    """The machine lacks something: a library, a version, a device."""
+    """Error raised where the machine lacks something (a library, a version, a device); exit code 3."""
 
     exit_code = 3
 
 
 class StoreError(RislamError):
-    """A result could not be written or read back."""
+    """Error raised where a result could not be written to disk or read back; exit code 4."""
 
     exit_code = 4
 
@@ -81,11 +83,12 @@ def disk_error(error: OSError) -> RislamError:
 
 
 def _printable(text: str) -> str:
+    """Text with every unprintable character as a space."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 
 def expect(name: str, value: object, kind: type | tuple[type, ...]) -> None:
-    """Check the type of an argument of a public function.
+    """Check the type of an argument of a public function, and raise an error for another.
 
     Raises
     ------

@@ -1,5 +1,6 @@
 """Shipped pipeline files and scene folders, those that come with the package, found by name."""
 
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,6 +32,21 @@ def find_room(name: str | Path) -> Path:
     with the package."""
     given = Path(name)
     return given if given.exists() else shipped_rooms().get(str(name), given)
+
+
+def room_beside(folder: Path, name: str) -> Path:
+    """The scene folder that a pipeline file names: relative to the folder of the file, or the room of that name that
+    comes with the package; the folder comes first."""
+    given = Path(os.path.normpath(folder / name))
+    return given if given.exists() else shipped_rooms().get(name, given)
+
+
+def name_from_here(folder: Path) -> str:
+    """What a pipeline file in the working folder calls a scene folder: a built-in room's name, or the way there."""
+    built_in = shipped_rooms().get(folder.name)
+    if built_in is not None and folder.resolve() == built_in.resolve() and not Path(folder.name).exists():
+        return folder.name
+    return os.path.relpath(folder)
 
 
 def first_sentence(pipeline: Path) -> str:

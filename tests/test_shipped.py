@@ -11,7 +11,15 @@ import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
-from rislam_rt.shipped import find_pipeline, find_room, first_sentence, shipped_pipelines, shipped_rooms
+from rislam_rt.shipped import (
+    find_pipeline,
+    find_room,
+    first_sentence,
+    name_from_here,
+    room_beside,
+    shipped_pipelines,
+    shipped_rooms,
+)
 
 ROOT = Path(__file__).parents[1]
 
@@ -36,6 +44,23 @@ def test_a_users_own_file_comes_first(tmp_path: Path, monkeypatch: pytest.Monkey
     assert find_room("office").samefile(ROOT / "scenes" / "office")
     (tmp_path / "office").mkdir()
     assert find_room("office") == Path("office")
+
+
+def test_a_pipeline_may_name_a_built_in_room_and_its_own_folder_comes_first(tmp_path: Path) -> None:
+    assert room_beside(tmp_path, "office").samefile(ROOT / "scenes" / "office")
+    assert room_beside(ROOT / "pipelines", "../scenes/office").samefile(ROOT / "scenes" / "office")
+    assert room_beside(tmp_path, "../scenes/office") == tmp_path.parent / "scenes" / "office", "no folder, no name"
+    (tmp_path / "office").mkdir()
+    assert room_beside(tmp_path, "office") == tmp_path / "office"
+
+
+def test_a_folder_is_called_what_finds_it_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    office = ROOT / "scenes" / "office"
+    assert name_from_here(office) == "office"
+    assert name_from_here(tmp_path / "mine" / "office") == "mine/office"
+    (tmp_path / "office").mkdir()
+    assert room_beside(tmp_path, name_from_here(office)).samefile(office), "another room has taken the name"
 
 
 def test_a_name_with_a_slip_is_mended() -> None:

@@ -29,7 +29,7 @@ from rislam_rt.design import (
     problem_from_belief,
     problem_from_paths,
 )
-from rislam_rt.design.coordinate import coordinate_descent
+from rislam_rt.design.coordinate_descent import coordinate_descent
 from rislam_rt.geometry.planes import mirror
 from rislam_rt.model import MapEstimate, RadioConfig, RisSpec, Scene, SlamEstimate, Trajectory
 from rislam_rt.scene import load_scene

@@ -26,7 +26,7 @@ from rislam_rt.measurement import (
     with_reference_snr,
 )
 from rislam_rt.measurement.tracking import TrackingConfig
-from rislam_rt.measurement.waveform import to_measurement
+from rislam_rt.measurement.waveform_receiver import to_measurement
 from rislam_rt.model import Paths, RadioConfig, RxArray, Trajectory
 from rislam_rt.scene import load_scene
 

@@ -1,4 +1,5 @@
-"""Sionna's own `PathSolver` on an exported scene file against image sources: the round trip of a room."""
+"""Comparison of Sionna's own `PathSolver` on an exported scene file with the image-source channel: a room's round
+trip."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,12 +18,12 @@ from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 
 SAMPLES = 100_000
-"""Enough for rooms of a few dozen faces; a hall of 186 walls takes a million."""
+"""Rays shot from each device: enough for rooms of a few dozen faces; a hall of 186 walls takes a million."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoundTrip:
-    """What Sionna found in a file, beside image sources in the scene of it."""
+    """Comparison of the paths that Sionna finds in a scene file with the image-source paths of the same scene."""
 
     report: PathReport
     allowed: Floats
@@ -30,7 +31,7 @@ class RoundTrip:
 
     @property
     def passed(self) -> bool:
-        """Every one-sided path explained; lengths, directions, gains and phases as near as float32 leaves them."""
+        """Whether every one-sided path is explained, and lengths, directions and gains agree as float32 allows."""
         report, names = self.report, ("length [m]", "departure [rad]", "arrival [rad]")
         judged = [error <= limit for name, (error, limit) in report.judged.items() if name in names]
         return not report.unexplained and bool(np.all(judged) and (report.gain_error <= self.allowed).all())
@@ -39,10 +40,11 @@ class RoundTrip:
 def compare_with_path_solver(
     file: str | Path, scene: Scene, radio: RadioConfig, trajectory: Trajectory, depth: int, samples: int = SAMPLES
 ) -> RoundTrip:
-    """Every path that Sionna's `PathSolver` finds in a scene file, against image sources in `scene`, one by one.
+    """Compare the paths that Sionna's `PathSolver` finds in a scene file with the image-source paths of `scene`, one by
+    one.
 
-    `samples` rays are shot from each device: candidates are found by luck, more rays find more of them. The panel is
-    left out, and so are scatterers that cast a shadow: a shade hides its own centre from Sionna.
+    `samples` rays are shot from each device: candidates are found at random, more rays find more of them. The panel is
+    left out, and so are scatterers with an occluding mesh: it hides its own centre from Sionna.
     """
     alone = tuple(s for s in scene.scatterers if s.shade is None)
     hiding = tuple(replace(s.shade, name=s.name) for s in scene.scatterers if s.shade is not None)
@@ -54,7 +56,7 @@ def compare_with_path_solver(
 
 
 def vertex_errors(exact: Paths, report: PathReport, scene: Scene, radio: RadioConfig, trajectory: Trajectory) -> Floats:
-    """(M,) what bounce points moved by float32 and by the rays' offsets do to the reflections on matched paths.
+    """Gain error (M,) of matched paths that follows from the float32 rounding of Sionna's bounce points.
 
     Sionna evaluates its materials along the segments between its own bounce points. Those lie up to
     `RAY_OFFSET (1 m + E + L)` off, E being the largest coordinate in the file: so a segment is turned by that over its
@@ -73,7 +75,8 @@ def vertex_errors(exact: Paths, report: PathReport, scene: Scene, radio: RadioCo
 
 
 def _turned(points: Floats, met: list[int], walls: Walls, radio: RadioConfig, extent: float) -> float:
-    """Sum over the bounces of a path through `points` (V + 2, 3), on the walls `met` (-1 for a landmark)."""
+    """Relative gain error of a path through `points` (V + 2, 3) [m] whose segments are turned at each bounce on the
+    walls `met` (-1 for a landmark)."""
     along = np.diff(points, axis=0)
     length = np.linalg.norm(along, axis=1)
     off = RAY_OFFSET * (1.0 + extent + length.sum())

@@ -1,4 +1,4 @@
-"""Sionna's own `PathSolver` on a scene file, its paths under this package's identities.
+"""Paths that Sionna's own `PathSolver` finds in a scene file, under this package's path identities.
 
 `TracedChannel` gives Sionna's image method the candidates that it should look at, and meshes that it built in memory.
 Here nothing of that is used: Sionna loads the file, shoots its rays, and says which primitives of which objects it met.
@@ -23,13 +23,13 @@ from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
 
 
 class SolverLeg(NamedTuple):
-    """One leg of one cycle as Sionna has it."""
+    """One specular leg of one cycle as Sionna's `PathSolver` reports it."""
 
     cycle: int
     walls: tuple[int, ...]
     tau: float
     field: complex
-    """Without carrier phase."""
+    """Complex amplitude without carrier phase."""
     vertices: Floats
     """(D, 3) [m]."""
 
@@ -76,7 +76,7 @@ def solve_file(
 
 
 def _load(file: Path, scene: Scene, radio: RadioConfig) -> tuple[Any, dict[int, int]]:
-    """Sionna's scene, and the number of the first triangle of each reflector by its object's number."""
+    """Load a scene file in Sionna; also the number of each reflector's first triangle, by the number of its object."""
     import sionna.rt as rt
 
     tracer_scene = rt.load_scene(str(file), merge_shapes=False)
@@ -96,6 +96,7 @@ def _load(file: Path, scene: Scene, radio: RadioConfig) -> tuple[Any, dict[int, 
 
 
 def _receiver(name: str, point: Floats) -> Any:
+    """Sionna receiver at a point (3,) [m]."""
     import sionna.rt as rt
 
     return rt.Receiver(name, point.tolist())
@@ -104,7 +105,7 @@ def _receiver(name: str, point: Floats) -> Any:
 def _solve(
     tracer_scene: Any, cycle: int, depth: int, samples: int, number_of: dict[int, int], walls: Walls
 ) -> list[tuple[int, SolverLeg]]:
-    """(far end, leg) of all that Sionna's own path solver finds from one place of a device."""
+    """Pairs (far end, leg) of all paths that Sionna's own path solver finds from one position of a device."""
     import sionna.rt as rt
 
     paths = rt.PathSolver(deterministic=True)(
@@ -130,7 +131,7 @@ def _solve(
 
 
 def _legs(rows: list[SolverLeg], device: Floats, far: Floats, depth: int, radio: RadioConfig) -> SpecularLegs:
-    """Legs (K, S) of all that the path solver found; of two with one identity in one cycle the first."""
+    """Arrange the path solver's legs by cycle and wall sequence (K, S); of two alike in one cycle the first counts."""
     first = {(row.cycle, row.walls): row for row in reversed(rows)}
     columns = sorted({walls for _, walls in first}, key=lambda walls: (len(walls), walls))
     table = np.full((len(columns), depth), -1)

@@ -1,1 +1,2 @@
-"""What a run in a room will hear, before it is run: link budget, what would help, the panel's coverage, the cost."""
+"""Forecast of a run in a room before it is run: link budget of each landmark, remedies for those not detected, the RIS
+panel's coverage, and the cost of tracing."""

@@ -1,4 +1,5 @@
-"""The adviser's whole word on a room: links, what would help, and what a trace costs."""
+"""Advice on a room before a run: link budgets of its landmarks, remedies for those not detected, and the cost of
+tracing."""
 
 from typing import Any, NamedTuple
 
@@ -12,16 +13,17 @@ from rislam_rt.pipeline.specification.spec import Settings
 
 
 class Advice(NamedTuple):
-    """What is to be expected of a run in a room, with the radio and receiver of `settings`."""
+    """Advice on a room, with the radio and receiver of its settings: link budgets, remedies, and costs of tracing."""
 
     links: list[LandmarkLink]
     remedies: list[str]
+    """Lines that say what would help."""
     costs: list[TraceCost]
     threshold_db: float
-    """Of detection: SNR over all antennas."""
+    """Detection threshold [dB] of the SNR over all antennas."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Advice for a machine to read; None stands for no path."""
+        """Advice on a room as tables for JSON; a margin of None stands for no path."""
         links = []
         for link in self.links:
             places = [
@@ -40,7 +42,8 @@ class Advice(NamedTuple):
 
 
 def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator) -> Advice:
-    """Advice on a room that passes the check. `rng` draws the random codes that a panel is tried under."""
+    """Forecast what a run would detect in a room that passes the scene check, what would help, and what tracing costs.
+    `rng` draws the random codes that a RIS panel is tried under."""
     looked = survey(scene, settings)
     links = link_budget(looked, rng=rng)
     threshold = 10.0 * float(np.log10(settings.sensor.threshold))
@@ -48,4 +51,5 @@ def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator) -> Adv
 
 
 def _finite(margin: float) -> float | None:
+    """Margin of a link budget [dB] as a number, None where it stands for no path."""
     return float(margin) if margin > NOTHING_DB else None

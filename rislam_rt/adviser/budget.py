@@ -1,4 +1,5 @@
-"""Link budget: how strong each landmark comes in along the way, how often it will be heard, and why not."""
+"""Link budget of each landmark along the agent's trajectory: SNR over the detection threshold, detection probability,
+and why it is not detected."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,53 +15,57 @@ from rislam_rt.model import Paths, Scene
 from rislam_rt.pipeline.specification.spec import Settings
 
 PLACES = 15
-"""Places along the way, evenly; the first, the middle and the last are the budget's three columns."""
+"""Number of positions along the trajectory at which the link budget is worked out, spread evenly; the first, the middle
+and the last are its three columns."""
 DEPTHS = ((500, 2), (2000, 1))
-"""Up to so many triangles, paths of so many wall bounces are looked at, and of more triangles the straight ones alone:
-the check is to take seconds. More bounces are seldom the strongest; they cover weaker paths."""
+"""Most triangles of a room, and the wall bounces that its link budget then counts; with more triangles direct paths
+alone: the check is to take seconds. More bounces are seldom the strongest; they cover weaker paths."""
 NOTHING_DB = -400.0
-"""SNR over the threshold [dB] where there is no path."""
+"""Margin [dB] over the detection threshold that stands for no path."""
 
 
 class LandmarkLink(NamedTuple):
-    """One landmark under one kind of codes, at K places."""
+    """Link budget of one landmark under one kind of RIS codes, at K positions along the trajectory."""
 
     landmark: str
+    """Name of the scatterer or RIS panel."""
     code: str
-    """`aimed`, `swept` or `random` for a panel, empty for a scatterer."""
+    """Kind of codes of a RIS panel, `aimed`, `swept` or `random`; empty for a scatterer."""
     margin_db: Floats
-    """(K,) SNR of the strongest path over the detection threshold; of swept codes, that of the best beam, of random
-    ones, the mean power's."""
+    """(K,) SNR of the landmark's strongest path over the detection threshold; of swept codes that of the best beam, of
+    random ones that of the mean power."""
     probability: Floats
-    """(K,) that the receiver reports at least one component of it."""
+    """(K,) probability that the receiver reports at least one component of the landmark."""
     reason: tuple[str, ...]
-    """(K,) why it is not heard there; empty where it is."""
+    """(K,) why the landmark is not detected there; empty where it is."""
 
     @property
     def share(self) -> float:
-        """Share of the way on which a landmark's link is heard, by its budget."""
+        """Share of the trajectory on which a landmark is detected: the mean detection probability of its link
+        budget."""
         return float(np.mean(self.probability))
 
     @property
     def three(self) -> tuple[int, int, int]:
-        """Start, middle and end among the places of a link budget."""
+        """Indices of the first, the middle and the last position of a link budget."""
         last = len(self.margin_db) - 1
         return 0, last // 2, last
 
 
 class Survey(NamedTuple):
-    """The paths of a room at places along the way."""
+    """Propagation paths of a room at positions along the trajectory, from which its link budget is worked out."""
 
     scene: Scene
-    """With the places for its trajectory."""
+    """The room, its trajectory cut to those positions."""
     paths: Paths
     settings: Settings
     depth: int
-    """Wall bounces of the paths that were looked for."""
+    """Most wall bounces of these paths."""
 
 
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
-    """Paths for the link budget at places along the way, by exact image sources."""
+    """Find the propagation paths at `places` positions along a scene's trajectory by exact image sources, for its link
+    budget."""
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
     scene = replace(scene, agent=scene.agent[rows])
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
@@ -69,7 +74,8 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
 
 
 def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:
-    """A link for each scatterer, and one for each kind of codes of each panel. `rng` draws the random codes."""
+    """Link budgets of a room: one for each scatterer, and one for each RIS panel and kind of codes. `rng` draws the
+    random codes."""
     scene, paths, settings = looked.scene, looked.paths, looked.settings
     reasons = build_reasons(scene, paths, settings)
     if scene.ris is None:
@@ -87,6 +93,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
 
 
 def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
+    """Detection forecast of all landmarks under one RIS code, at each position of the link budget."""
     heading = looked.scene.agent.heading
     return [
         forecast_detection(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)
@@ -94,7 +101,8 @@ def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
 
 
 def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:
-    """Link budget over C codes: mean of the chance, and of the power, but of swept codes the best beam's."""
+    """Link budget of one landmark from forecasts under C RIS codes: the mean of their detection probabilities, and of
+    their SNRs, but of swept codes the best beam's SNR."""
     snr = np.array([[place.snr[number] for place in places] for places in heard])
     chance = np.array([[place.probability[number] for place in places] for places in heard]).mean(axis=0)
     level = snr.max(axis=0) if code == "swept" else snr.mean(axis=0)

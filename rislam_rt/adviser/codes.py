@@ -1,4 +1,4 @@
-"""The codes that a panel is judged under: aimed at the agent, swept in search of it, and random."""
+"""RIS codes under which the adviser forecasts detection: aimed at the agent, swept in search of it, and random."""
 
 from typing import NamedTuple
 
@@ -13,20 +13,23 @@ from rislam_rt.model.ris import DataSheet, join_codes
 from rislam_rt.ris import rephase
 
 RANDOM_CODES = 16
-"""Random codes over which hearing is averaged: a share of one half is known to an eighth, at each place anew."""
+"""Number of random RIS codes over which detection is averaged: a share of one half is known to an eighth, at each
+position anew."""
 
 
 class Codes(NamedTuple):
-    """C codes a place, all worth the same."""
+    """C equally likely RIS codes for each of K positions along the trajectory."""
 
     name: str
+    """Kind of the codes: `aimed`, `swept` or `random`."""
     levels: Integers
-    """(C, K, N, M)."""
+    """(C, K, N, M) phase levels of the panel's elements."""
 
 
 def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.random.Generator) -> list[Codes]:
-    """`aimed`: for each panel the best code for its strongest path at each of the K places; `swept`: the beams of the
-    search for a panel that is not known yet, in turn, all panels at once; `random`."""
+    """RIS codes to forecast detection with, at K cycles of a room's paths: `aimed`, for each panel the best code for
+    its strongest path; `swept`, the beams of the search for a panel that is not known yet, in turn, all panels at once;
+    `random`."""
     count = paths.num_cycles
     beams = [sweep_codes(panel, radio.wavelength) for panel in spec.panels]
     turns = np.arange(max(map(len, beams)))
@@ -40,7 +43,8 @@ def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.rando
 
 
 def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
-    """(K, N, M) levels of the advice's aimed code: of each panel the path, heard by the array, that gets strongest."""
+    """Phase levels (K, N, M) of the RIS code that is best for one path over each panel: among those that the array
+    receives, the one that it makes strongest."""
     assert paths.ris is not None
     index = np.zeros((paths.num_cycles, spec.num_elements), dtype=np.int64)
     best = np.zeros((len(spec.panels), paths.num_cycles))
@@ -58,10 +62,10 @@ def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
 
 
 def aimed_paths(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Paths:
-    """Paths of a room with the panels' codes aimed at the agent."""
+    """Propagation paths of a room with their gains under RIS codes aimed at the agent."""
     return paths_under_codes(paths, spec, aimed_codes(paths, spec, radio))
 
 
 def paths_under_codes(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
-    """Paths of a room under a panel's codes, levels (K, N, M)."""
+    """Propagation paths of a room with their gains under RIS codes of phase levels (K, N, M)."""
     return rephase(paths, RisCode(index, spec.levels))

@@ -1,4 +1,5 @@
-"""What tracing a room will cost: wall sequences, paths, and seconds at measured rates, at one to three bounces."""
+"""Forecast cost of tracing a room: wall sequences, paths, and seconds at measured rates, for one to three wall
+bounces."""
 
 from typing import NamedTuple
 
@@ -9,33 +10,34 @@ from rislam_rt.channel.image_source.sequences import wall_sequences
 from rislam_rt.model import RadioConfig, Scene
 
 DEPTHS = (1, 2, 3)
+"""Numbers of wall bounces for which the cost is forecast."""
 START_SECONDS, PATH_SECONDS, SEQUENCE_SECONDS = 0.15, 1.5e-6, 2.5e-8
-"""Processor time of the traced channel: of any trace, of a path in a cycle, and of a wall sequence that is sieved in a
-cycle. Measured on six rooms that come with the package (600 cycles, one core of a 2026 server):
+"""Processor time [s] of the traced channel: of any trace, of one path in one cycle, and of one wall sequence that is
+tested in one cycle. Measured on six rooms that come with the package (600 cycles, one core of a 2026 server):
 `benchmarks/runs/adviser.py --cost` sets them beside new ones. The tracer's import comes on top, and so does the
 filter."""
 MANY_WALLS = 2000
-"""More walls are not looked at here: the check is to take seconds."""
+"""Most walls of a room whose wall sequences are counted for the cost: the check is to take seconds."""
 COUNTED = 300_000
-"""Up to so many sequences of one leg are looked at here; the tracer takes about as many one by one, and narrows more of
-them down by cones, at a cost that these rates do not tell."""
+"""Most wall sequences of one leg that are counted for the cost; the tracer takes about as many one by one, and narrows
+more of them down by cones, at a cost that these rates do not tell."""
 
 
 class TraceCost(NamedTuple):
-    """A trace of the whole way with up to `depth` wall bounces."""
+    """Forecast cost of tracing the whole trajectory with up to `depth` wall bounces."""
 
     depth: int
     walls: int
     sequences: int
-    """Of all legs, at the middle of the way; an upper limit where there are no seconds."""
+    """Wall sequences of all legs at the middle of the trajectory; an upper limit where there are no seconds."""
     paths: int | None
-    """At the middle of the way; None where they were too many to be looked for."""
+    """Paths at the middle of the trajectory; None where there were too many sequences to find them."""
     seconds: float | None
-    """Processor time, or None likewise."""
+    """Processor time [s], or None likewise."""
 
 
 def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[TraceCost]:
-    """The cost at each of `DEPTHS` in a scene of so many walls."""
+    """Forecast the cost of tracing a scene with a given number of walls, at each of `DEPTHS` wall bounces."""
     middle = scene.agent[len(scene.agent) // 2 :][:1]
     legs = 1 + 2 * len(scene.landmarks)
     costs: list[TraceCost] = []
@@ -45,14 +47,14 @@ def trace_cost(scene: Scene, radio: RadioConfig, walls: int) -> list[TraceCost]:
             costs.append(TraceCost(depth, walls, legs * most, None, None))
             continue
         channel = ImageSourceChannel(scene, radio, depth)
-        asked, paths = _asked(channel, depth), int(channel.paths(middle).valid.sum())
-        seconds = START_SECONDS + len(scene.agent) * (PATH_SECONDS * paths + SEQUENCE_SECONDS * asked)
-        costs.append(TraceCost(depth, walls, asked, paths, seconds))
+        sequences, paths = _count_sequences(channel, depth), int(channel.paths(middle).valid.sum())
+        seconds = START_SECONDS + len(scene.agent) * (PATH_SECONDS * paths + SEQUENCE_SECONDS * sequences)
+        costs.append(TraceCost(depth, walls, sequences, paths, seconds))
     return costs
 
 
 def cost_words(cost: TraceCost) -> str:
-    """Cost of tracing in words: `2 bounces: 173 wall sequences, 172 paths, 0.31 s`."""
+    """Forecast cost of tracing in words: `2 bounces: 173 wall sequences, 172 paths, 0.31 s`."""
     bounces = f"{cost.depth} bounce{'s' if cost.depth > 1 else ''}"
     if cost.seconds is None:
         digits = int(np.ceil(np.log10(max(cost.sequences, 1))))
@@ -60,10 +62,10 @@ def cost_words(cost: TraceCost) -> str:
     return f"{bounces}: {cost.sequences} wall sequences, {cost.paths} paths at a time, {cost.seconds:.2g} s"
 
 
-def _asked(channel: ImageSourceChannel, depth: int) -> int:
-    """Cost of a trace in wall sequences: of all legs at the middle of the way that the walls' sides leave possible,
-    bare legs included."""
-    scene, facets, row = channel.scene, channel.looked.facets, len(channel.scene.agent) // 2
+def _count_sequences(channel: ImageSourceChannel, depth: int) -> int:
+    """Number of wall sequences that tracing has to test: of all legs at the middle of the trajectory, those that the
+    walls' sides leave possible, the empty sequence of each leg included."""
+    scene, facets, row = channel.scene, channel.sequence_search.facets, len(channel.scene.agent) // 2
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]
     for number, point in enumerate(scene.landmark_positions):

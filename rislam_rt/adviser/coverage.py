@@ -1,4 +1,5 @@
-"""Coverage of a panel, where it can be heard: SNR of its direct path under the best code, at the agent's height."""
+"""Coverage of a RIS panel: SNR of its direct path under the best code, at positions all over the plan at the agent's
+height."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,33 +15,35 @@ from rislam_rt.model import PathKind, Scene, Trajectory
 from rislam_rt.pipeline.specification.spec import Settings
 
 POINTS, ELEMENTS = 6000, 2_000_000
-"""Most points of a map, and most of points times elements: a second or two."""
+"""Most positions of a coverage map, and most of positions times RIS elements: a second or two."""
 INSIDE = 1e-3
-"""[m] by which the outermost points lie within the bounds: on a wall nothing is heard."""
+"""[m] by which the outermost positions of a coverage map lie within the bounds: on a wall nothing is received."""
 
 
 class Coverage(NamedTuple):
-    """A map of one panel; Y by X points."""
+    """Coverage map of one RIS panel: margin over the detection threshold at Y by X positions of the plan."""
 
     panel: str
+    """Name of the panel."""
     x: Floats
-    """(X,) [m]."""
+    """(X,) [m] coordinates along x."""
     y: Floats
-    """(Y,) [m]."""
+    """(Y,) [m] coordinates along y."""
     height: float
-    """[m] of the agent: the median over its way."""
+    """Height [m] of the agent: the median over its trajectory."""
     margin_db: Floats
-    """(Y, X) SNR over the detection threshold; not a number where no direct path comes in."""
+    """(Y, X) SNR over the detection threshold [dB]; not a number where no direct path comes in."""
 
     @property
     def heard(self) -> float:
-        """Share of the points with a direct path at which it is heard; zero if there is none."""
+        """Share of a coverage map's positions with a direct path at which its SNR exceeds the detection threshold; zero
+        if there are none."""
         seen = np.isfinite(self.margin_db)
         return float(np.mean(self.margin_db[seen] >= 0.0)) if seen.any() else 0.0
 
 
 def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
-    """Maps of coverage, one for each of a scene's panels."""
+    """Coverage maps of a scene's RIS panels, one for each; none in a room without a panel."""
     if scene.ris is None:
         return []
     low, high = scene.bounds
@@ -61,7 +64,8 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
 
 
 def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """Coverage (panels, N) [dB] of direct paths at points (N, 3), the agent headed along x."""
+    """SNR over the detection threshold (panels, N) [dB] of each RIS panel's direct path under the best code, for agent
+    positions (N, 3) [m], headed along x."""
     assert scene.ris is not None
     count = len(points)
     still = Trajectory(

@@ -1,4 +1,5 @@
-"""Detection at one place: the chance that the receiver reports each landmark, without noise being drawn."""
+"""Forecast of detection at one position of the agent: probability that the receiver reports each landmark, without
+noise being drawn."""
 
 from typing import NamedTuple
 
@@ -6,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.measurement import Received, receive
-from rislam_rt.measurement.bound import NEGLIGIBLE
+from rislam_rt.measurement.bound_receiver import NEGLIGIBLE
 from rislam_rt.measurement.components import NoiselessComponents, merge, select_paths, single
 from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Paths, SensorModel
@@ -14,21 +15,24 @@ from rislam_rt.pipeline.specification.spec import Settings
 
 
 class DetectionForecast(NamedTuple):
-    """L landmarks at one place under one code."""
+    """Forecast of the detection of L landmarks at one position under one RIS code."""
 
     probability: Floats
-    """(L,) that at least one component comes from the landmark."""
+    """(L,) probability that at least one component comes from the landmark."""
     snr: Floats
-    """(L,) of the strongest path on the side that the array hears, linear, over all antennas; 0 without one."""
+    """(L,) SNR of the landmark's strongest path on the side that the array receives, linear, over all antennas; 0
+    without one."""
     covered: Integers
-    """(L,) column of the stronger path that the landmark's strongest one comes out as; -1 if it comes out itself."""
+    """(L,) column of the stronger path in whose component the landmark's strongest one is merged; -1 if it has a
+    component of its own."""
 
 
 def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Settings) -> DetectionForecast:
-    """Forecast of detection: the landmarks of one cycle as the receiver of these settings reports them.
+    """Forecast the detection of all landmarks in one cycle of a room's paths, by the receiver of these settings.
 
-    The same steps as a run's receiver: what the array hears, the two captures of alternated codes, paths that cannot be
-    resolved joined, detection by Marcum's function; errors and false components left out, motion within the slot too.
+    The same steps as a run's receiver: the side that the array receives, the two captures of alternated codes, paths
+    that cannot be resolved joined, detection by Marcum's function; errors and false components left out, motion within
+    the slot too.
     """
     radio, sensor = settings.radio, settings.sensor
     received = receive(paths, cycle, heading, radio, settings.receiver)
@@ -52,8 +56,8 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
 
 
 def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
-    """The strongest path that leads a path's component and so hides it from detection; -1 if it leads one, or is not
-    loud."""
+    """Column of the strongest path in whose component a path that cannot be resolved from it is merged; -1 if the path
+    has a component of its own, or is too weak to matter."""
     row = np.flatnonzero(loud.path == path)
     if path in parts.path or not len(row):
         return -1

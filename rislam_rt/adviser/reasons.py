@@ -1,4 +1,5 @@
-"""Reasons why a landmark is not heard at a place."""
+"""Reasons why a landmark is not detected at a position: occluded, behind the panel, below the array, not resolved, too
+weak, or no path."""
 
 from typing import NamedTuple
 
@@ -11,33 +12,35 @@ from rislam_rt.pipeline.specification.spec import Settings
 from rislam_rt.scene.check.mesh_queries import crossings
 
 WEAK = "too weak"
+"""Reason where a path comes in that is below the detection threshold."""
 CLEARANCE = 1e-6
 """Share of a line of sight left out at the landmark's end, where a panel lies on its own wall."""
 
 
 class Reasons(NamedTuple):
-    """A room at K places, to be asked."""
+    """Room with its paths at K positions of the agent and all surfaces that hide, from which reasons for missed
+    detections of landmarks are found."""
 
     scene: Scene
     paths: Paths
     settings: Settings
     triangles: Floats
-    """(T, 3, 3) [m] of all that hides."""
+    """(T, 3, 3) [m] of all reflectors and occluders."""
     owner: tuple[str, ...]
-    """(T,) names."""
+    """(T,) name of the reflector or occluder of each triangle."""
 
     def why(self, number: int, place: int, margin_db: float, covered: int) -> str:
-        """The reason, in a few words."""
+        """Reason, in a few words, why a landmark is not detected at a position of the agent; empty if none is found."""
         point, agent = self.scene.landmark_positions[number], self.scene.agent
         panel = self.scene.panel_number(number)
         front = self.scene.panels[panel] if panel >= 0 else None
         if front is not None and (agent.position[place] - front.center) @ front.spec.normal <= 0.0:
             return "the agent is behind the panel"
-        hider = self._hider(point, place, number)
+        blocker = self._blocker(point, place, number)
         weak = margin_db < 0.0
         own = (self.paths.landmark == number) & self.paths.valid[place]
-        if hider and weak:
-            return f"shaded by '{hider}'"
+        if blocker and weak:
+            return f"shaded by '{blocker}'"
         upper = self.settings.radio.array.pattern == "upper"
         if own.any() and upper and (self.paths.arrival[place, own, 2] < -HORIZON_MARGIN).all():
             return "below the array, which hears from above only"
@@ -47,8 +50,9 @@ class Reasons(NamedTuple):
             return "no path"
         return WEAK if weak else ""
 
-    def _hider(self, point: Floats, place: int, number: int) -> str:
-        """Name of what stands in the straight way between a landmark and either end; empty if nothing does."""
+    def _blocker(self, point: Floats, place: int, number: int) -> str:
+        """Name of the reflector or occluder that stands between a landmark and Tx or Rx at one position; empty if none
+        does."""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):
             last = point + CLEARANCE * (end - point)
             _, hit = crossings(end[None], last[None], self.triangles)
@@ -60,7 +64,7 @@ class Reasons(NamedTuple):
 
 
 def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
-    """All that may be a reason for not being heard: walls and occluders that hide."""
+    """Collect a room's walls and occluders, which may hide a landmark, for the reasons why it is not detected."""
     meshes = [(r.name, r.triangles) for r in scene.reflectors]
     meshes += [(shade.name, shade.triangles) for shade in scene.occluders]
     meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
@@ -70,7 +74,8 @@ def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
 
 
 def _occluder_name(scene: Scene, number: int) -> str:
-    """Occluder that is a reason for not being heard; a scatterer's own shade does not hide its centre."""
+    """Name of a scatterer's own occluder, which does not hide the scatterer's centre; empty for landmarks without
+    one."""
     if number < len(scene.scatterers) and scene.scatterers[number].shade is not None:
         return scene.scatterers[number].name
     return ""

@@ -1,4 +1,4 @@
-"""Remedies for a landmark that is not heard: a larger panel or scatterer, less noise, a nearer way."""
+"""Remedies for a landmark that is not detected: a larger panel or scatterer, less noise, a nearer trajectory."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -16,20 +16,23 @@ from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.ris import leg_response
 
 HEARD, SELDOM = 0.5, 0.05
-"""Shares of the way from which on a landmark counts as heard, and up to which as not heard; between, at times."""
+"""Shares of the trajectory from which on a landmark counts as detected, and up to which as not detected; between, at
+times."""
 LARGEST = 128
-"""Elements a side of the largest panel that is proposed."""
+"""Elements along a side of the largest RIS panel that is proposed."""
 GROWTH = 1.05
-"""From one size tried to the next, once the law for a continuous phase has said where to begin."""
+"""Factor from one panel size tried to the next, once the law for a continuous phase has said where to begin."""
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """Label of a link in need of a remedy or not: `heard`, `heard at times` or `not heard`."""
+    """Label of a landmark's link budget by the share of the trajectory on which it is detected: `heard`, `heard at
+    times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 
 def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
-    """One line for each landmark that is not heard on half of the way under the best code, and one on finding it."""
+    """Lines that say what would help: one for each landmark that is not detected on half of the trajectory under the
+    best code, and one for each RIS panel that the beam sweep would hardly find."""
     lines = []
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:
@@ -40,20 +43,20 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
 
 
 def weak_places(link: LandmarkLink) -> Integers:
-    """Places where more SNR is the remedy: a path comes in that is only too weak."""
+    """Indices of a link budget's positions at which more SNR would help: a path comes in that is only too weak."""
     return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
 
 
 def lack_db(link: LandmarkLink) -> float:
-    """SNR [dB] that would be the remedy, at the median of the places where it is all that lacks; 0 if there are
-    none."""
+    """SNR [dB] that a landmark lacks to be detected, at the median of the positions where its path is only too weak; 0
+    if there are none."""
     weak = weak_places(link)
     return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
 
 
 def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisSpec | None:
-    """Remedy by size: the smallest panel, grown alike along both sides, whose direct path under the best code is above
-    the threshold at the median of the places where it is too weak; None if none of up to `LARGEST` elements a side
+    """Smallest RIS panel, grown alike along both sides, whose direct path under the best code is above the detection
+    threshold at the median of the positions where it is too weak; None if none of up to `LARGEST` elements a side
     is."""
     spec, weak = panel.spec, weak_places(link)
     scale = 10.0 ** (lack_db(link) / 40.0) * 0.9  # the amplitude goes with the sides' product
@@ -68,6 +71,8 @@ def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisS
 
 
 def _what_helps(looked: Survey, link: LandmarkLink) -> str:
+    """Text on one landmark that is not detected: the reasons with their remedies, the SNR that it lacks, and what would
+    make up for that."""
     scene, lack = looked.scene, lack_db(link)
     parts = list(_why_where(link))
     if lack:
@@ -81,14 +86,16 @@ def _what_helps(looked: Survey, link: LandmarkLink) -> str:
 
 
 def _why_where(link: LandmarkLink) -> Iterator[str]:
-    """Reasons to remedy, each with the share of the way on which it holds, the commonest first, and the way round
-    it."""
+    """Reasons why a landmark is not detected, the commonest first, each with its share of the trajectory and a
+    remedy."""
     for reason, count in Counter(reason for reason in link.reason if reason).most_common():
         share = f"{reason} on {count / len(link.reason):.0%} of it"
         yield share if reason == WEAK else f"{share} ({_way_round(reason)})"
 
 
 def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
+    """Remedy by size for a landmark that is too weak: the cross-section of a scatterer, or the elements of a RIS panel,
+    that would make up for a lack [dB]."""
     scene = looked.scene
     if link.code == "":
         yield f"or an echo of {10.0 ** (lack / 10.0):.2g} times the cross-section"
@@ -104,7 +111,8 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """Remedy for a panel that an aimed code makes heard, but the sweep hardly ever hits."""
+    """Warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam sweep that looks for
+    it."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:
         yield (
@@ -114,6 +122,7 @@ def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[st
 
 
 def _way_round(why: str) -> str:
+    """Remedy for a reason why a landmark is not detected, other than too weak a path."""
     if "behind the panel" in why:
         return "turn the panel, or lead the way before it"
     if "shaded" in why:
@@ -126,8 +135,8 @@ def _way_round(why: str) -> str:
 
 
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
-    """(K,) margin that tells the remedy: SNR over the threshold [dB] of the direct path under the best code, as if
-    nothing were in its way."""
+    """SNR over the detection threshold (K,) [dB] of the direct path over a RIS panel of a given data sheet under the
+    best code, as if nothing were in its way."""
     radio, agent = looked.settings.radio, looked.scene.agent
     ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
     tx, rx = (

@@ -1,4 +1,4 @@
-"""Cross-section of a scatterer: what it re-radiates from one direction into another, by the law of its scene.
+"""Radar cross-section of a scatterer, from the Tx's direction into the Rx's, by the law that the scene file names.
 
 A conducting sphere by physical optics (pi r^2, the scene's default) or by the exact Mie series, a conducting cylinder
 by physical optics.
@@ -12,11 +12,12 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Scatterer
 
 MAX_SIZE = 3000.0
-"""Largest k r of the series, whose time grows with its square (0.2 s there): from 1000 on it is pi r^2 within 3e-7."""
+"""Largest size parameter k r of a sphere for which the Mie series is summed: its time grows with the square (0.2 s
+there), and from 1000 on the cross-section is pi r^2 within 3e-7."""
 
 
 def cross_section(scatterer: Scatterer, wavelength: float, toward_tx: Floats, toward_rx: Floats) -> Floats:
-    """Cross-section (...,) [m^2] between unit vectors (..., 3) from the scatterer to both ends of the path.
+    """Radar cross-section (...,) [m^2] of a scatterer for a path with unit vectors (..., 3) from it to both ends.
 
     `constant`: the scene's value. `mie`: the exact backscattering of a conducting sphere at the wavelength [m], for
     all directions as in eq. `a2`. `cylinder`: physical optics, direction by direction.
@@ -51,7 +52,8 @@ def sphere_rcs(radius: float, wavelength: float, angle: Floats) -> tuple[Floats,
 
 
 def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes]:
-    """Scattering amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, per cosine (...,).
+    """Mie amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, at cosines (...,) of the scattering
+    angle.
 
     Raises
     ------
@@ -77,7 +79,7 @@ def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes
 
 
 def mie_coefficients(size: float) -> tuple[Complexes, Complexes]:
-    """Coefficients a_n and b_n (N,), n = 1 .. N, of a perfectly conducting sphere of size parameter k r.
+    """Mie coefficients a_n and b_n (N,), n = 1 .. N, of a perfectly conducting sphere of size parameter k r.
 
     With psi and xi the Riccati-Bessel functions, `a_n = psi_n' / xi_n'`, `b_n = psi_n / xi_n`; Wiscombe's number of
     terms.
@@ -93,7 +95,7 @@ def mie_coefficients(size: float) -> tuple[Complexes, Complexes]:
 def cylinder_rcs(
     radius: float, height: float, axis: Floats, wavelength: float, toward_tx: Floats, toward_rx: Floats
 ) -> Floats:
-    """Cross-section (...,) [m^2] of the round side of a finite cylinder; its flat ends are left out.
+    """Radar cross-section (...,) [m^2] of the round side of a finite conducting cylinder; its flat ends are left out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Doppler shifts: what motion does to paths within a cycle."""
+"""Doppler shifts of paths, from the velocities of Tx and Rx on the moving and turning agent."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def doppler_shift(paths: Paths, trajectory: Trajectory, wavelength: float) -> Fl
 
 
 def end_velocities(trajectory: Trajectory) -> tuple[Floats, Floats]:
-    """Velocities (K, 3) [m/s] of Tx and Rx, which make the Doppler shift: the agent's own, and its turning's."""
+    """Velocities (K, 3) [m/s] of Tx and Rx: the agent's velocity plus what its turning adds at their offsets."""
     quarter = rotation_z(trajectory.heading + np.pi / 2.0)
     horizontal = np.array([1.0, 1.0, 0.0])
     turn = turn_rate(trajectory)[:, None]
@@ -32,7 +32,7 @@ def end_velocities(trajectory: Trajectory) -> tuple[Floats, Floats]:
 
 
 def turn_rate(trajectory: Trajectory) -> Floats:
-    """Rate (K,) [rad/s] of the heading for the ends' Doppler, from its differences between cycles."""
+    """Turn rate (K,) [rad/s] of the agent, from differences of its heading between cycles; 0 for a single cycle."""
     if len(trajectory) < 2:
         return np.zeros(len(trajectory))
     return np.gradient(np.unwrap(trajectory.heading), trajectory.time)

@@ -9,15 +9,16 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpecularLegs:
-    """K cycles by S wall sequences, from a device to a far end. Where `valid` is False the rest means nothing.
+    """Specular legs from a device to a landmark, or from Tx to Rx, for K cycles by S wall sequences.
 
-    The gain of a leg is `coefficient * lambda / (4 pi length) * exp(-j 2 pi length / lambda)`.
+    Where `valid` is False the rest means nothing. The gain of a leg is
+    `coefficient * lambda / (4 pi length) * exp(-j 2 pi length / lambda)`.
     """
 
     walls: Integers
-    """(S, D) in the order from device to far end, padded with -1."""
+    """(S, D) wall sequences in the order from device to far end, padded with -1."""
     valid: Booleans
-    """(K, S)."""
+    """(K, S) whether the leg exists."""
     length: Floats
     """(K, S) unfolded length [m]."""
     at_device: Floats
@@ -25,7 +26,8 @@ class SpecularLegs:
     at_far_end: Floats
     """(K, S, 3) unit vector from the far end along the ray, back towards the device."""
     coefficient: Complexes
-    """(K, S) product of the reflection coefficients; antenna gains are not in it."""
+    """(K, S) product of the reflection coefficients and of antenna patterns that are not isotropic; the radio's antenna
+    gains are not in it."""
     vertices: Floats
     """(K, S, D, 3) [m] bounce points in the order from device to far end; the first `num_bounces` count."""
 
@@ -45,11 +47,11 @@ class SpecularLegs:
 
     @property
     def num_bounces(self) -> Integers:
-        """(S,) bounces of specular legs."""
+        """Number (S,) of bounces of each wall sequence."""
         return (self.walls >= 0).sum(axis=1)
 
     def gain(self, wavelength: float) -> Complexes:
-        """(K, S) gain of specular legs, 0 where not valid."""
+        """Complex gain (K, S) of specular legs, carrier phase included, 0 where not valid."""
         length = np.where(self.valid, self.length, 1.0)
         gain = self.coefficient * wavelength / (4.0 * np.pi * length) * np.exp(-2j * np.pi / wavelength * length)
         return np.where(self.valid, gain, 0.0)

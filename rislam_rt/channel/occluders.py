@@ -9,29 +9,29 @@ from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import Scene
 
 ALONE = -2
-"""Landmark of a shade that belongs to no scatterer; -1 is that of a leg without landmark, which is spared nothing."""
+"""Landmark number of an occluder that belongs to no scatterer (-1 stands for a leg without landmark)."""
 
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
 
 _BLOCK = 1_000_000
-"""Segment-triangle pairs looked at in one go."""
+"""Segment-triangle pairs tested at once: bounds the memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Occluders:
-    """S occluders made of T triangles, one after the other."""
+    """Meshes of S occluders, which hide paths and reflect nothing: T triangles, one occluder after the other."""
 
     names: tuple[str, ...]
-    """(S,)."""
+    """(S,) names of the occluders."""
     landmark: Integers
     """(S,) number of the scatterer in the order of `scene.landmarks`, `ALONE` without one."""
     first: Integers
-    """(S + 1,) triangles of shade s are first[s] : first[s + 1]."""
+    """(S + 1,) triangles of occluder s are first[s] : first[s + 1]."""
     triangles: Floats
-    """(T, 3, 3) [m]."""
+    """(T, 3, 3) [m] corners of the triangles."""
     center: Floats
-    """(S, 3) [m] middle of a ball around each shade."""
+    """(S, 3) [m] middle of a ball around each occluder."""
     radius: Floats
     """(S,) [m] of that ball."""
 
@@ -43,7 +43,8 @@ class Occluders:
         return self.triangles[self.first[shade] : self.first[shade + 1]]
 
     def hides(self, start: Floats, end: Floats, spared: int = -1) -> Booleans:
-        """Which segments (N, 3) to (N, 3) pass through a shade; that of the landmark `spared` does not count."""
+        """Which segments from `start` to `end` (N, 3) [m] an occluder hides; that of the landmark `spared` does not
+        count."""
         hidden = np.zeros(len(start), dtype=np.bool_)
         for shade in np.flatnonzero(self.landmark != spared):
             near = _distance_to_segments(self.center[shade], start, end) <= self.radius[shade]
@@ -55,9 +56,9 @@ class Occluders:
         return hidden
 
     def margin(self, start: Floats, end: Floats, shade: int) -> float:
-        """Distance [m] of a segment (3,) to (3,) from the outline that it sees of a shade, negative if it is hidden.
+        """Distance [m] of a segment (3,) to (3,) from an occluder's silhouette, negative if the occluder hides it.
 
-        The outline: edges of one triangle alone, and of two of which one faces the segment's start, the other does not.
+        The silhouette: edges of one triangle alone, and of two of which only one faces the segment's start.
         """
         middle = self.center[shade]
         triangles, start, end = self.of(shade) - middle, start - middle, end - middle
@@ -66,7 +67,7 @@ class Occluders:
 
 
 def build_occluders(scene: Scene) -> Occluders:
-    """Collect the occluders of a scene's scatterers, and those that stand alone."""
+    """Collect the occluding meshes of a scene's scatterers, and those that stand alone."""
     owners = [n for n, scatterer in enumerate(scene.scatterers) if scatterer.shade is not None]
     meshes = [s.shade.triangles for s in scene.scatterers if s.shade is not None]
     names = [scene.scatterers[n].name for n in owners] + [shade.name for shade in scene.occluders]
@@ -106,7 +107,7 @@ def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
 
 
 def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
-    """Distance (N,) [m] of one point (3,) from an occluder's outline, segments (N, 3)."""
+    """Distance (N,) [m] of one point (3,) from segments `start` to `end` (N, 3)."""
     along = end - start
     square = np.einsum("ni,ni->n", along, along)
     fraction = np.einsum("ni,ni->n", point - start, along) / np.where(square > 0.0, square, 1.0)
@@ -114,7 +115,8 @@ def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _outline(triangles: Floats, direction: Floats) -> Floats:
-    """Edges (E, 2, 3) [m] between faces turned towards a direction and faces turned away, and edges of one face."""
+    """Silhouette edges (E, 2, 3) [m] of triangles (T, 3, 3) seen along a direction: between front and back faces, and
+    edges of one triangle alone."""
     normal, _ = triangle_planes(triangles)
     ahead = np.repeat(normal @ direction > 0.0, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)

@@ -1,5 +1,5 @@
-"""Legs composed to paths: LOS and VT are single legs; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at a
-landmark."""
+"""Composition of paths from specular legs: LOS and VT are one leg; PS, VS, RIS and VRIS join a Tx leg and an Rx leg at
+a landmark."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,7 +25,8 @@ def compose_paths(
     rx_legs: Sequence[SpecularLegs],
     source: str,
 ) -> Paths:
-    """Compose legs to all paths of up to `depth` wall bounces; identities that no cycle has are left out.
+    """Compose specular legs into all paths of up to `depth` wall bounces, with gains; identities that no cycle has are
+    left out.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ _PER_PATH = ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices", "tx_leg
 
 
 def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[str, Any]:
-    """LOS and VT columns of the composed paths."""
+    """Fields of `Paths` for LOS and wall returns (VT), from the legs between Tx and Rx."""
     keep = np.flatnonzero(direct.num_bounces <= depth)
     bounces = direct.num_bounces[keep]
     paths = len(keep)
@@ -108,7 +109,8 @@ def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[
 def _join_block(
     tx: SpecularLegs, rx: SpecularLegs, point: Floats, landmark: int, is_ris: bool, depth: int
 ) -> dict[str, Any]:
-    """Composed columns of one landmark: every Tx leg with every Rx leg, up to `depth` bounces together."""
+    """Fields of `Paths` over one landmark: every Tx leg with every Rx leg, up to `depth` bounces together; for a
+    scatterer or panel the gain is still 0."""
     i, j = np.nonzero(tx.num_bounces[:, None] + rx.num_bounces[None, :] <= depth)
     ever = np.logical_or.reduce(tx.valid)[i] & np.logical_or.reduce(rx.valid)[j]
     i, j = i[ever], j[ever]
@@ -134,7 +136,8 @@ def _join_block(
 def _panel_responses(
     scene: Scene, radio: RadioConfig, number: int, tx: SpecularLegs, rx: SpecularLegs
 ) -> tuple[Complexes, Complexes]:
-    """Element responses (K, I, N, M) and (K, J, N, M) of a composed path's legs to a panel, from mirrored devices."""
+    """Responses (K, I, N, M) and (K, J, N, M) of a panel's elements to its Tx legs and its Rx legs, from the devices'
+    mirror images."""
     assert scene.ris is not None
     spec, center = scene.panels[number].spec, scene.panels[number].center
     responses = []
@@ -149,26 +152,27 @@ def _panel_responses(
 
 
 def _padded(walls: Integers, depth: int) -> Integers:
-    """Wall sequences of composed paths brought to exactly `depth` columns."""
+    """Pad or cut wall sequences (P, d) to exactly `depth` columns."""
     fill = np.full((len(walls), max(depth - walls.shape[1], 0)), -1)
     return np.concatenate([walls, fill], axis=1)[:, :depth]
 
 
 def _padded_vertices(vertices: Floats, count: int) -> Floats:
-    """Vertices (K, S, D, 3) of composed paths brought to exactly `count` points."""
+    """Pad or cut vertices (K, S, D, 3) of paths to exactly `count` points."""
     cycles, paths, depth, _ = vertices.shape
     fill = np.zeros((cycles, paths, max(count - depth, 0), 3))
     return np.concatenate([vertices, fill], axis=2)[:, :, :count]
 
 
 def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
-    """Wall sequences of composed paths: each row's first `bounces` entries in reverse order."""
+    """Reverse the first `bounces` (S,) entries of each wall sequence (S, d); the padding of -1 stays behind."""
     index = bounces[:, None] - 1 - np.arange(walls.shape[1])
     return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
 
 
 def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
-    """Composed path's points (K, P, count, 3) in the order of travel: Tx bounces, landmark, Rx bounces."""
+    """Vertices (K, P, count, 3) [m] of paths over a landmark, in the order of travel: Tx bounces, landmark, Rx
+    bounces."""
     vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
     for path, (a, b) in enumerate(zip(i, j, strict=True)):
         first, last = int(tx.num_bounces[a]), int(rx.num_bounces[b])

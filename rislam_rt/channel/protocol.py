@@ -1,4 +1,4 @@
-"""The protocol of a channel: what every one offers."""
+"""Protocol of a channel: paths of a room over a trajectory, and their gains under any panel code."""
 
 from typing import Protocol
 
@@ -6,16 +6,17 @@ from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 
 
 class Channel(Protocol):
-    """All paths of a room over a trajectory. `TracedChannel` and `ImageSourceChannel` are drop-in for each other."""
+    """Protocol for all propagation paths of a room: `TracedChannel` and `ImageSourceChannel` are drop-in for each
+    other."""
 
     @property
     def scene(self) -> Scene:
-        """The room of a channel."""
+        """The room whose paths the channel computes."""
         ...
 
     @property
     def radio(self) -> RadioConfig:
-        """The agent's radio in a channel."""
+        """The agent's radio, which decides carrier and antenna gains."""
         ...
 
     @property
@@ -24,9 +25,9 @@ class Channel(Protocol):
         ...
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """What every channel gives: every path of every cycle, with the panel at level 0."""
+        """Propagation paths of every cycle of a trajectory, with the panel's code at level 0."""
         ...
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """What every channel gives: the same paths under another code, without tracing again."""
+        """The same paths with their gains under another panel code, without tracing again."""
         ...

@@ -15,7 +15,7 @@ from rislam_rt.model import Material, RisPanel, Scene
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Walls:
-    """W walls made of T triangles."""
+    """Walls of a scene: W planes made of T triangles, with materials, coplanar overlaps and the panels' host walls."""
 
     names: tuple[str, ...]
     """(W,) `reflector`, or `reflector#facet` where the reflector has several planes."""
@@ -24,11 +24,11 @@ class Walls:
     offset: Floats
     """(W,) [m]: `normal . x = offset`."""
     material: tuple[Material, ...]
-    """(W,)."""
+    """(W,) material of each wall."""
     triangles: Floats
     """(T, 3, 3) [m], reflector by reflector in the order of their faces."""
     wall_of_triangle: Integers
-    """(T,)."""
+    """(T,) number of the wall that each triangle belongs to."""
     plane: Integers
     """(W,) the wall whose plane each shares: its own number, unless it lies on another or another on it."""
     over: tuple[Integers, ...]
@@ -36,17 +36,17 @@ class Walls:
     hosts: tuple[int, ...]
     """The wall behind each panel, -1 where there is none."""
     occluders: Occluders
-    """What hides but is no wall: it never reflects."""
+    """Meshes that hide paths and reflect nothing."""
 
     def __len__(self) -> int:
         return len(self.names)
 
     def beside(self, wall: int) -> Booleans:
-        """(W,) which walls share a wall's plane by lying on each other; none for -1."""
+        """Which walls (W,) share a wall's plane by lying on each other, itself among them; none for -1."""
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
 
     def surface(self, wall: int) -> tuple[Floats, Floats]:
-        """Centroid (3,) of a wall and the share (T,) of each of its triangles in its area."""
+        """Centroid (3,) [m] of a wall, and the share (t,) of each of its triangles in its area."""
         triangles = self.triangles[self.wall_of_triangle == wall]
         edges = triangles[:, 1:] - triangles[:, :1]
         area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
@@ -88,12 +88,13 @@ def build_walls(scene: Scene) -> Walls:
 
 
 def _names(reflector: str, count: int) -> list[str]:
-    """Names of the walls of one reflector."""
+    """Names of the `count` walls of one reflector: its own, or `reflector#facet` where it has several planes."""
     return [reflector] if count == 1 else [f"{reflector}#{facet}" for facet in range(count)]
 
 
 def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """The wall behind a panel, of walls whose `reflector` (W,) is given."""
+    """Number of the wall behind a panel, -1 without one: the nearest plane of its host reflector, `reflector` (W,)
+    being each wall's."""
     names = [r.name for r in scene.reflectors]
     if panel.host not in names:
         return -1

@@ -7,6 +7,7 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, settings_of, write_json
 from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.spelling import counted
 
 if TYPE_CHECKING:
     from rislam_rt.pipeline.specification.spec import Settings as Records
@@ -62,7 +63,7 @@ def command(
     if not errors:
         content["advice"] = _advise(Path(scene), settings, picture)
     write_json(json, content)
-    typer.echo(f"{scene}: {errors} errors, {warnings} warnings")
+    typer.echo(f"{scene}: {counted(errors, 'error')}, {counted(warnings, 'warning')}")
     if errors:
         raise typer.Exit(2)
 

@@ -1,10 +1,12 @@
 """`rislam-rt config [PIPELINE]`."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings, write_json
+from rislam_rt.shipped import name_from_here, room_beside
 
 if TYPE_CHECKING:
     from rislam_rt.pipeline.specification.settings import Setting
@@ -34,12 +36,13 @@ def command(
         settings = [find(settings, explain)]
         _print_one(settings[0], _value(spec, settings[0].key))
     else:
-        _print_file(settings, spec)
+        _print_file(settings, spec, pipeline.parent)
     write_json(json, {one.key: one._asdict() | {"value": _plain(_value(spec, one.key))} for one in settings})
 
 
-def _print_file(settings: "list[Setting]", spec: Any) -> None:
-    """Print all settings of `config` as TOML, each under one line on its meaning; those without a value as comments."""
+def _print_file(settings: "list[Setting]", spec: Any, folder: Path) -> None:
+    """Print all settings of `config` as TOML, each under one line on its meaning; those without a value as comments.
+    Rooms are named as a file in the working folder names them, for that is where the output is put."""
     from rislam_rt.toml import toml_value
 
     table = ""
@@ -48,7 +51,7 @@ def _print_file(settings: "list[Setting]", spec: Any) -> None:
         if head != table:
             typer.echo(f"\n[{head}]")
             table = head
-        value = _plain(_value(spec, one.key))
+        value = _from_here(_plain(_value(spec, one.key)), folder, one.key)
         typer.echo(f"# {_facts(one)}")
         typer.echo(f"# {name} =" if value is None else f"{name} = {toml_value(value)}")
 
@@ -71,6 +74,16 @@ def _value(spec: Any, key: str) -> Any:
     for part in key.split("."):
         spec = getattr(spec, part)
     return spec
+
+
+def _from_here(value: Any, folder: Path, key: str = "") -> Any:
+    """A value for `config`, with the scene folders in it, which are relative to `folder`, as seen from here."""
+    if isinstance(value, list):
+        return [_from_here(item, folder, key) for item in value]
+    if isinstance(value, dict):
+        return {name: _from_here(item, folder, name) for name, item in value.items()}
+    named = key in ("scene", "scenes") and isinstance(value, str)
+    return name_from_here(room_beside(folder, value)) if named else value
 
 
 def _plain(value: Any) -> Any:

@@ -11,7 +11,7 @@ from rislam_rt.cli.output_files import OUTPUT
 
 def command(
     scene: SceneFolder,
-    at: Annotated[str, typer.Option(metavar="X,Y,Z", help="The agent's midpoint [m].", show_default=False)],
+    at: Annotated[str, typer.Option(metavar="X,Y,Z", help="The agent's midpoint, in metres.", show_default=False)],
     depth: Depth = 2,
     channel: ChannelName = "image_source",
     seed: Seed = 7,

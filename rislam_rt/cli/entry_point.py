@@ -58,7 +58,8 @@ def _run(heard: list[int]) -> int:
             if heard and not isinstance(error, Interrupted):  # what was being imported took it for a fault of its own
                 return _say("interrupted", EXIT_CODE)
             raise
-        return _say(f"error: {error.format_message().rstrip('.')}; see rislam-rt --help", 2)
+        command = getattr(getattr(error, "ctx", None), "command_path", "rislam-rt")
+        return _say(f"error: {error.format_message().rstrip('.')}; see {command} --help", 2)
     if code == EXIT_CODE:  # an interrupt that no command has answered
         return _say("interrupted", EXIT_CODE)
     return code if isinstance(code, int) else 0

@@ -30,18 +30,18 @@ def command(
         ),
     ] = None,
     within: Annotated[
-        str, typer.Option(metavar="X0,Y0,X1,Y1", help="Of an XML scene: this window of the plan alone [m].")
+        str, typer.Option(metavar="X0,Y0,X1,Y1", help="Of an XML scene: this window of the plan alone, in metres.")
     ] = "",
     floorplan: Annotated[
-        str | None, typer.Option(metavar="CORNERS", help='One room by its corners [m], e.g. "0,0 4,0 4,3 0,3".')
+        str | None, typer.Option(metavar="CORNERS", help='One room by its corners in metres, e.g. "0,0 4,0 4,3 0,3".')
     ] = None,
-    height: Annotated[float, typer.Option(min=1.0, max=100.0, help="Of a floor plan's rooms [m].")] = 2.7,
+    height: Annotated[float, typer.Option(min=1.0, max=100.0, help="Of a floor plan's rooms, in metres.")] = 2.7,
     units: Annotated[
         Literal["mm", "cm", "m", "in"] | None, typer.Option(help="What a unit of the file is; metres without it.")
     ] = None,
     up: Annotated[Literal["y", "z"] | None, typer.Option(help="Axis that points up; y for glTF, else z.")] = None,
     origin: Annotated[
-        str, typer.Option(metavar="X,Y,Z", help="Point that becomes the room's zero [m], z up.")
+        str, typer.Option(metavar="X,Y,Z", help="Point that becomes the room's zero, in metres, z up.")
     ] = "0,0,0",
     material: Annotated[
         list[str] | None,
@@ -59,7 +59,7 @@ def command(
     scan: Annotated[
         bool | None, typer.Option("--scan/--no-scan", help="The mesh is a scan, with noise; as it looks without it.")
     ] = None,
-    fill: Annotated[float, typer.Option(min=0.0, help="Holes of a scan up to this are filled [m^2].")] = 1.0,
+    fill: Annotated[float, typer.Option(min=0.0, help="Holes of a scan up to so many m² are filled.")] = 1.0,
     max_walls: Annotated[int, typer.Option(min=4, max=10_000, help="Of a file with more the widest reflect.")] = 150,
 ) -> None:  # fmt: skip
     """Make a scene folder from a built-in room, of a random one, or from a file of another program, to be edited.

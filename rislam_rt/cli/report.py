@@ -7,6 +7,7 @@ import typer
 
 from rislam_rt.cli.options import JsonFile, write_json
 from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
     from rislam_rt.model import SlamResult
@@ -46,6 +47,8 @@ def command(
     if gif is not None:
         typer.echo(f"moving picture: {_write_gif(result, gif)}")
     print_summary(summary)
+    for line in summary["warnings"]:
+        warn(line)
     with hold_run(run):
         page = write_report(result, summary, run)
     typer.echo(f"report: {page}")

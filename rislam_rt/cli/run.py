@@ -7,6 +7,7 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
 from rislam_rt.cli.verbosity import warn
+from rislam_rt.spelling import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -91,6 +92,8 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
     summary = read_summary(folder, about)
     typer.echo("this run is complete already; nothing was computed")
     print_summary(summary)
+    for line in summary["warnings"]:
+        warn(line)
     page = folder / PAGE
     draw = given.page and not page.is_file()
     if draw or is_left_locked(folder):  # a process died at the report, or is at it
@@ -137,12 +140,14 @@ def compute_run(
             finally:
                 kept = len(store)
             print_summary(summary)
+            for line in summary["warnings"]:
+                warn(line)
             if given.page:
                 from rislam_rt.report import write_report
 
                 typer.echo(f"report: {write_report(result, summary, folder)}")
     except KeyboardInterrupt:
-        said = f"{kept} schemes kept; the same command goes on from there" if kept else "nothing was kept"
+        said = f"{counted(kept, 'scheme')} kept; the same command goes on from there" if kept else "nothing was kept"
         raise Interrupted(f"interrupted: {said}") from None
     typer.echo(f"run folder: {folder}")
     write_json(given.json, summary)

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rislam_rt.cli.options import beside, parse_point
+from rislam_rt.cli.options import parse_point
 from rislam_rt.cli.verbosity import warn
+from rislam_rt.shipped import room_beside
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -42,7 +43,7 @@ def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:
 
 
 def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Path) -> Path:
-    """The folder of `--scene`, or the one that the pipeline names, relative to its file.
+    """The folder of `--scene`, or the one that the pipeline names: relative to its file, or a built-in room.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Pa
         return option
     if spec.scene is None:
         raise ConfigError(f"{pipeline}: scene: not given; add it, or give --scene DIR")
-    return beside(pipeline, spec.scene)
+    return room_beside(pipeline.parent, spec.scene)
 
 
 def point_in(scene: "Scene", text: str) -> "Floats":

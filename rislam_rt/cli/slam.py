@@ -25,11 +25,13 @@ def command(
     ] = MAIN_JOB,
     set_: Settings = None,
     start: Annotated[
-        str | None, typer.Option(metavar="X,Y,Z", help="Where the agent starts [m]; a NetCDF file brings its own.")
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Where the agent starts, in m; a NetCDF file brings its own."),
     ] = None,
-    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Its first velocity [m/s].")] = "0,0,0",
+    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Its first velocity, in m/s.")] = "0,0,0",
     tx: Annotated[
-        str | None, typer.Option(metavar="X,Y,Z", help="Tx from the agent's position [m], x forward, y left, z up.")
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Tx from the agent's position in m, x forward, y left, z up."),
     ] = None,
     rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
     truth: Annotated[

@@ -22,6 +22,7 @@ from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, writ
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.terminal_tables import print_validation
 from rislam_rt.scene.file_names import safe_name
+from rislam_rt.shipped import room_beside
 from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
 from rislam_rt.studies.claims import SOURCE, judge, read_results
 from rislam_rt.studies.compare import comparison_table, run_comparison
@@ -49,7 +50,7 @@ def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
     """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
     refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
-    opened = [open_scene(beside(given.pipeline, room.scene), radio) for room in spec.rooms]
+    opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
     record = study_record(spec, scenes)
     files = (f"{COMPARISON}.md", f"{COMPARISON}.json", *([CERTIFICATE] if given.page else []))

@@ -43,7 +43,7 @@ def command(
         bool, typer.Option("--signals", help="Write samples, true paths and estimates: a data set of signals.")
     ] = False,
     cycles: Annotated[int | None, typer.Option(min=1, help="Only the first so many cycles.")] = None,
-    stride: Annotated[int, typer.Option(min=1, help="Of those, every so manieth alone.")] = 1,
+    stride: Annotated[int, typer.Option(min=1, help="Of those, only every one in so many.")] = 1,
     set_: SignalSettings = None,
     out: Annotated[
         Path | None,

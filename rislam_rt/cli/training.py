@@ -2,7 +2,7 @@
 
 import typer
 
-from rislam_rt.cli.options import StudyOptions, beside, write_json
+from rislam_rt.cli.options import StudyOptions, write_json
 from rislam_rt.cli.output_files import study_folder
 from rislam_rt.cli.progress import show_progress
 from rislam_rt.cli.scenes import open_scene
@@ -18,8 +18,10 @@ from rislam_rt.report.studies.classifier import (
     weights_file,
 )
 from rislam_rt.report.style import to_png
+from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.studies.classifier.run import ALL, run_training
+from rislam_rt.studies.classifier.run import ALL, train_and_score
+from rislam_rt.studies.classifier.sets import gather_sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.spec import study_record
 
@@ -35,13 +37,13 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     """Train the classifier of components and score it; weights, page, data and figures."""
     refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
-    scenes = [open_scene(beside(given.pipeline, room.scene), radio).scene for room in spec.rooms]
+    scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)
     files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *(PICTURES if given.page else ()))
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
     with show_progress() as progress:
-        found = run_training(scenes, spec, progress=progress)
+        found = train_and_score(gather_sets(scenes, spec, progress=progress), spec)
     content = {**record, **classifier_table(found)}
     contents = {
         f"{PAGE}.md": classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),

@@ -1,13 +1,12 @@
-"""Floor 5: which code to set the panel to. Designers, their bound, and the problem as the agent believes it."""
+"""Floor 5: design of the RIS panel's phase code. Designers, bounds, and the design problem on the agent's belief."""
 
 from rislam_rt.design.belief import design_code, problem_from_belief
 from rislam_rt.design.designers import DESIGNERS, designer
-from rislam_rt.design.gain_curves import GainCurves, GainInterval, direct_only, gain_curves
+from rislam_rt.design.gain_curves import GainCurves, direct_only, gain_curves
 from rislam_rt.design.genie import focus_codes, panel_columns, problem_from_paths
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem, problem_from_arrays
-from rislam_rt.design.relaxation import best_magnitudes, relaxation_bound
-from rislam_rt.design.result import Design, DesignConfig, Designer
+from rislam_rt.design.result import Design, DesignConfig
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 
 __all__ = [
@@ -15,11 +14,8 @@ __all__ = [
     "Design",
     "DesignConfig",
     "DesignProblem",
-    "Designer",
     "GainCurves",
-    "GainInterval",
     "Objective",
-    "best_magnitudes",
     "build_objective",
     "continuous_phases",
     "design_code",
@@ -33,5 +29,4 @@ __all__ = [
     "problem_from_arrays",
     "problem_from_belief",
     "problem_from_paths",
-    "relaxation_bound",
 ]

@@ -1,8 +1,9 @@
-"""Codes for a panel that has not been found yet: beams that sweep all directions, and one aimed at a suspect.
+"""Beam sweep: phase codes for a panel that has not been found yet, over all directions or aimed at a panel candidate.
 
-The paper designs for a panel whose place is known to the filter. Until then an agent that hears nothing of it can only
-look: Tx and Rx being one place as the panel sees it, a linear phase over the panel sends what comes from a direction
-back into it. Its two-way phase repeats after `lambda / (2 d)` in a direction cosine, so that N x M beams cover all.
+The paper designs for a panel whose place is known to the filter. Until then an agent that detects nothing of it can
+only search: Tx and Rx being one place as the panel sees it, a linear phase over the panel sends what comes from a
+direction back into it. Its two-way phase repeats after `lambda / (2 d)` in a direction cosine, so that N x M beams
+cover all.
 """
 
 from functools import lru_cache
@@ -15,19 +16,25 @@ from rislam_rt.model import RadioConfig, RisCode, RisSpec, SlamEstimate
 from rislam_rt.ris import leg_response
 
 MAX_BEAMS = 6
-"""Beams along either axis: those of larger panels are widened, or the sweep would take longer than the agent stays."""
+"""Largest number of beams along either axis of the panel: those of larger panels are widened, or the sweep would take
+longer than the agent stays."""
 HOLD = 3
-"""Measurements of a suspect up to which the beam that showed it is held: its place is too coarse to aim at."""
+"""Measurements of a panel candidate up to which the beam that showed it is held: its position is too coarse to aim
+at."""
 LOOK_ROUND = 4
-"""While a suspect is aimed at, one code in so many goes on with the sweep: if it is the panel, it is silent then."""
+"""One code in so many goes on with the sweep while a panel candidate is aimed at: if it is the panel, it is silent
+then."""
 SETTLED = 8
-"""Measurements of a suspect from which on one looks round."""
+"""Measurements of a panel candidate from which on the sweep goes on beside it."""
 
 
 def search_code(
     belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, number: int, last: RisCode | None, panel: int = 0
 ) -> RisCode:
-    """The code that looks for a panel: `last` or aimed at the belief's suspect, else the next beam of the sweep.
+    """Panel code for searching a panel that the map lacks: aimed at the belief's panel candidate, or the sweep's next
+    beam.
+
+    While the candidate has few measurements the code is `last`, under which it was seen.
 
     `number` counts codes; `last` is the one before, None at first; `panel` is which of several panels is sought.
     """
@@ -49,7 +56,8 @@ def search_code(
 
 @lru_cache(maxsize=16)
 def sweep_codes(ris: RisSpec, wavelength: float) -> Integers:
-    """Levels (B, N, M) of the beams of two sweeps, the second between the beams of the first."""
+    """Phase levels (B, N, M) of the beams of two sweeps over all directions, the second between the beams of the
+    first."""
     along_up, along_right = (
         beam_phases(count, spacing, wavelength)
         for count, spacing in ((ris.rows, ris.spacing[1]), (ris.cols, ris.spacing[0]))
@@ -66,7 +74,7 @@ def sweep_codes(ris: RisSpec, wavelength: float) -> Integers:
 
 
 def beam_phases(count: int, spacing: float, wavelength: float) -> Floats:
-    """Phases (2, B, count) [rad] of a row of elements for B beams evenly over all cosines, and for those between.
+    """Phases (2, B, count) [rad] of a row of elements for B beams evenly over all direction cosines, and for B between.
 
     With fewer beams than elements each is widened to its share: the phase is quadratic, so that the direction runs
     over the share from one end of the row to the other.

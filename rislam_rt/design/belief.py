@@ -1,4 +1,5 @@
-"""Design on the belief: the problem as the agent sees it, from its own pose, map and the panel's data sheet."""
+"""Design on the agent's belief: the problem from its estimated pose and map and the panel's data sheet, without
+truth."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -36,7 +37,7 @@ def design_code(
     number: int = 0,
     last: RisCode | None = None,
 ) -> Design:
-    """A code for the next cycle from the belief predicted to it; truth is not looked at.
+    """Design the panel's phase code for the next cycle from the belief predicted to it, without the truth.
 
     Parameters
     ----------
@@ -50,15 +51,14 @@ def design_code(
         SNR over all antennas, linear, at which the receiver detects a path every other time. 0, the paper's objective,
         counts the information of paths that will be missed.
     gradient
-        How a path's length is held to change with the agent: `exact`, or as the paper has it (see `vertex_gradient`).
-
+        Gradient of path lengths by the agent's position: `exact`, or as the paper has it (see `vertex_gradient`).
     number
-        How many codes were asked for before: which beam of the sweep comes next.
+        Number of codes asked for before: which beam of the sweep comes next.
     last
         The code before this one.
 
-    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code one that looks for it. Of several
-    panels those that are known are designed for together, and the others each look for a landmark of their own.
+    If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code one that searches for it. Of
+    several panels those that are known are designed for together, and the others are searched for.
     """
     chosen = designer(method)
     problem = problem_from_belief(
@@ -85,7 +85,8 @@ def problem_from_belief(
     belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
     least_snr: float = 0.0, gradient: GradientMode = "exact",
 ) -> DesignProblem | None:  # fmt: skip
-    """The design problem of a belief: that of the elements of the panels which its map holds; None if it holds none.
+    """Design problem on a belief: element responses and gradients of the paths predicted from its map; None without a
+    panel in the map.
 
     A point landmark gives one path; an image gives two, with its wall on the Rx leg and on the Tx leg. Paths of the
     panel and its images depend on the code, the others do not. The wall between the panel and its image mirrors the
@@ -98,8 +99,8 @@ def problem_from_belief(
     sheets, held = join_sheets(tuple(panel for _, panel in known)), [row for row, _ in known]
     position = np.concatenate([belief.position[None], belief.samples[: max(samples - 1, 0)]])
     tx, rx = (end[:, None, :] for end in belief.body.ends(position, np.array(belief.heading, dtype=np.float64)))
-    panel, static = _believed_paths(belief.map, held)
-    both = _Believed(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
+    panel, static = _predicted_paths(belief.map, held)
+    both = _PredictedPaths(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
     points = belief.map.position
     unit_snr = float(radio.integrated_snr(np.ones(())))
     return DesignProblem(
@@ -115,32 +116,38 @@ def problem_from_belief(
     )
 
 
-class _Believed(NamedTuple):
-    """Q paths of a map: rows of the point that scatters, and of the points that Tx and Rx see."""
+class _PredictedPaths(NamedTuple):
+    """Q paths predicted from a map: rows of the scattering point, and of the points that Tx and Rx see (it or its
+    image)."""
 
     source: Integers
     tx_point: Integers
     rx_point: Integers
 
 
-def _believed_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Believed, _Believed]:
-    """Paths over the panels' rows, the direct ones first, and the others. Images of images are too weak to matter."""
+def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_PredictedPaths, _PredictedPaths]:
+    """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others.
+
+    Images of images are too weak to matter.
+    """
     rows = np.arange(len(landmarks.parent))
     points = rows[landmarks.parent < 0]
     points = np.concatenate([held, points[~np.isin(points, held)]])
     images = rows[(landmarks.parent >= 0) & np.isin(landmarks.parent, points)]
     parents = landmarks.parent[images]
-    paths = _Believed(
+    paths = _PredictedPaths(
         np.concatenate([points, parents, parents]),
         np.concatenate([points, parents, images]),
         np.concatenate([points, images, parents]),
     )
     over_panel = np.isin(paths.source, held)
-    return _Believed(*(field[over_panel] for field in paths)), _Believed(*(field[~over_panel] for field in paths))
+    return _PredictedPaths(*(field[over_panel] for field in paths)), _PredictedPaths(
+        *(field[~over_panel] for field in paths)
+    )
 
 
-def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
-    """Gradients (B, Q, 3) of believed path lengths by the agent's position.
+def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
+    """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position.
 
     The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
     image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
@@ -157,29 +164,30 @@ def _gradient(points: Floats, paths: _Believed, tx: Floats, rx: Floats, mode: Gr
     return total
 
 
-def _ratio(landmarks: MapEstimate, paths: _Believed) -> Floats:
-    """Amplitude (Q,) that the wall of a believed image leaves; 1 without a wall."""
+def _ratio(landmarks: MapEstimate, paths: _PredictedPaths) -> Floats:
+    """Amplitude ratio (Q,) of the wall reflection on each predicted path, from the image's strength; 1 without a
+    wall."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
     return np.where(image != paths.source, landmarks.strength[image], 1.0)
 
 
 def _panel_responses(
-    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
+    landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
     radio: RadioConfig,
 ) -> Complexes:  # fmt: skip
-    """(B, Q, N, M) believed element responses of the paths of all panels, whose rows are `held`."""
+    """Predicted element responses (B, Q, N, M) of the paths over all panels, whose rows in the map are `held`."""
     whole = np.zeros((len(tx), len(paths.source), ris.rows, ris.cols), dtype=np.complex128)
     for number, row in enumerate(held):
         mine = np.flatnonzero(paths.source == row)
-        one = _Believed(*(field[mine] for field in paths))
+        one = _PredictedPaths(*(field[mine] for field in paths))
         whole[:, mine] = ris.place(number, _responses_of(landmarks, one, tx, rx, row, ris.panels[number], radio))
     return whole
 
 
 def _responses_of(
-    landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
+    landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
 ) -> Complexes:
-    """(B, Q, N, M) believed element responses of the paths of the panel in a row of the map."""
+    """Predicted element responses (B, Q, N, M) of the paths over the panel in one row of the map."""
     center, legs = landmarks.position[row], []
     for end, seen, antenna_gain in ((tx, paths.tx_point, radio.tx_gain), (rx, paths.rx_point, radio.rx_gain)):
         # a point that is the panel itself has no plane: its zero normal mirrors nothing
@@ -192,8 +200,11 @@ def _responses_of(
     return np.where(np.isfinite(response), response, 0.0)
 
 
-def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats, radio: RadioConfig) -> Complexes:
-    """(B, Q) believed gains by eq. `a2`, two legs joined by the landmark's strength (root of its cross-section)."""
+def _point_gains(
+    landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, radio: RadioConfig
+) -> Complexes:
+    """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, from their strengths (root of the
+    cross-section)."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)
@@ -202,8 +213,8 @@ def _point_gains(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Float
     return point_amplitude(strength, first, second, radio) * phase
 
 
-def _length_variance(landmarks: MapEstimate, paths: _Believed, tx: Floats, rx: Floats) -> Floats:
-    """(B, Q) variance [m^2] of believed path lengths that comes with the landmarks' covariances."""
+def _length_variance(landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats) -> Floats:
+    """Variance (B, Q) [m^2] of the lengths of predicted paths that follows from the landmarks' covariances."""
     first = unit(landmarks.position[paths.tx_point] - tx)
     second = unit(landmarks.position[paths.rx_point] - rx)
     tx_spread, rx_spread = landmarks.covariance[paths.tx_point], landmarks.covariance[paths.rx_point]

@@ -1,4 +1,4 @@
-"""All designers behind one interface, in one list."""
+"""All designers of panel codes by name, behind one interface: genetic, exact, coordinate descent, random, ..."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.design.coordinate import coordinate_search, exact_codes
+from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
@@ -19,7 +19,7 @@ from rislam_rt.information import Outcome
 from rislam_rt.model import RisCode
 
 _Search = Callable[[DesignProblem, Objective, np.random.Generator, DesignConfig], tuple[Integers | Floats, Floats]]
-"""Levels, or for continuous methods phases [rad], (N M,), and the history of the objective (may be empty)."""
+"""Search for a code: returns levels, or for continuous methods phases [rad], (N M,), and the objective's history."""
 
 _NO_HISTORY = np.zeros(0)
 _DEFAULT = DesignConfig()
@@ -37,6 +37,8 @@ _SEARCHES: Mapping[str, _Search] = {
 
 
 def _designer(name: str, search: _Search) -> Designer:
+    """Make a designer of a search: one that builds the objective, times the search and values its code."""
+
     def design(problem: DesignProblem, *, rng: np.random.Generator, config: DesignConfig = _DEFAULT) -> Design:
         begin = time.perf_counter()
         objective = build_objective(problem)
@@ -51,7 +53,8 @@ def _describe(
     name: str, problem: DesignProblem, objective: Objective, found: Integers | Floats, history: Floats,
     seconds: float, certify: bool,
 ) -> Design:  # fmt: skip
-    """Value what a search found, and set it beside the optimum of the direct path and the relaxation bound."""
+    """Value the code or phases that a search found, and compare with the direct path's optimum and the relaxation
+    bound."""
     step = 2.0 * np.pi / problem.levels
     discrete = np.issubdtype(found.dtype, np.integer)
     xi = np.asarray(found * step if discrete else found, dtype=np.float64)
@@ -79,21 +82,21 @@ def _describe(
 
 
 def _db(magnitude: Floats) -> Floats:
-    """20 log10 (...,) for a designer's result, a gain of zero as -400 dB."""
+    """Decibels 20 log10 (...,) of gain magnitudes, a gain of zero as -400 dB."""
     return 20.0 * np.log10(np.maximum(magnitude, 1e-20))
 
 
 DESIGNERS: Mapping[str, Designer] = MappingProxyType({name: _designer(name, one) for name, one in _SEARCHES.items()})
-"""Every designer by name. `continuous` breaks the panel's levels and is a reference only."""
+"""Every designer of panel codes by name. `continuous` breaks the panel's levels and is a reference only."""
 
 
 def designer(method: str) -> Designer:
-    """The designer of a name.
+    """The designer of panel codes of a name.
 
     Raises
     ------
     ConfigError
-        There is none.
+        No designer has this name.
     """
     if method not in DESIGNERS:
         raise ConfigError(f"design.method: '{method}' received; give one of {', '.join(DESIGNERS)}")
@@ -101,6 +104,6 @@ def designer(method: str) -> Designer:
 
 
 def blind_design(method: str, code: RisCode) -> Design:
-    """A code in place of a design: nothing is known of the panel yet (outcome `NO_PATHS`)."""
+    """Wrap a search code as a `Design` of outcome `NO_PATHS`, while nothing is known of the panel."""
     infinite = float("inf")
     return Design(method, code, code.xi, infinite, -infinite, 0.0, 0.0, np.array([infinite]), 0.0, Outcome.NO_PATHS)

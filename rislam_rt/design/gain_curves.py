@@ -1,4 +1,4 @@
-"""Designs place by place: the gain curves of Fig. 4(a)."""
+"""Gain curves over the distance of the direct panel path under designed, random and optimal codes (Fig. 4(a))."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,27 +13,27 @@ from rislam_rt.design.single_path import exact_code
 
 
 class GainInterval(NamedTuple):
-    """A curve over K places with its spread."""
+    """Gain [dB] at K places: middle, and lower and upper end of an interval (K,)."""
 
     middle: Floats
-    """(K,)."""
+    """(K,) [dB] median or root mean square."""
     low: Floats
-    """(K,)."""
+    """(K,) [dB] lower quantile."""
     high: Floats
-    """(K,)."""
+    """(K,) [dB] upper quantile."""
 
 
 class GainCurves(NamedTuple):
-    """Gain of the direct panel path at K places [dB]."""
+    """Gain [dB] of the direct panel path at K places under designed, random and optimal codes."""
 
     optimized: GainInterval
-    """Under the designer's codes: median and quantiles over its seeds."""
+    """Gain under the designer's codes: median and quantiles over its seeds."""
     random: GainInterval
-    """Under random codes: root mean square (exact), and quantiles over draws."""
+    """Gain under random codes: root mean square (exact), and quantiles over draws."""
     exact: Floats
-    """(K,) largest gain that any code of the panel's levels reaches."""
+    """(K,) [dB] largest gain that any code of the panel's levels reaches."""
     continuous: Floats
-    """(K,) largest gain at all."""
+    """(K,) [dB] largest gain with continuous phases."""
 
 
 _SINGLE = DesignConfig(certify=False)
@@ -49,16 +49,18 @@ def gain_curves(
     coverage: float = 0.9,
     config: DesignConfig = _SINGLE,
 ) -> GainCurves:
-    """The panel's curves of Fig. 4(a) from one design problem a place (`problem_from_paths`, `direct_only`).
+    """Gain curves of the direct panel path under designed, random and optimal codes, as in Fig. 4(a).
 
     Parameters
     ----------
+    problems
+        One design problem a place (`problem_from_paths`, `direct_only`).
     seeds
-        How often the designer is run at each place.
+        Number of runs of the designer at each place.
     draws
-        How many random codes give the interval; their root mean square is `sqrt(sum |h_n|^2)`, no draw needed.
+        Number of random codes that give the interval; their root mean square is `sqrt(sum |h_n|^2)`, no draw needed.
     coverage
-        Of both intervals.
+        Probability of both intervals.
     """
     tail = np.array([0.5, (1.0 - coverage) / 2.0, (1.0 + coverage) / 2.0])
     run = designer(method)
@@ -77,7 +79,7 @@ def gain_curves(
 
 
 def direct_only(problem: DesignProblem) -> DesignProblem:
-    """The same design problem with the direct panel path alone: what Fig. 4(a) optimises."""
+    """The same design problem with the direct panel path alone, as Fig. 4(a) optimises it."""
     return DesignProblem(
         problem.response[:, :1], problem.static_gain[:, :0], problem.gradient[:, :1], problem.prior, problem.scale,
         problem.levels, least_power=problem.least_power,

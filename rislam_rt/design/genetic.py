@@ -1,4 +1,4 @@
-"""CRLB-GA: the genetic algorithm of the paper, as printed."""
+"""CRLB-GA: the paper's genetic algorithm for the panel's phase code."""
 
 import numpy as np
 
@@ -10,7 +10,8 @@ from rislam_rt.design.result import DesignConfig
 def genetic_search(
     objective: Objective, num_elements: int, levels: int, *, rng: np.random.Generator, config: DesignConfig
 ) -> tuple[Integers, Floats]:
-    """Best individual (N M,) and the best objective after each iteration (C^A + 1,), the first before any.
+    """Panel code (N M,) of least expected CRLB that a genetic search finds, and the best objective after each iteration
+    (C^A + 1,), the first before any.
 
     Selection: the Q fittest survive. Cross: (K - Q)/2 times two parents, drawn with probability proportional to
     fitness `1 / tr(...)` (the paper prints the inverse of a matrix), swap the genes from a random one to the last.
@@ -45,7 +46,7 @@ def genetic_search(
 
 
 def _mutations(genes: int, levels: int, probability: float, *, rng: np.random.Generator) -> tuple[Integers, Integers]:
-    """Which of so many genes mutate, each on its own with the same probability, in order; and what they become.
+    """Draw which of a number of genes mutate, each independently with the same probability, and their new levels.
 
     The gaps between mutated genes are geometric, so that only those are drawn.
     """

@@ -1,4 +1,5 @@
-"""Design with the paths themselves at hand: the genie, and the command line's `design`. The caller traces."""
+"""Design by a genie that knows the true paths: the reference for design on the belief, and the command line's
+`design`."""
 
 import numpy as np
 
@@ -11,13 +12,14 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
 
 
 def panel_columns(paths: Paths, cycle: int) -> Integers:
-    """Panel paths (P,) of a cycle that the genie knows, the direct one first if it is there."""
+    """Columns (P,) of the valid paths of a cycle that meet a panel, the direct ones first."""
     over_panel = np.flatnonzero(paths.valid[cycle] & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
     return over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
 
 
 def focus_codes(paths: Paths, levels: int) -> RisCode:
-    """Codes (K, N, M) of the genie, one a cycle: every panel at the optimum of its direct path, 0 where hidden.
+    """Codes (K, N, M) that focus every panel on its direct path, one a cycle, from true paths; level 0 where it is
+    hidden.
 
     Raises
     ------
@@ -39,7 +41,7 @@ def problem_from_paths(
     paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, levels: int, *, cycle: int = 0,
     prior: Floats | None = None, least_snr: float = 0.0,
 ) -> DesignProblem:  # fmt: skip
-    """The genie's problem at one cycle of traced or analytic paths: landmark paths only (no LOS, no VT).
+    """Design problem on the true paths of one cycle: landmark paths only (no LOS, no VT).
 
     `tx`, `rx` (3,) [m] are the agent's ends at that cycle.
 

@@ -1,4 +1,5 @@
-"""The objective, laid out for speed: one matrix product takes a batch of codes to all gains of all samples."""
+"""Objective of the code design, the expected CRLB of the position, laid out to value many codes by one matrix
+product."""
 
 from dataclasses import dataclass
 
@@ -11,35 +12,36 @@ from rislam_rt.information import Outcome
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Objective:
-    """A `DesignProblem` with everything that no code changes worked out."""
+    """Expected CRLB of a `DesignProblem` as a function of the code, with all that no code changes precomputed."""
 
     matrix: Complexes
-    """(N M, B P): element weights to gains."""
+    """(N M, B P) from element weights to gains of the panel paths."""
     outer: Floats
-    """(B, P, 3) xx, xy, yy of scale g g^T."""
+    """(B, P, 3) xx, xy, yy of scale g g^T: information of a panel path of unit power."""
     fixed: Floats
-    """(B, 3) xx, xy, yy of prior and static paths."""
+    """(B, 3) xx, xy, yy of the information of prior and static paths."""
     spread: Floats | None
     """(B P,) scale times variance of the panel paths; None where all are zero."""
     least_power: float
+    """|alpha|^2 at which a path is detected with probability one half; 0: all are."""
     table: Complexes
-    """(H,) exp(-j xi) of the levels."""
+    """(H,) element weights exp(-j xi) of the levels."""
     outcome: Outcome
-    """`UNOBSERVABLE` if no code makes the information regular: then the value is `1 / tr J`, the part that is seen."""
+    """`UNOBSERVABLE` if no code makes the information regular: then the objective is `1 / tr J`."""
 
     def gains(self, weight: Complexes) -> Complexes:
-        """Gains (..., B P) in the objective under element weights (..., N M)."""
+        """Gains (..., B P) of the panel paths at all samples under element weights (..., N M)."""
         return weight @ self.matrix
 
     def value(self, gain: Complexes) -> Floats:
-        """Objective, the expected CRLB (...,) [m^2], of gains (..., B P)."""
+        """Objective, the expected CRLB (...,) [m^2], of the panel paths' gains (..., B P)."""
         power = detected_power(gain.real**2 + gain.imag**2, self.least_power)
         if self.spread is not None:
             power = power / (1.0 + power * self.spread)
         return self.value_of_power(power)
 
     def value_of_power(self, power: Floats) -> Floats:
-        """Objective, the expected CRLB (...,), of (discounted) powers (..., B P)."""
+        """Objective, the expected CRLB (...,) [m^2], of the panel paths' (discounted) powers (..., B P)."""
         samples, paths, _ = self.outer.shape
         if samples == 1:
             information = power @ self.outer[0] + self.fixed[0]
@@ -48,11 +50,11 @@ class Objective:
         return self._inverse_trace(information + self.fixed).mean(axis=-1)
 
     def of_index(self, index: Integers) -> Floats:
-        """Objective, the expected CRLB (...,), of codes (..., N M)."""
+        """Objective, the expected CRLB (...,) [m^2], of codes (..., N M) given as levels."""
         return self.value(self.gains(self.table[index]))
 
     def _inverse_trace(self, information: Floats) -> Floats:
-        """Trace (...,) in the objective of the inverse of 2 x 2 matrices (..., 3)."""
+        """Trace (...,) of the inverse of 2 x 2 information matrices (..., 3); 1 / trace of them where unobservable."""
         xx, xy, yy = information[..., 0], information[..., 1], information[..., 2]
         trace = xx + yy
         if self.outcome is Outcome.UNOBSERVABLE:
@@ -68,7 +70,8 @@ SINGULAR = 1e-12
 
 
 def build_objective(problem: DesignProblem) -> Objective:
-    """Precompute; decides whether the problem is observable at all, from what every path can reach at most."""
+    """Precompute the objective of a design problem; the outcome tells whether any code makes the position
+    observable."""
     samples, panel = problem.response.shape[:2]
     matrix = np.ascontiguousarray(problem.response.reshape(samples * panel, -1).T)
     x, y = problem.gradient[..., 0], problem.gradient[..., 1]
@@ -97,7 +100,7 @@ def build_objective(problem: DesignProblem) -> Objective:
 
 
 def detected_power(power: Floats, least: float) -> Floats:
-    """Powers (...,) times about the chance of detecting them, `1 / (1 + (least / power)^4)`."""
+    """Path powers (...,) times their approximate detection probability, `1 / (1 + (least / power)^4)`."""
     if least == 0.0:
         return power
     ratio = (power / least) ** 2
@@ -106,5 +109,5 @@ def detected_power(power: Floats, least: float) -> Floats:
 
 
 def level_table(levels: int) -> Complexes:
-    """Weights exp(-j xi) (H,) in the objective of the levels 0..H-1."""
+    """Element weights exp(-j xi) (H,) of the phase levels 0..H-1."""
     return np.exp(-2j * np.pi / levels * np.arange(levels))

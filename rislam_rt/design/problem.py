@@ -1,4 +1,4 @@
-"""The design problem: paths that meet the panel, the others, and what is known of the agent beforehand."""
+"""The design problem of a panel's code: responses of paths over the panel, gains of others, gradients, prior."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,8 @@ from rislam_rt.model import RadioConfig
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DesignProblem:
-    """Minimise the mean over B samples of the belief of `tr((J_prior + sum_p w_p g_p g_p^T)^-1)`.
+    """Design problem of a panel's code: minimise the agent's expected horizontal position CRLB over B samples of the
+    belief, the mean of `tr((J_prior + sum_p w_p g_p g_p^T)^-1)`.
 
     `w_p = scale |alpha_p|^2 / (1 + scale |alpha_p|^2 variance_p)`: the information on the length of path p, where what
     the path's landmark and walls are not known to (`variance`) is added to its own error. With `least_power`,
@@ -34,13 +35,13 @@ class DesignProblem:
     scale: float
     """Information on a path's length per |alpha|^2 [1/m^2]: `8 pi^2 zeta^2 L E / (c^2 N0)`."""
     levels: int
-    """H."""
+    """Number H of phase levels."""
     variance: Any = None
     """(B, P + S) variance [m^2] of a path's predicted length; None is zero."""
     least_power: float = 0.0
-    """|alpha|^2 at which a path is detected every other time; 0: all are."""
+    """|alpha|^2 at which a path is detected with probability one half; 0: all are."""
     panels: tuple[tuple[int, slice], ...] = ((0, slice(None)),)
-    """For each panel the row of its direct path, and where its elements stand among all, in their order."""
+    """For each panel the row of its direct path, and the span of its elements among all N M."""
 
     def __post_init__(self) -> None:
         freeze(self, "response", np.complex128, (None, None, None, None))
@@ -60,21 +61,21 @@ class DesignProblem:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns of the panel that is designed for."""
+        """Rows N and columns M of the panel's elements."""
         return self.response.shape[2], self.response.shape[3]
 
     @property
     def target(self) -> Complexes:
-        """(N M,) response of the direct panel path at the first sample of the belief (its mean)."""
+        """Element responses (N M,) of the direct panel path at the first sample of the belief (its mean)."""
         return self.response[0, 0].ravel()
 
     @property
     def targets(self) -> list[Complexes]:
-        """For each panel the design problem of its own direct path, at its own elements."""
+        """For each panel the responses of its own elements to its direct path, at the first sample of the belief."""
         return [self.response[0, row].ravel()[span] for row, span in self.panels]
 
     def owner(self) -> Integers:
-        """(P,) the panel that each panel path runs over: at whose elements it has a response."""
+        """Number (P,) of the panel that each panel path runs over: the one whose elements respond to it."""
         elements = np.abs(self.response[0].reshape(self.response.shape[1], -1))
         return np.argmax([elements[:, span].max(axis=1) for _, span in self.panels], axis=0)
 
@@ -83,7 +84,7 @@ def problem_from_arrays(
     response: Complexes, static_gain: Complexes, gradient: Floats, radio: RadioConfig, levels: int,
     prior: Floats | None = None, least_snr: float = 0.0, panels: tuple[tuple[int, slice], ...] = ((0, slice(None)),),
 ) -> DesignProblem:  # fmt: skip
-    """A problem of one position from plain arrays.
+    """Design problem of a panel's code at one position of the agent, from plain arrays.
 
     Parameters
     ----------
@@ -96,7 +97,7 @@ def problem_from_arrays(
     prior
         (2, 2) information [1/m^2] beforehand; none by default.
     least_snr
-        SNR over all antennas, linear, at which a path is detected every other time; 0: all paths count.
+        SNR over all antennas, linear, at which a path is detected with probability one half; 0: all paths count.
     panels
         Where there are several: as in `DesignProblem`.
     """

@@ -1,4 +1,4 @@
-"""The result of a design, and the settings that a designer is given."""
+"""Result of a code design: code, CRLB and bound; and the settings and interface of designers."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -14,22 +14,22 @@ from rislam_rt.model import RisCode
 
 @dataclass(frozen=True, slots=True)
 class DesignConfig:
-    """Settings of all designers; each reads its own."""
+    """Settings of the designers of panel codes; each reads its own."""
 
     population: int = 50
-    """K of CRLB-GA."""
+    """Population size K of CRLB-GA."""
     elite: int = 10
-    """Q of CRLB-GA; K - Q must be even."""
+    """Number Q of individuals that survive in CRLB-GA; K - Q must be even."""
     iterations: int = 100
-    """C^A of CRLB-GA."""
+    """Number C^A of generations of CRLB-GA."""
     mutation: float = 0.02
-    """p_m of CRLB-GA."""
+    """Mutation probability p_m of CRLB-GA."""
     max_steps: int = 200
-    """Most steps of a coordinate descent."""
+    """Largest number of steps of a coordinate descent."""
     starts: int = 2
-    """How many of the single-path optima coordinate descent starts from, the best first."""
+    """Number of single-path optima from which coordinate descent starts, the best first."""
     certify: bool = True
-    """Whether to work out the relaxation bound and the gap of the target's gain."""
+    """Whether to compute the relaxation bound and the gap of the direct path's gain to its optimum."""
 
     def __post_init__(self) -> None:
         if not self.population >= 2 or not 0 <= self.elite < self.population or (self.population - self.elite) % 2:
@@ -45,11 +45,12 @@ class DesignConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """A code and how good it is."""
+    """A designed panel code with its expected CRLB, the direct path's gain and the lower bound over all codes."""
 
     method: str
+    """Name of the designer."""
     code: RisCode
-    """(N, M); for `continuous` its phases at their nearest levels."""
+    """(N, M) code; for `continuous` its phases at their nearest levels."""
     xi: Floats
     """(N, M) phases [rad] that the figures below belong to: the code's, save for `continuous`."""
     crlb: float
@@ -63,17 +64,19 @@ class Design:
     history: Floats
     """Best objective after each iteration [m^2]; one entry for methods that do not iterate."""
     seconds: float
+    """Time [s] that the design took."""
     outcome: Outcome
+    """Whether the position is observable, and the panel known."""
 
     @property
     def gap_crlb(self) -> float:
-        """How far the CRLB lies above its bound, relative; infinite if not certified or unobservable."""
+        """Relative gap of the design's CRLB to its lower bound; infinite if not certified or unobservable."""
         return self.crlb / self.bound - 1.0 if self.bound > 0.0 else float("inf")
 
 
 class Designer(Protocol):
-    """All designers look like this."""
+    """Interface of a designer: from a design problem to a panel code."""
 
     def __call__(self, problem: DesignProblem, *, rng: np.random.Generator, config: DesignConfig = ...) -> Design:
-        """A code for the problem. Deterministic methods leave `rng` alone."""
+        """Design a panel code for the problem. Deterministic methods leave `rng` alone."""
         ...

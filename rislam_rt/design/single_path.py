@@ -1,4 +1,4 @@
-"""The best code for one path: exact over discrete levels, and the references around it.
+"""Optimal panel code for a single path: exact over discrete phase levels, continuous, or rounded to the nearest level.
 
 `|sum_n h_n exp(-j 2 pi k_n / H)|` is largest for levels that are, each on its own, nearest to some common phase.
 As that phase turns by one level spacing, every element changes its nearest level once, so N + 1 candidates remain:
@@ -11,7 +11,8 @@ from rislam_rt.arrays import Complexes, Floats, Integers
 
 
 def exact_code(response: Complexes, levels: int) -> tuple[Integers, Floats]:
-    """Levels (..., N) that maximise the gain of responses (..., N), and that gain's magnitude (...,).
+    """Phase levels (..., N) that maximise the gain of element responses (..., N) exactly, and that gain's magnitude
+    (...,).
 
     O(N log N), vectorised over the batch.
     """
@@ -36,11 +37,11 @@ def exact_code(response: Complexes, levels: int) -> tuple[Integers, Floats]:
 
 
 def continuous_phases(response: Complexes) -> Floats:
-    """Phases xi (..., N) [rad] that align every element."""
+    """Continuous phases xi (..., N) [rad] that align the responses of all elements."""
     return np.asarray(np.angle(response))
 
 
 def nearest_code(response: Complexes, levels: int) -> Integers:
-    """`continuous_phases` rounded to the nearest level, element by element: (..., N)."""
+    """Phase levels (..., N) nearest to the aligning continuous phases, element by element."""
     turns = continuous_phases(response) * levels / (2.0 * np.pi)
     return np.floor(turns + 0.5).astype(np.int64) % levels

@@ -1,18 +1,17 @@
 """Scores of estimates against the truth (floor 5): errors, map distances, consistency, association, intervals."""
 
-from rislam_rt.evaluate.association import AssociationScore, association_fractions, association_score, label_switches
+from rislam_rt.evaluate.association import association_fractions, association_score, label_switches
 from rislam_rt.evaluate.confidence_intervals import (
     Interval,
     bootstrap,
     bootstrap_ratio,
-    mean_over_runs,
     median_over_runs,
     rms_over_runs,
     share_interval,
 )
 from rislam_rt.evaluate.consistency import normalised_squares
 from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
-from rislam_rt.evaluate.planes import (
+from rislam_rt.evaluate.plane_matching import (
     NEAR_ANGLE,
     NEAR_WALL,
     Surfaces,
@@ -21,13 +20,11 @@ from rislam_rt.evaluate.planes import (
     plane_angle,
     plane_distance,
 )
-from rislam_rt.evaluate.set_distances import Gospa, gospa, match_nearest, match_points
+from rislam_rt.evaluate.set_distances import gospa, match_points
 
 __all__ = [
     "NEAR_ANGLE",
     "NEAR_WALL",
-    "AssociationScore",
-    "Gospa",
     "Interval",
     "Surfaces",
     "align",
@@ -38,10 +35,8 @@ __all__ = [
     "ghost_planes",
     "gospa",
     "label_switches",
-    "match_nearest",
     "match_planes",
     "match_points",
-    "mean_over_runs",
     "median_over_runs",
     "normalised_squares",
     "plane_angle",

@@ -12,6 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 
 Statistic = Callable[[Floats], Floats]
+"""Statistic of samples (R, B, ...) that works along the first axis, the runs, and gives values (B,)."""
 
 
 class Interval(NamedTuple):
@@ -37,11 +38,11 @@ def median_over_runs(samples: Floats) -> Floats:
     return np.asarray(np.median(samples, axis=0))
 
 
-def share_interval(count: int, runs: int, *, level: float = 0.95) -> Interval:
-    """Share `count / runs` with its confidence interval by Wilson (1927), which holds at shares of 0 and 1 too."""
+def share_interval(count: int, runs: int) -> Interval:
+    """Share `count / runs` with its 95 % confidence interval by Wilson (1927), which holds at shares of 0 and 1 too."""
     if not 0 <= count <= runs or runs < 1:
         raise ConfigError(f"count, runs: {count} of {runs} received; give a part of at least one run")
-    z, share = float(scipy.special.ndtri(0.5 + 0.5 * level)), count / runs
+    z, share = float(scipy.special.ndtri(0.975)), count / runs
     middle = (share + z**2 / (2 * runs)) / (1.0 + z**2 / runs)
     half = z / (1.0 + z**2 / runs) * float(np.sqrt(share * (1.0 - share) / runs + z**2 / (4.0 * runs**2)))
     return Interval(share, min(share, max(0.0, middle - half)), max(share, min(1.0, middle + half)))
@@ -87,15 +88,9 @@ def bootstrap(
 
 
 def bootstrap_ratio(
-    numerator: Floats,
-    denominator: Floats,
-    *,
-    rng: np.random.Generator,
-    statistic: Statistic = rms_over_runs,
-    level: float = 0.95,
-    resamples: int = 2000,
+    numerator: Floats, denominator: Floats, *, rng: np.random.Generator, level: float = 0.95
 ) -> Interval:
-    """Bootstrap interval of `statistic(numerator) / statistic(denominator)` of two schemes run on the same R seeds.
+    """Bootstrap interval of the ratio of two schemes' root mean squares, both run on the same R seeds.
 
     Seeds are drawn in pairs, so that what both schemes share (room, noise) does not widen the interval. 1 minus this is
     the gain over the denominator's scheme.
@@ -103,6 +98,6 @@ def bootstrap_ratio(
     pairs = np.stack([np.asarray(numerator), np.asarray(denominator)], axis=-1)
 
     def ratio(samples: Floats) -> Floats:
-        return statistic(samples[..., 0]) / statistic(samples[..., 1])
+        return rms_over_runs(samples[..., 0]) / rms_over_runs(samples[..., 1])
 
-    return bootstrap(pairs, rng=rng, statistic=ratio, level=level, resamples=resamples)
+    return bootstrap(pairs, rng=rng, statistic=ratio, level=level)

@@ -13,9 +13,13 @@ class Gospa(NamedTuple):
     """GOSPA distance [m] (alpha = 2) and its parts, `distance^p = localisation^p + c^p / 2 (missed + false)`."""
 
     distance: float
+    """GOSPA distance [m]."""
     localisation: float
+    """Part [m] of the pairs that were matched."""
     missed: int
+    """Number of true points without an estimate."""
     false: int
+    """Number of estimates without a true point."""
 
 
 def gospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float = 2.0) -> Gospa:

@@ -29,7 +29,7 @@ def angle_between(a: Floats, b: Floats) -> Floats:
 
 
 def rotation_about(axis: Floats, angle: float) -> Floats:
-    """(3, 3) rotation by an angle [rad] about an axis that is a unit vector (3,) (Rodrigues)."""
+    """Rotation matrix (3, 3) by an angle [rad] about an axis, a unit vector (3,) (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)

@@ -20,7 +20,9 @@ class CoplanarPair(NamedTuple):
     """Two coplanar walls that overlap: wall `upper` lies on the larger wall `lower`."""
 
     upper: int
+    """Number of the smaller wall."""
     lower: int
+    """Number of the larger wall."""
     gap: float
     """Largest distance [m] of the upper wall's corners from the lower wall's plane."""
 
@@ -29,6 +31,7 @@ class CoplanarStack(NamedTuple):
     """Coplanar walls among W walls: the pairs that overlap, and the plane that all in one stack share."""
 
     pairs: list[CoplanarPair]
+    """All pairs of coplanar walls that overlap."""
     plane: Integers
     """Number (W,) of the wall whose plane each wall shares: its own where it overlaps no other wall of its plane."""
     over: tuple[Integers, ...]

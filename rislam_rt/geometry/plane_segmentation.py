@@ -24,7 +24,7 @@ class PlanarRegions(NamedTuple):
     group: Integers
     """Number (T,) of each triangle's plane."""
     normal: Floats
-    """(G, 3) unit normals, on the side of the group's first triangle."""
+    """Unit normals (G, 3) of the planes, on the side of the group's first triangle."""
     offset: Floats
     """Offsets (G,) [m] of the planes along their normals."""
 

@@ -1,9 +1,8 @@
-"""Floor 4: Fisher information of delays, gains and angles; what it says about positions; bounds over a trajectory."""
+"""Floor 4: Fisher information of delays, gains and angles, position bounds, and bounds over a trajectory."""
 
-from rislam_rt.information.accuracy import MeasurementStd, amplitude_std, cosine_information, measurement_std
+from rislam_rt.information.accuracy import amplitude_std, cosine_information, measurement_std
 from rislam_rt.information.bound_outcome import Outcome
 from rislam_rt.information.delay_gain import (
-    EquivalentDelayInformation,
     delay_gain_information,
     delay_information,
     eliminate_gains,
@@ -20,21 +19,17 @@ from rislam_rt.information.landmark_model import (
     fewer_rows,
 )
 from rislam_rt.information.motion_prior import MotionPrior
-from rislam_rt.information.position import PositionBound, position_bound, position_information, range_information
-from rislam_rt.information.posterior_crlb import PosteriorBound, posterior_bound
+from rislam_rt.information.position import position_bound, position_information, range_information
+from rislam_rt.information.posterior_crlb import posterior_bound
 from rislam_rt.information.prior import assumed_std, prior_from_covariance
 from rislam_rt.information.resolution import certainty_share, resolved_probability
 
 __all__ = [
-    "EquivalentDelayInformation",
     "GradientMode",
     "LandmarkModel",
     "LinearMeasurements",
-    "MeasurementStd",
     "MotionPrior",
     "Outcome",
-    "PositionBound",
-    "PosteriorBound",
     "WallSpread",
     "amplitude_std",
     "assumed_std",

@@ -12,16 +12,17 @@ from rislam_rt.model import RadioConfig, RxArray
 
 
 class MeasurementStd(NamedTuple):
-    """Least standard deviations of one path's measurements."""
+    """Cramér-Rao bounds, as standard deviations, of a resolved path's delay and direction cosines."""
 
     tau: Floats
-    """(...,) [s]."""
+    """(...,) [s] delay."""
     cosines: Floats
     """(..., 2) direction cosines along body x and y."""
 
 
 def measurement_std(snr_integrated: Floats, radio: RadioConfig) -> MeasurementStd:
-    """Accuracy at SNRs (...,) after integration over signal and all antennas (`L E |alpha|^2 / N0`), linear.
+    """Cramér-Rao bounds of delay and cosines of resolved paths at integrated SNRs (...,) (`L E |alpha|^2 / N0`,
+    linear).
 
     `var tau = 1 / (8 pi^2 zeta^2 SNR)`; `cosine_information` for the angles. Infinite where the SNR is 0 and for a
     cosine along which the array has no extent.
@@ -34,7 +35,7 @@ def measurement_std(snr_integrated: Floats, radio: RadioConfig) -> MeasurementSt
 
 
 def cosine_information(snr_per_antenna: Floats, radio: RadioConfig) -> Floats:
-    """Information (..., 2) on the direction cosines along the array's rows and columns, its phase eliminated.
+    """Fisher information (..., 2) on the direction cosines along the array's rows and columns, the phase unknown.
 
     `2 SNR (2 pi / lambda)^2 sum_l x_l^2` with the element positions about their centre. For a line of L elements d
     apart this is the familiar `var(phi) = 6 / (SNR L (L^2 - 1) (2 pi d cos(phi) / lambda)^2)`.
@@ -45,7 +46,7 @@ def cosine_information(snr_per_antenna: Floats, radio: RadioConfig) -> Floats:
 
 @lru_cache(maxsize=64)
 def _aperture(array: RxArray, wavelength: float) -> Floats:
-    """(2,) [m^2] `sum_l x_l^2` of the array, on which the accuracy of cosines rests; read-only."""
+    """Second moments (2,) [m^2] `sum_l x_l^2` of the array's element positions along both axes; read-only."""
     positions = array.positions(wavelength)[:, :2]
     spread = np.sum((positions - positions.mean(axis=0)) ** 2, axis=0)
     spread.flags.writeable = False
@@ -53,5 +54,5 @@ def _aperture(array: RxArray, wavelength: float) -> Floats:
 
 
 def amplitude_std(radio: RadioConfig) -> float:
-    """Standard deviation of a resolved path's |alpha|: `sqrt(N0 / (2 L E))`, whatever the amplitude."""
+    """Standard deviation of a resolved path's measured amplitude |alpha|: `sqrt(N0 / (2 L E))`, whatever its value."""
     return float(np.sqrt(radio.noise_psd / (2.0 * radio.array.num_antennas * radio.energy)))

@@ -1,12 +1,13 @@
-"""Numerical outcomes. They are values: a bound that does not exist is an answer, not an error."""
+"""Outcome of a bound: whether it exists. It is a value, as a bound that does not exist is an answer, not an error."""
 
 from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """What became of a bound or a design."""
+    """Outcome of a bound or a code design: whether it exists, and why not."""
 
     OK = 0
+    """The bound exists."""
     UNOBSERVABLE = 1
     """The information is singular: some direction is not seen at all, and the bound is infinite."""
     DEGENERATE = 2

@@ -1,4 +1,4 @@
-"""The full Fisher information of overlapping paths (Appendix B), and what is left of it for delays and angles.
+"""Fisher information of overlapping paths on delays, angles and gains (Appendix B), and its part with gains unknown.
 
 Antenna l receives `sum_i alpha_i b_l(i) s(t - tau_i)` in noise of density N0. Every derivative of it is a coefficient
 times a derivative of s times an antenna vector, so the whole matrix follows from R_s, two derivatives of it, and the
@@ -21,7 +21,7 @@ ILL_CONDITIONED = 1e-10
 
 
 class EquivalentDelayInformation(NamedTuple):
-    """Information on delays (and cosines) with the gains eliminated."""
+    """Equivalent Fisher information on delays (and cosines) of overlapping paths, the complex gains unknown."""
 
     information: Floats
     """(..., D, D): D = P delays [1/s^2], or 3 P delays, first and second cosines. Zero where degenerate."""
@@ -38,7 +38,8 @@ def steering(arrival: Floats, radio: RadioConfig, heading: Floats | float = 0.0)
 def delay_gain_information(
     tau: Floats, gain: Complexes, radio: RadioConfig, *, antennas: Complexes | None = None, angles: bool = False
 ) -> Floats:
-    """J(chi) of Appendix B over (tau, [u, v,] Re alpha, Im alpha): (..., 3P, 3P), with angles (..., 5P, 5P).
+    """Fisher information J(chi) of overlapping paths over (tau, [u, v,] Re alpha, Im alpha), Appendix B: (..., 3P, 3P),
+    with angles (..., 5P, 5P).
 
     Parameters
     ----------
@@ -83,7 +84,8 @@ def delay_gain_information(
 
 
 def eliminate_gains(information: Floats, num_paths: int) -> EquivalentDelayInformation:
-    """Schur complement: what J(chi) says about delays (and cosines) when the complex gains are unknown."""
+    """Equivalent Fisher information on delays (and cosines) from J(chi), the complex gains eliminated by Schur
+    complement."""
     kept = information.shape[-1] - 2 * num_paths
     nuisance = information[..., kept:, kept:]
     scale = np.sqrt(np.diagonal(nuisance, axis1=-2, axis2=-1))
@@ -99,14 +101,15 @@ def eliminate_gains(information: Floats, num_paths: int) -> EquivalentDelayInfor
 def delay_information(
     tau: Floats, gain: Complexes, radio: RadioConfig, *, antennas: Complexes | None = None
 ) -> EquivalentDelayInformation:
-    """Equivalent information (..., P, P) [1/s^2] on the delays of paths that may overlap, gains unknown."""
+    """Equivalent Fisher information (..., P, P) [1/s^2] on the delays of overlapping paths, gains unknown."""
     full = delay_gain_information(tau, gain, radio, antennas=antennas)
     return eliminate_gains(full, np.shape(tau)[-1])
 
 
 def map_to_position(delays: Floats, gradient: Floats) -> Floats:
-    """`T J T^T` of Appendix B: information (..., D, D) [1/m^2] from that on delays (..., P, P) [1/s^2].
+    """Fisher information (..., D, D) [1/m^2] on the position from that on delays (..., P, P) [1/s^2]: `T J T^T` of
+    Appendix B.
 
-    `gradient` (..., P, D) of the path lengths.
+    `gradient` (..., P, D) is that of the path lengths.
     """
     return np.swapaxes(gradient, -1, -2) @ delays @ gradient / SPEED_OF_LIGHT**2

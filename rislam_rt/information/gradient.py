@@ -1,4 +1,4 @@
-"""Gradients of path lengths from all interaction points: exact, and in the two ways in which the paper has them."""
+"""Gradients of path lengths by the agent's position: exact, and in the two ways in which the paper has them."""
 
 from typing import Literal
 
@@ -8,12 +8,13 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import unit
 
 GradientMode = Literal["exact", "paper", "appendix"]
+"""Forms of a path length's gradient by the agent's position (see `vertex_gradient`)."""
 
 
 def vertex_gradient(
     tx: Floats, rx: Floats, vertices: Floats, num_vertices: Integers, *, mode: GradientMode = "exact"
 ) -> Floats:
-    """Gradient (..., P, 3) of paths with all their interaction points.
+    """Gradients (..., P, 3) of path lengths by the agent's position, from the paths' interaction points.
 
     Parameters
     ----------
@@ -22,7 +23,7 @@ def vertex_gradient(
     vertices
         (..., P, V, 3) [m] in the order of travel.
     num_vertices
-        (P,) how many of them count; 0 is the line of sight.
+        (P,) number of vertices of each path; 0 is the line of sight.
     mode
         `exact`; `paper`: sum of all segments' unit vectors in the sense of travel (nu, kappa of eq. `derived`);
         `appendix`: the last segment alone (H of Appendix B).

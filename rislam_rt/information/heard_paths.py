@@ -1,4 +1,4 @@
-"""Which paths a receiver reports, and what the chance of a miss takes from their information."""
+"""Heard paths: those that a receiver detects in some cycle, their information times the detection probability."""
 
 from dataclasses import replace
 
@@ -8,13 +8,13 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model import PathKind, Paths, SensorModel, detection_probability
 
 SILENT = 1e-4
-"""Information over that at the detection threshold below which a path counts as not heard."""
+"""Expected information, relative to that at the detection threshold, below which a path counts as never detected."""
 
 
 def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
-    """The columns that are reported in some cycle, with their gains times the root of the detection probability.
+    """Select the paths that a receiver detects in some cycle, with gains times the root of the detection probability.
 
-    Information is proportional to the SNR, so that it comes out times that probability.
+    Information is proportional to the SNR, so that it is multiplied by that probability.
     """
     snr = sensor.radio.integrated_snr(paths.gain)
     detected = _detected(snr, sensor.threshold)
@@ -35,7 +35,7 @@ def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
 
 
 def _detected(snr: Floats, threshold: float) -> Floats:
-    """Probability that a path is heard, read off a table over 40 dB about the threshold: 0 below it, 1 above."""
+    """Detection probability at linear SNRs, from a table over 40 dB about the threshold: 0 below that, 1 above."""
     decibel = np.linspace(-20.0, 20.0, 401)
     table = detection_probability(threshold * 10.0 ** (decibel / 10.0), threshold)
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""How range and angle of every path depend on the agent and on what is unknown of landmarks and walls.
+"""Linear model of landmarks and walls: how range and angle of every path depend on the agent and on their unknowns.
 
 A landmark path joins two fixed points: the landmark as the Tx sees it, through the walls of the Tx leg, and as the Rx
 sees it. Its length is the sum of the two straight distances, its direction of arrival that of the second point. A wall
@@ -22,21 +22,23 @@ from rislam_rt.information.position import range_information
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 Unknown = Literal["known", "planes", "images"]
+"""Treatments of walls in a bound (see `build_landmark_model`)."""
 
 
 class LinearMeasurements(NamedTuple):
-    """M scalar measurements of one cycle."""
+    """M scalar measurements (ranges and cosines) of one cycle, linear in the agent's position and U unknowns of the
+    map."""
 
     agent: Floats
-    """(M, 3) derivatives with respect to the agent's position."""
+    """(M, 3) derivatives by the agent's position."""
     unknown: Floats
-    """(M, U) derivatives with respect to landmarks and walls."""
+    """(M, U) derivatives by the unknowns of landmarks and walls."""
     information: Floats
     """(M,) inverse variances."""
 
 
 def fewer_rows(rows: LinearMeasurements) -> LinearMeasurements:
-    """At most as many measurements as there are unknowns, with the same information: the factor R of a QR."""
+    """Compress linear measurements of a cycle to at most as many as unknowns, with the same information, by QR."""
     weighted = np.sqrt(rows.information)[:, None] * np.concatenate([rows.agent, rows.unknown], axis=1)
     if len(weighted) <= weighted.shape[1]:
         return rows
@@ -45,17 +47,18 @@ def fewer_rows(rows: LinearMeasurements) -> LinearMeasurements:
 
 
 class WallSpread(NamedTuple):
-    """RMS errors of a plane."""
+    """RMS errors of an estimated wall's plane: angle and distance."""
 
     angle: float
-    """[rad] between the normals, both tilts together."""
+    """[rad] angle between the normals, both tilts together."""
     distance: float
-    """[m] along the normal, at one point of the wall."""
+    """[m] distance along the normal, at one point of the wall."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LandmarkModel:
-    """Paths of a trajectory as measurements of agent, landmarks and walls."""
+    """Model of a trajectory's paths as linear measurements of the agent's position and of unknown landmarks and
+    walls."""
 
     paths: Paths
     motion: Trajectory
@@ -65,37 +68,41 @@ class LandmarkModel:
     tx_point: Integers
     """(P,) row of the fixed point that the Tx sees, -1 for a path without a landmark."""
     rx_point: Integers
-    """(P,)."""
+    """(P,) row of the fixed point that the Rx sees, -1 for a path without a landmark."""
     point: Floats
     """(S, 3) fixed points [m]."""
     jacobian: Floats
-    """(S, 3, U) their derivatives."""
+    """(S, 3, U) derivatives of the fixed points by the unknowns."""
     walls: Unknown
+    """Treatment of walls: known, unknown planes, or images as points of their own."""
     wall_normal: Floats
+    """(W, 3) unit normals."""
     wall_offset: Floats
+    """(W,) [m]: `normal . x = offset`."""
     wall_column: Integers
     """(W,) first unknown of each wall, -1 if it is known."""
 
     @property
     def num_unknowns(self) -> int:
-        """U, the unknown coordinates of landmarks and walls."""
+        """Number U of unknown coordinates of landmarks and walls."""
         return len(self.labels)
 
     def prior_std(self, length: float = 10.0, tilt: float = 0.5) -> Floats:
-        """(U,) the same standard deviation for every coordinate and offset [m], and for every tilt [rad]."""
+        """Prior standard deviations (U,) of the unknowns: one for every coordinate and offset [m], one for every tilt
+        [rad]."""
         return np.array([tilt if " tilt " in label else length for label in self.labels])
 
     def landmark_error(self, covariance: Floats) -> dict[str, float]:
-        """RMS distance [m] of each landmark whose position is among the unknowns, of covariance (U, U)."""
+        """RMS position error [m] of each unknown landmark, by name, from the unknowns' covariance (U, U)."""
         variance = np.diagonal(covariance)
         column = {label: number for number, label in enumerate(self.labels)}
         first = {name: column.get(f"{name} x") for name in self.paths.landmarks}
         return {name: float(np.sqrt(variance[c : c + 3].sum())) for name, c in first.items() if c is not None}
 
     def wall_error(self, covariance: Floats, at: Floats) -> dict[str, WallSpread]:
-        """RMS errors of each unknown wall, of covariance (U, U).
+        """RMS angle and distance errors of each unknown wall, by name, from the unknowns' covariance (U, U).
 
-        `at` (W, 3) holds the point of each wall where its distance is asked for.
+        `at` (W, 3) [m] holds the point of each wall where its distance is asked for.
         """
         found = {}
         for wall in np.flatnonzero(self.wall_column >= 0):
@@ -110,7 +117,7 @@ class LandmarkModel:
     def rows(
         self, least_snr: float = 10.0, *, angles: bool = True, use_vt: bool = False
     ) -> Iterator[LinearMeasurements]:
-        """Measurements of landmarks and walls in each cycle in turn.
+        """Yield the linear measurements of each cycle in turn: landmark paths and, if asked for, wall returns.
 
         Parameters
         ----------
@@ -125,8 +132,7 @@ class LandmarkModel:
             yield self._rows_of(cycle, least_snr, angles, use_vt)
 
     def _rows_of(self, cycle: int, least_snr: float, angles: bool, use_vt: bool) -> LinearMeasurements:
-        """Measurements of a cycle: range, and with `angles` both cosines, of every heard landmark path and wall
-        return."""
+        """Linear measurements of one cycle: range, and with `angles` both cosines, of every detected path."""
         snr = self.radio.integrated_snr(self.paths.gain[cycle])
         heard = self.paths.valid[cycle] & (snr >= least_snr)
         joined = np.flatnonzero(heard & (self.tx_point >= 0))
@@ -152,7 +158,7 @@ class LandmarkModel:
         )
 
     def _joined_rows(self, cycle: int, path: Integers) -> tuple[Floats, Floats]:
-        """(Q, 3, 3) and (Q, 3, U) of landmark paths: range, then two cosines."""
+        """Derivatives of landmark paths' range and two cosines by the agent (Q, 3, 3) and by the unknowns (Q, 3, U)."""
         tx, rx, heading = self.motion.tx[cycle], self.motion.rx[cycle], self.motion.heading[cycle]
         first, last = self.tx_point[path], self.rx_point[path]
         out, back = unit(tx - self.point[first]), unit(rx - self.point[last])
@@ -163,7 +169,8 @@ class LandmarkModel:
         return agent, np.concatenate([length[:, None], -cosines @ self.jacobian[last]], axis=1)
 
     def _wall_rows(self, cycle: int, path: int) -> tuple[Floats, Floats]:
-        """(1, 3, 3) and (1, 3, U) of one wall return."""
+        """Derivatives of one wall return's range and two cosines by the agent (1, 3, 3) and by the unknowns (1, 3,
+        U)."""
         tx, rx, heading = self.motion.tx[cycle], self.motion.rx[cycle], self.motion.heading[cycle]
         walls = self.paths.tx_walls[path][self.paths.tx_walls[path] >= 0]
         chain = mirror_chain(tx, self.wall_normal[walls], self.wall_offset[walls])
@@ -189,7 +196,8 @@ def build_landmark_model(
     *,
     walls: Unknown = "planes",
 ) -> LandmarkModel:
-    """Set up the landmarks and walls that are unknown on a trajectory's paths.
+    """Build the linear model of a trajectory's paths: which coordinates of landmarks and walls are unknown, and
+    derivatives.
 
     Parameters
     ----------
@@ -236,7 +244,7 @@ def build_landmark_model(
 
 
 def _points_seen(paths: Paths) -> tuple[list[tuple[int, ...]], Integers]:
-    """Fixed points as (landmark, walls that mirror it in turn), and which one Tx and Rx of each path see (2, P)."""
+    """Fixed points of paths as (landmark, walls that mirror it in turn), and which of them Tx and Rx see (2, P)."""
     keys: dict[tuple[int, ...], int] = {}
     seen = np.full((2, paths.num_paths), -1, dtype=np.int64)
     for path in np.flatnonzero(paths.landmark >= 0):

@@ -1,4 +1,4 @@
-"""What a bound takes for known of the motion: the start, and white-noise acceleration from there on."""
+"""Motion prior of a bound: standard deviations of the start, and white-noise acceleration from there on."""
 
 from dataclasses import dataclass
 
@@ -10,19 +10,19 @@ from rislam_rt.errors import ConfigError
 
 @dataclass(frozen=True, slots=True)
 class MotionPrior:
-    """What a bound takes for known of the motion: white-noise acceleration, and the start; deviations per axis."""
+    """Prior of a bound on the agent's motion: standard deviations per axis of acceleration noise and of the start."""
 
     acceleration: float = 0.01
-    """sigma_a [m/s^2]."""
+    """Standard deviation sigma_a [m/s^2] of the white-noise acceleration."""
     start_position: float = 0.01
-    """[m]."""
+    """Standard deviation [m] of the start position."""
     start_velocity: float = 0.01
-    """[m/s]."""
+    """Standard deviation [m/s] of the start velocity."""
     axes: int = 2
-    """2: height known, the agent moves in a horizontal plane; 3: all of it unknown."""
+    """Number of unknown axes: 2, height known, the agent moves in a horizontal plane; 3, height unknown too."""
     climb: float | None = None
-    """sigma_a upwards [m/s^2] of an agent whose height and climb are known at the start alone (3 axes); None: as in the
-    other directions."""
+    """Vertical sigma_a [m/s^2] of an agent whose height and climb are known at the start alone (3 axes); None: as in
+    the other directions."""
 
     def __post_init__(self) -> None:
         for name in ("acceleration", "start_position", "start_velocity"):
@@ -35,7 +35,7 @@ class MotionPrior:
 
     @property
     def accelerations(self) -> Floats:
-        """(axes,) sigma_a of each axis [m/s^2]."""
+        """Standard deviations (axes,) [m/s^2] of the white-noise acceleration of each axis."""
         sigma = np.full(self.axes, self.acceleration)
         if self.climb is not None:
             sigma[2] = self.climb
@@ -43,7 +43,7 @@ class MotionPrior:
 
     @property
     def start(self) -> Floats:
-        """(2 axes,) deviations of position and velocity at the start [m, m/s]."""
+        """Standard deviations (2 axes,) of position and velocity at the start [m, m/s]."""
         std = np.repeat([self.start_position, self.start_velocity], self.axes)
         if self.climb is not None:
             std[[2, 5]] = 0.0

@@ -1,4 +1,4 @@
-"""Position information of resolved paths (Proposition 1) and the bound that follows from it."""
+"""Fisher information of resolved paths on the agent's position (Proposition 1), and the position error bound."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ SINGULAR = 1e-13
 
 
 class PositionBound(NamedTuple):
-    """Cramer-Rao bound of a position."""
+    """Cramér-Rao bound of the agent's position, and whether it exists."""
 
     variance: Floats
     """(...,) trace of the inverse information [m^2]; infinite where it does not exist."""
@@ -23,12 +23,12 @@ class PositionBound(NamedTuple):
 
     @property
     def rms(self) -> Floats:
-        """(...,) position error bound [m]."""
+        """Position error bound (...,) [m]: root of the trace of the covariance bound."""
         return np.sqrt(self.variance)
 
 
 def range_information(snr: Floats, radio: RadioConfig) -> Floats:
-    """Information (...,) [1/m^2] on a resolved path's length from its SNR (...,) over all antennas, linear.
+    """Fisher information (...,) [1/m^2] on a resolved path's length from its SNR (...,) over all antennas, linear.
 
     `8 pi^2 zeta^2 / c^2 SNR`, the factor before `g g^T` in eq. `derived`.
     """
@@ -36,7 +36,7 @@ def range_information(snr: Floats, radio: RadioConfig) -> Floats:
 
 
 def position_information(gradient: Floats, snr: Floats, radio: RadioConfig) -> Floats:
-    """Information on the position, `J_p` (..., D, D) [1/m^2] of eq. `derived`, for paths that do not overlap.
+    """Fisher information `J_p` (..., D, D) [1/m^2] on the position of eq. `derived`, from paths that do not overlap.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def position_information(gradient: Floats, snr: Floats, radio: RadioConfig) -> F
 
 
 def position_bound(information: Floats, prior: Floats | float = 0.0) -> PositionBound:
-    """`tr((J + J_prior)^-1)` of information matrices (..., D, D) [1/m^2] with prior information likewise.
+    """Cramér-Rao bound `tr((J + J_prior)^-1)` of a position from information matrices (..., D, D) [1/m^2] and a prior.
 
     Outcomes: `NO_PATHS` where there is no information at all, `UNOBSERVABLE` where it is singular.
     """

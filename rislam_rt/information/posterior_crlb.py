@@ -1,4 +1,4 @@
-"""The posterior bound: recursive information of a whole trajectory with unknown landmarks and a prior on the start."""
+"""Posterior CRLB of a whole trajectory, cycle by cycle, with unknown landmarks and walls and a prior on the start."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from rislam_rt.information.motion_prior import MotionPrior
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosteriorBound:
-    """Bound after each of K cycles; no unbiased filter with these measurements does better on average."""
+    """Posterior CRLB of agent and map after each of K cycles: no unbiased filter does better on average."""
 
     agent: Floats
     """(K, 2 D, 2 D) covariance of position and velocity [m, m/s], D axes."""
@@ -28,7 +28,7 @@ class PosteriorBound:
 
     @property
     def rms(self) -> Floats:
-        """(K,) posterior bound on the position [m] over the axes that are filtered."""
+        """Posterior position error bound (K,) [m] over the unknown axes."""
         axes = self.agent.shape[1] // 2
         return np.asarray(np.sqrt(np.einsum("kii->k", self.agent[:, :axes, :axes])))
 
@@ -36,7 +36,7 @@ class PosteriorBound:
 def posterior_bound(
     rows: Iterable[LinearMeasurements], time: Floats, motion: MotionPrior, unknown_std: Floats
 ) -> PosteriorBound:  # fmt: skip
-    """The posterior CRLB by its recursion along a trajectory, linearised at the truth.
+    """Posterior CRLB of agent and map along a trajectory by its recursion, linearised at the truth.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def posterior_bound(
     time
         (K,) [s].
     unknown_std
-        (U,) standard deviation of each unknown beforehand; large where nothing is known.
+        (U,) prior standard deviation of each unknown; large where nothing is known.
 
     `J_k+1 = (Q + F J_k^-1 F^T)^-1 + H^T R^-1 H` (Tichavsky et al. 1998), with a square root of the covariance: nothing
     is subtracted, so that no SNR and no gap in time makes it indefinite (Kaminski, Bryson and Schmidt 1971).
@@ -69,7 +69,8 @@ def posterior_bound(
 
 
 def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
-    """Root (N, N) of the posterior bound after one time step, (N, N + D): `F = [I dt; 0 I]`, discrete white noise."""
+    """Square root (N, N + D) of the posterior covariance one time step on, from its root (N, N): `F = [I dt; 0 I]`,
+    discrete white noise."""
     axes = motion.axes
     moved = spread.copy()
     moved[:axes] += dt * spread[axes : 2 * axes]
@@ -79,8 +80,8 @@ def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
 
 
 def _update(spread: Floats, slope: Floats) -> Floats:
-    """Triangular root (N, N) of the posterior bound after measurements with derivatives (M, N) of unit variance, of a
-    root (N, N or more)."""
+    """Triangular square root (N, N) of the posterior covariance after measurements with derivatives (M, N) and unit
+    variance, from a root (N, N or more)."""
     count, size = slope.shape
     stacked = np.zeros((count + size, count + spread.shape[1]))
     stacked[:count, :count] = np.eye(count)

@@ -1,4 +1,4 @@
-"""Resolution of two paths: what the second one's amplitude can be told by, with all else unknown."""
+"""Resolution of two paths: the probability that a receiver resolves them, from their joint Cramér-Rao bound."""
 
 from typing import Any
 
@@ -8,27 +8,28 @@ from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig, SensorModel, detection_probability
 
 PHASES = 8
-"""Relative phases of two paths that are looked at: half a turn covers them, as the other half is alike."""
+"""Number of relative phases of two paths that are averaged: half a turn covers them, as the other half is alike."""
 BAND_NODES = 24
-"""Gauss-Legendre nodes over the band: exact to 1e-9 for delays up to 4 cells, beyond which nothing overlaps."""
+"""Number of Gauss-Legendre nodes over the band: exact to 1e-9 for delays up to 4 cells; beyond, nothing overlaps."""
 FAR = 4.0
-"""Cells of delay beyond which two paths do not overlap."""
+"""Delay difference [cells] beyond which two paths do not overlap."""
 RIDGE = 1e-10
 """Added to a Gram matrix of unit diagonal, so that coinciding paths do not stop the solver."""
 
 
 def resolved_probability(gap: Floats, snr: Floats, sensor: SensorModel) -> Floats:
-    """Probability (...,) that two paths come out as two, over their relative phase.
+    """Probability (...,) that the receiver resolves two paths, averaged over their relative phase.
 
     Parameters
     ----------
     gap
-        (..., 3) between them, delay [s] and cosines.
+        (..., 3) difference of the two in delay [s] and cosines.
     snr
-        (..., 2) expected, of each: linear, over all antennas.
+        (..., 2) expected SNR of each: linear, over all antennas.
 
-    The weaker one needs an amplitude that passes the threshold when both places and both amplitudes are unknown: its
-    SNR times `certainty_share` stands in for that of a lone path. A receiver that goes by cells has another rule.
+    The weaker one needs an amplitude that passes the threshold when the parameters and amplitudes of both are unknown:
+    its SNR times `certainty_share` takes the place of that of a lone path. A receiver that resolves by cells has
+    another rule.
     """
     if sensor.resolution != "joint":
         return np.where(sensor.may_merge(gap), 0.0, 1.0)
@@ -38,9 +39,9 @@ def resolved_probability(gap: Floats, snr: Floats, sensor: SensorModel) -> Float
 
 
 def certainty_share(gap: Floats, radio: RadioConfig) -> Floats:
-    """(..., `PHASES`) by how much the variance of a path's amplitude grows beside another, inverted: 1 far from it.
+    """Ratio (..., `PHASES`) of a lone path's amplitude variance to that beside a second path: 1 far from it.
 
-    The joint Cramer-Rao bound of two paths, amplitudes (complex) and places (delay and both cosines) unknown: it
+    From the joint Cramer-Rao bound of two paths, complex amplitudes, delays and both cosines unknown: it
     depends on their gap (..., 3) and relative phase, not on how strong the other is.
     """
     inner = _inner_products(np.asarray(gap, dtype=np.float64), radio)
@@ -57,7 +58,7 @@ def certainty_share(gap: Floats, radio: RadioConfig) -> Floats:
 
 
 def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
-    """(..., 8, 8) of the signals of two paths to resolve and of their derivatives, all of length one."""
+    """Inner products (..., 8, 8) of the signals of two paths and of their derivatives, all of unit norm."""
     array = radio.array
     nodes, weight = np.polynomial.legendre.leggauss(BAND_NODES)
     rows, cols = ((np.arange(count) - (count - 1) / 2.0) * array.spacing for count in (array.rows, array.cols))
@@ -75,7 +76,7 @@ def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
 
 
 def _block(gap: Floats, axes: list[tuple[Any, Any]]) -> Complexes:
-    """(..., 4, 4) inner products of a signal to resolve and its derivatives with those a `gap` (..., 3) in cells
+    """Inner products (..., 4, 4) of a path's signal and derivatives with those of a path a `gap` (..., 3) in cells
     away."""
     moments = []
     for axis, (place, weight) in enumerate(axes):

@@ -1,41 +1,33 @@
-"""Floor 5: the receiver. What arrives, the noise, and multipath components with their standard deviations."""
+"""Floor 5: the receiver. Received signal, noise, hardware, and multipath components with their standard deviations."""
 
 from rislam_rt.measurement.calibrate import calibrate
 from rislam_rt.measurement.components import path_std
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_dataset
-from rislam_rt.measurement.false_alarms import detection_threshold, expected_false_alarms
-from rislam_rt.measurement.hardware import Correction, FrontEnd, HardwareConfig, build_front_end, expected_distortion
+from rislam_rt.measurement.hardware import FrontEnd, HardwareConfig, build_front_end, expected_distortion
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import paper_snr_db, reference_gain, with_reference_snr
 from rislam_rt.measurement.received import Clutter, Received, phase_reversed, receive
 from rislam_rt.measurement.sensor_model import build_sensor
-from rislam_rt.measurement.signal import num_tones, pulse_samples, to_samples, to_tones, tones
-from rislam_rt.measurement.tracking import TrackInfo, TrackingConfig, TrackState, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import Capture, DetectedComponents, capture, find_components
+from rislam_rt.measurement.signal import num_tones, to_samples
+from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
+from rislam_rt.measurement.waveform_receiver import capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [
     "NO_COMPONENT",
-    "Capture",
     "Clutter",
-    "Correction",
-    "DetectedComponents",
     "FrontEnd",
     "HardwareConfig",
     "Received",
     "ReceiverConfig",
-    "TrackInfo",
-    "TrackState",
     "TrackingConfig",
     "build_front_end",
     "build_sensor",
     "calibrate",
     "capture",
     "detection_probability",
-    "detection_threshold",
     "expected_distortion",
-    "expected_false_alarms",
     "find_components",
     "init_tracks",
     "load_signals",
@@ -44,13 +36,10 @@ __all__ = [
     "paper_snr_db",
     "path_std",
     "phase_reversed",
-    "pulse_samples",
     "receive",
     "reference_gain",
     "signals_dataset",
     "step_tracks",
     "to_samples",
-    "to_tones",
-    "tones",
     "with_reference_snr",
 ]

@@ -25,25 +25,26 @@ from rislam_rt.measurement.signal import num_tones
 from rislam_rt.model import Body, RadioConfig
 
 FAINTEST = (0.3, 0.1, 0.03, 0.01, 0.003)
-"""Round by round, amplitude over that of the strongest path within `GHOST_CELLS` below which a path is taken for its
-ghost: the better the array is known, the fainter its ghosts."""
+"""Amplitude ratio to the strongest path within `GHOST_CELLS` below which a path is taken for that one's ghost, round by
+round: the better the array is known, the fainter its ghosts."""
 GHOST_CELLS = 1.5
-"""An array's errors make ghosts at the delay of the path that they stem from, within so many cells."""
+"""Resolution cells of delay within which an array's errors make ghosts of a path."""
 LOUD = 100.0
-"""SNR over all antennas from which on a path serves (20 dB): its direction is known to a tenth of a beam."""
+"""SNR over all antennas above which a path is used (20 dB): its direction is known to a tenth of a beam."""
 MOST = 60
-"""Most paths of one cycle."""
+"""Largest number of paths estimated in one cycle."""
 STRAY, LEAST_STRAY = 0.1, 1e-3
-"""Amplitude that an element is held beforehand to take from each other one, and the least that is reckoned with; in
-between it is as found in the last round."""
+"""Prior standard deviation of the coupling amplitude between two elements, in the first round and at least; in between
+it is as found in the last round."""
 
 
 class CalibrationReference(NamedTuple):
-    """What calibration starts from."""
+    """Known inputs of a front end's calibration: sounding, search grid, direct path and noise."""
 
     sounding: Sounding
     grid: MatchedFilterGrid
     window: tuple[float, float]
+    """First and last delay in resolution cells."""
     direct: Floats
     """(3,) delay of the direct path in cells, and its two cosines."""
     noise: float
@@ -53,12 +54,12 @@ class CalibrationReference(NamedTuple):
 def calibrate(
     samples: Sequence[Complexes], body: Body, radio: RadioConfig, config: ReceiverConfig, *, swinging: bool = False
 ) -> Correction:
-    """What calibration takes out of the front end, from the samples (L, M) of several cycles at full energy.
+    """Calibrate a front end: the correction of its faults from the samples (L, M) of several cycles at full energy.
 
     Parameters
     ----------
     body
-        Where Tx and Rx sit: length and direction of the direct path.
+        Offsets of Tx and Rx: length and direction of the direct path.
     swinging
         Whether the gain changes from cycle to cycle; it is then measured on the direct path.
     """
@@ -77,18 +78,19 @@ def calibrate(
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
         plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, _inverse(matrix)
-        drawn = np.array([_as_drawn(inverse @ one, known, faintest) for one in plain])
+        drawn = np.array([_ideal_samples(inverse @ one, known, faintest) for one in plain])
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
         model = matrix @ drawn
         image = _image(heard - residue - model, heard)
         rest = heard - image[:, None] * image_spectrum(heard) - model
-        residue, spread = _standing(rest)
+        residue, spread = _constant_residue(rest)
     left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
     return Correction(_inverse(matrix), residue, image, direct, loudness, left)
 
 
 def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> CalibrationReference:
+    """Inputs of calibration that follow from the body's drawing and the settings of radio and receiver."""
     span = body.tx_offset - body.rx_offset
     length = float(np.linalg.norm(span))
     sounding = build_sounding(num_tones(radio, config), radio)
@@ -98,14 +100,14 @@ def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Calibratio
 
 
 def _chains(mean: Complexes, direct: Complexes) -> Complexes:
-    """(L,) gain and phase of each receiver chain by calibration, from the direct path in the mean samples; of mean
-    one."""
+    """Complex gains (L,) of the receive chains, of mean one, from the direct path in the mean samples (L, M)."""
     chains = np.sum(mean * direct.conj(), axis=1)
     return np.asarray(chains / np.mean(chains))
 
 
-def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
-    """What an array as drawn would hear (L, M) of the strong paths in samples of a calibrated one, ghosts left out."""
+def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
+    """Samples (L, M) that an ideal array would receive of the strong paths estimated in calibrated samples, without
+    ghosts."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
     kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
@@ -115,28 +117,29 @@ def _as_drawn(samples: Complexes, known: CalibrationReference, faintest: float) 
 
 
 def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
-    """(P,) which paths calibration uses: those not so much weaker than one of their delay that they may be its
+    """Which paths (P,) calibration uses: those not so much weaker than a path of about their delay that they may be its
     ghost."""
     near = np.abs(delay[:, None] - delay) < GHOST_CELLS
     return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
 
 
 def _antennas(sounding: Sounding, parameters: Floats) -> Complexes:
-    """(L, P) antenna vectors of paths (P, 3) as the array to be calibrated is drawn."""
+    """Antenna vectors (L, P) of paths (P, 3) for an ideal array."""
     x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
     return np.asarray(np.exp(2j * np.pi * (x * parameters[:, 1] + y * parameters[:, 2])))
 
 
 def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
-    """(M, P) responses of the calibration's paths over the band."""
+    """Responses (M, P) of the sounding's tones to paths (P, 3)."""
     return tone_response(sounding.frequency, parameters[:, 0])
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
-    """Calibration matrix (L, L) from what the antennas should have heard (T, L, M) to what they did, by least squares.
+    """Array matrix (L, L) of coupling and chain gains, by regularised least squares from ideal to received samples (T,
+    L, M).
 
-    It is held to the chains as known so far, and between elements to nothing with the deviation `stray`; `spread` is
-    the variance of a tone's misfit.
+    The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
+    misfit.
     """
     prior = spread / stray**2
     left = np.einsum("tlm,tkm->lk", plain, drawn.conj()) + prior * np.diag(np.diag(matrix))
@@ -144,9 +147,9 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
     return np.asarray(np.linalg.solve(right.T, left.T).T)
 
 
-def _standing(rest: Complexes) -> tuple[Complexes, float]:
-    """Residue (L, M) that calibration finds standing in (T, L, M) from cycle to cycle, and the variance of what does
-    not."""
+def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
+    """Leakage residue (L, M) that stays the same over the cycles of unexplained samples (T, L, M), and the variance of
+    the rest."""
     mean = rest.mean(axis=0)
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))
@@ -154,11 +157,12 @@ def _standing(rest: Complexes) -> tuple[Complexes, float]:
 
 
 def _inverse(matrix: Complexes) -> Complexes:
+    """Inverse (L, L) of the array's matrix."""
     return np.asarray(np.linalg.inv(matrix))
 
 
 def _image(rest: Complexes, heard: Complexes) -> Complexes:
-    """(L,) the mixer's image by calibration: share of the mirrored band in what is left beside the direct path.
+    """Complex amplitude (L,) of the mixers' image of the band, from unexplained and received samples (T, L, M).
 
     At rest an image is the same as a chain's gain.
     """

@@ -1,4 +1,4 @@
-"""Components before noise: single paths, or several that come out as one; and how well a lone one can be measured."""
+"""Multipath components before noise, of one path or of several unresolved ones, and the errors of a lone one."""
 
 from typing import NamedTuple
 
@@ -15,46 +15,46 @@ cosine along which the array has no aperture."""
 
 
 class NoiselessComponents(NamedTuple):
-    """N components of one cycle before noise: single paths, or several that cannot be resolved."""
+    """N multipath components of one cycle before noise, each of one path or of several that cannot be resolved."""
 
     path: Integers
     """(N,) column of the strongest path."""
     tau: Floats
-    """(N,) [s]."""
+    """(N,) [s] delay."""
     cosines: Floats
-    """(N, 2) body frame."""
+    """(N, 2) direction cosines in the body frame."""
     gain: Complexes
-    """(N,)."""
+    """(N,) complex gain."""
 
 
 class ComponentErrors(NamedTuple):
-    """What the bound does to N components."""
+    """Errors of N multipath components, drawn by the Cramér-Rao bound, and their standard deviations."""
 
     error: Floats
-    """(N, 3) of delay [s] and cosines, drawn."""
+    """(N, 3) errors of delay [s] and cosines, drawn."""
     deviation: Floats
-    """(N, 3) their standard deviations."""
+    """(N, 3) standard deviations of delay [s] and cosines."""
     gain_std: Floats
     """(N,) standard deviation of the complex gain."""
 
 
 class ReportedComponents(NamedTuple):
-    """N components of one capture as the receiver reports them."""
+    """N multipath components of one capture as the receiver reports them, false ones included."""
 
     path: Integers
     """(N,) column of the strongest path, -1 for a false one."""
     points: Floats
     """(N, 3) delay [s] and cosines."""
     deviation: Floats
-    """(N, 3)."""
+    """(N, 3) standard deviations of delay [s] and cosines."""
     gain: Complexes
-    """(N,)."""
+    """(N,) complex gain."""
     gain_std: Floats
-    """(N,) of the complex gain."""
+    """(N,) standard deviation of the complex gain."""
 
 
 def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
-    """Deviations of the component of a lone path: delay (...,) [s] and cosines (..., 2), by its bound.
+    """Standard deviations of a lone path's component by its Cramér-Rao bound: delay (...,) [s] and cosines (..., 2).
 
     `information.measurement_std` at the linear SNR over all L antennas, but no cosine is less certain than `DISC_STD`.
     """
@@ -63,8 +63,7 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
 
 
 def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
-    """Merge the paths of one capture that are closer than a resolution cell into components, from the strongest
-    down."""
+    """Merge paths of one capture that are closer than a resolution cell into components, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
     for value in in_resolution_cells(
         received, sensor.radio
@@ -74,7 +73,7 @@ def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
 
 
 def join(received: Received, leader: Integers) -> NoiselessComponents:
-    """One component for all paths of the same leader (N,), a row of `received`.
+    """Sum the paths of the same leader (N,), a row of `received`, to one component each.
 
     The joint gain is the sum. Delay and cosines are those at which one path fits the sum best, to first order
     `Re sum_i alpha_i conj(alpha) tau_i / |alpha|^2`, kept between the members' own.
@@ -92,12 +91,13 @@ def join(received: Received, leader: Integers) -> NoiselessComponents:
 
 
 def single(received: Received) -> NoiselessComponents:
-    """Components of which each is one path."""
+    """Components of one path each, nothing merged."""
     return NoiselessComponents(received.path, received.tau, received.direction[:, :2], received.gain)
 
 
 def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
-    """Errors of components, and what is reported of them, each as if it were alone in its cell."""
+    """Errors of components by the bound of a lone path, each as if no other were near; `draws` (N, 5) are standard
+    normal."""
     tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
     deviation = np.column_stack([tau, cosines])
     gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))
@@ -105,36 +105,37 @@ def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -
 
 
 def select_paths(received: Received, keep: Booleans) -> Received:
-    """The components' paths that are marked (N,)."""
+    """Select the received paths that are marked (N,)."""
     return Received._make(field[keep] for field in received)
 
 
 def in_resolution_cells(received: Received, radio: RadioConfig) -> Floats:
-    """Delays and cosines (N, 3) in resolution cells; 0 along an axis without aperture."""
+    """Delays and direction cosines (N, 3) of received paths in resolution cells; 0 along an axis without aperture."""
     array = radio.array
     widths = [count * array.spacing if count > 1 else 0.0 for count in (array.rows, array.cols)]
     return np.column_stack([received.tau * radio.bandwidth, received.direction[:, :2] * widths])
 
 
 def clip_to_unit_disc(cosines: Floats) -> Floats:
-    """Cosines (..., 2) brought radially into the unit disc, where directions are."""
+    """Clip direction cosines (..., 2) radially to the unit disc."""
     length = np.linalg.norm(cosines, axis=-1, keepdims=True)
     return cosines / np.maximum(length, 1.0)
 
 
 def capped_cosine_std(deviation: Floats, radio: RadioConfig) -> Floats:
-    """Standard deviations (N, 2) of cosines, `DISC_STD` at most and along an axis without aperture."""
+    """Standard deviations (N, 2) of direction cosines, at most `DISC_STD`, which they are along an axis without
+    aperture."""
     blind = np.array([radio.array.rows, radio.array.cols]) < 2
     return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))
 
 
 def blind_axes(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Cosines (N, 2), zero along which the array has no aperture: nothing is measured there."""
+    """Direction cosines (N, 2) set to zero along axes of the array without aperture, where nothing is measured."""
     return cosines * (np.array([radio.array.rows, radio.array.cols]) > 1)
 
 
 def _leaders(strength: Floats, cell: Booleans) -> Integers:
-    """(N,) for each path the strongest free path of its cell, with which it merges into one component."""
+    """Leaders (N,) of paths: for each the strongest free path of its resolution cell, with which it merges."""
     crowded = np.count_nonzero(cell, axis=1) > 1
     leader = np.where(crowded, -1, np.arange(len(strength)))
     rows = crowded.nonzero()[0]

@@ -1,4 +1,4 @@
-"""Configuration of the receiver."""
+"""Configuration of the receiver: detection, resolution, alternation of codes, leakage, sounding."""
 
 from dataclasses import dataclass
 
@@ -8,24 +8,26 @@ ESTIMATORS = ("bound", "waveform")
 """Ways from the channel to multipath components: errors drawn from the Cramér-Rao bound, or a real estimator."""
 
 RESOLUTIONS = ("cell", "joint")
+"""Values of `ReceiverConfig.resolution`: criteria by which paths cannot be resolved."""
 ORDERS = ("ABBA", "AB")
+"""Values of `ReceiverConfig.order`: orders of a code and its phase-reversed one within the slot."""
 MOST_TONES = 65536
-"""Of a sounding: what estimates from its samples takes memory and time for all of them."""
+"""Largest number of tones of a sounding: memory and time of the estimator grow with it."""
 RANGES: dict[str, tuple[float, float]] = {
     "detection_threshold_db": (2.0, 60.0), "clutter_rate": (0.0, 1e4), "leakage_cancellation_db": (0.0, 300.0),
     "code_dwell": (0.0, 1e12), "slot": (0.0, 1e12), "top_speed": (0.0, 1e12), "min_delay": (0.0, 1.0),
     "max_delay": (0.0, 1.0), "false_alarm_rate": (0.0, 1e12), "num_subcarriers": (0, MOST_TONES),
     "converter_bits": (0, 32), "max_components": (1, 1000), "panels": (1, 100),
 }  # fmt: skip
-"""Smallest and largest value of each. Below 2 dB the law of false alarms, one of high levels, gives a negative number;
-above 60 dB nothing is heard; a delay of 1 s is beyond every scene."""
+"""Smallest and largest value of each setting of the receiver. Below 2 dB the law of false alarms, one of high levels,
+gives a negative number; above 60 dB nothing is detected; a delay of 1 s is beyond every scene."""
 LEAST_RATE = 1e-100
-"""[false components a cycle] Fewer nobody asks for, and a threshold for them float64 cannot tell."""
+"""Smallest false-alarm rate above 0 [components a cycle]: float64 cannot tell a threshold for fewer."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReceiverConfig:
-    """Everything that the receiver is free to choose. SI units; thresholds in dB refer to the SNR over all antennas."""
+    """Settings of the receiver. SI units; thresholds in dB refer to the SNR over all antennas."""
 
     estimator: str = "waveform"
     """`bound` draws errors from the Cramér-Rao bound; `waveform` makes the samples and estimates from them."""
@@ -34,26 +36,28 @@ class ReceiverConfig:
     clutter_rate: float = 0.5
     """Mean number of false components a cycle (`bound`)."""
     leakage_cancellation_db: float = 0.0
-    """By how much the Tx-Rx leakage (LOS) is attenuated before sampling."""
+    """Attenuation [dB] of the Tx-Rx leakage (LOS) before sampling."""
     merge: bool = True
     """Whether paths that cannot be resolved come out as one (`bound`)."""
     resolution: str = "cell"
-    """What that is (`bound`): `cell`, two paths within 1/B in delay and the array's beam; `joint`, paths among which
-    the joint bound cannot share the amplitude out. `joint` draws the errors from that bound too, and costs more."""
+    """Which paths cannot be resolved (`bound`): `cell`, two within 1/B in delay and the array's beam; `joint`, those
+    among which the joint bound cannot share the amplitude out. `joint` draws the errors from that bound too, and costs
+    more."""
     alternation: bool = False
-    """Whether the slot is split between the code and its phase-reversed twin, which sets the panel's paths apart."""
+    """Whether the slot is split between the code and its phase-reversed one, which sets the panel's paths apart."""
     order: str = "ABBA"
-    """Order of code and twin within the slot: `ABBA` cancels what moves evenly, `AB` lets it leak."""
+    """Order of the code (A) and its phase-reversed one (B) within the slot: `ABBA` cancels the first order of motion,
+    `AB` lets it leak."""
     panels: int = 1
-    """Panels that are told apart by alternation, each with signs of its own; with fewer than there are, the last stands
-    for the rest."""
+    """Number of panels that alternation tells apart, each with signs of its own; with fewer than there are, the last
+    stands for the rest."""
     code_dwell: float = 0.0
     """Time [s] for which a code is held, the order repeated until the slot is full; 0 goes through it once. The panel
     has to switch as fast."""
     slot: float = 0.01
     """Length [s] of the measurement slot, in which the agent moves on."""
     top_speed: float = 0.5
-    """Speed of the agent [m/s] that is reckoned with at most in asking what motion may have left in the difference."""
+    """Largest speed of the agent [m/s] assumed for the paths that motion leaves in the difference of two codes."""
     min_delay: float = 0.0
     """Components before this delay [s] are not reported."""
     max_delay: float = 80e-9
@@ -61,13 +65,14 @@ class ReceiverConfig:
     false_alarm_rate: float = 0.0
     """Mean number of false components a cycle that noise alone may cause; above 0 it sets the threshold instead."""
     num_subcarriers: int = 0
-    """M: tones, or samples, of a sounding; 0 takes as many as the latest delay needs."""
+    """Number M of tones, or samples, of a sounding; 0 takes as many as the latest delay needs."""
     element_exact: bool = False
     """Whether every element has its own exact delay (`waveform`), instead of plane waves and a narrow band."""
     converter_bits: int = 0
-    """Bits of the converters for each of real and imaginary part (`waveform`); 0 for none."""
+    """Bits of the analogue-to-digital converters for each of real and imaginary part (`waveform`); 0 for no
+    quantisation."""
     max_components: int = 120
-    """Most components that are looked for in one cycle (`waveform`)."""
+    """Largest number of components estimated in one capture (`waveform`)."""
 
     def __post_init__(self) -> None:
         for name, allowed in (("estimator", ESTIMATORS), ("resolution", RESOLUTIONS), ("order", ORDERS)):
@@ -90,5 +95,5 @@ class ReceiverConfig:
 
     @property
     def num_captures(self) -> int:
-        """Captures of the receiver a cycle: with alternation the sum, and one difference a panel."""
+        """Number of captures a cycle: one, or with alternation the codes' sum and one difference for each panel."""
         return 1 + self.panels if self.alternation else 1

@@ -1,4 +1,4 @@
-"""Data sets of received signals: samples, what the receiver found in them, and which path each finding was."""
+"""Data sets of received signals: samples, the components that the receiver found in them, and their true paths."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -11,7 +11,13 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received import receive
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
-from rislam_rt.measurement.waveform import DetectedComponents, capture, find_components, to_measurement, true_paths
+from rislam_rt.measurement.waveform_receiver import (
+    DetectedComponents,
+    capture,
+    find_components,
+    to_measurement,
+    true_paths,
+)
 from rislam_rt.model import Paths, RadioConfig, Trajectory
 from rislam_rt.storage.netcdf import Entry, padded, read_dataset, variables
 from rislam_rt.waveform import subcarrier_frequencies
@@ -20,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NO_COMPONENT = -9
-"""Fills the integer variables where a cycle has fewer components than the fullest one."""
+"""Fill value of integer variables of a signals data set where a cycle has fewer components than another."""
 
 SCHEMA: dict[str, Entry] = {
     "samples": (("time", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
@@ -41,7 +47,7 @@ SCHEMA: dict[str, Entry] = {
     "found_label": (("time", "component"), "1", "the tracker's label, -9 no component"),
     "found_path": (("time", "component"), "1", "truth, for scoring only: column of the path, -1 clutter, -9 none"),
 }
-"""Dimensions, unit and meaning; complex variables are stored as `_real` and `_imag`."""
+"""Dimensions, unit and meaning of a signals data set's variables; complex ones are stored as `_real` and `_imag`."""
 
 
 def signals_dataset(
@@ -53,7 +59,8 @@ def signals_dataset(
     rng: np.random.Generator,
     on_cycle: Callable[[], None] | None = None,
 ) -> "xr.Dataset":
-    """Data set of signals: samples of every cycle, the components found in them with their tracks, and the truth.
+    """Data set of received signals: samples of every cycle, the components found in them with their tracks, and the
+    truth.
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """
@@ -99,7 +106,7 @@ def signals_dataset(
 
 
 def load_signals(path: str | Path) -> "xr.Dataset":
-    """Read a data set of signals, its complex variables joined again.
+    """Read a data set of received signals from NetCDF, real and imaginary parts joined to complex variables.
 
     Raises
     ------
@@ -114,6 +121,7 @@ def load_signals(path: str | Path) -> "xr.Dataset":
 
 
 def _dataset(values: dict[str, Any], radio: RadioConfig, config: ReceiverConfig) -> "xr.Dataset":
+    """Signals data set of the given variables, radio and receiver settings as attributes."""
     import xarray as xr
 
     attributes = {f"radio_{key}": value for key, value in asdict(radio).items() if key not in ("array", "antennas")}

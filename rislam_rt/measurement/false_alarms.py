@@ -1,4 +1,4 @@
-"""Threshold and false alarms of a search over delay and both cosines without a grid.
+"""False alarms and detection threshold of a search over delay and both direction cosines without a grid.
 
 Noise alone makes the matched filter's output a stationary complex Gaussian field over (tau, u, v). How many of its
 peaks exceed a level follows from the expected Euler characteristic of the excursion set of a chi-square field with two
@@ -17,7 +17,8 @@ from rislam_rt.model import RadioConfig, SensorModel
 
 
 def detection_threshold(radio: RadioConfig, config: ReceiverConfig) -> float:
-    """Linear threshold on the measured SNR over all antennas: as set, or as the false-alarm rate demands."""
+    """Detection threshold (linear) on the measured SNR over all antennas: as set, or as the false-alarm rate
+    demands."""
     if not config.false_alarm_rate:
         return float(10.0 ** (config.detection_threshold_db / 10.0))
     return _threshold_of_rate(config.false_alarm_rate, radio, config.max_delay - config.min_delay)
@@ -44,7 +45,8 @@ def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -
 
 
 def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:
-    """Volume, surface and edges (mu_0 .. mu_3) of the region searched for false alarms: ellipse times interval."""
+    """Intrinsic volumes mu_0 .. mu_3 of the region searched for components: ellipse of cosines times interval of
+    delays."""
     length = 2.0 * np.pi * np.sqrt(radio.effective_bandwidth_squared) * window
     positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
     minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
@@ -54,7 +56,7 @@ def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float,
 
 
 def _half_perimeter(major: float, minor: float) -> float:
-    """Half perimeter of the ellipse of false alarms: Gauss' arithmetic-geometric mean (Abramowitz and Stegun 17.6).
+    """Half perimeter of an ellipse of given half axes by Gauss' arithmetic-geometric mean (Abramowitz and Stegun 17.6).
 
     `scipy.special.ellipe` would cost every command a tenth of a second to load.
     """
@@ -70,6 +72,7 @@ def _half_perimeter(major: float, minor: float) -> float:
 
 @lru_cache(maxsize=64)
 def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
+    """Detection threshold (linear SNR) at which noise causes `rate` false alarms a cycle in a window [s] of delays."""
     # From here on all densities fall with the threshold; fewer alarms than exp(-300) nobody asks for.
     lowest, highest = 4.0, 300.0
     if expected_false_alarms(lowest, radio, window) <= rate:
@@ -80,8 +83,8 @@ def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
 
 
 def draw_false_alarms(sensor: SensorModel, *, rng: np.random.Generator) -> ReportedComponents:
-    """Draw false alarms: Poisson many, even over delay window and disc of cosines, amplitudes as of noise that
-    passes."""
+    """Draw false alarms: a Poisson number, uniform over delay window and disc of cosines, amplitudes of noise above the
+    threshold."""
     radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
     tau = rng.uniform(*sensor.window, count)
     radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)

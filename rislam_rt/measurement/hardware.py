@@ -1,4 +1,4 @@
-"""Hardware faults of a real front end: an array not as drawn, leakage left over, converters, oscillator, gain.
+"""Hardware faults of a receiver's front end: array errors, leakage residue, I/Q imbalance, phase noise, quantisation.
 
 The chain of one capture, from the paths to the samples that the estimator gets: elements at other places than drawn;
 coupling between them; gain and phase of each receive chain; what is left of the leakage after its cancellation, random
@@ -19,38 +19,39 @@ from rislam_rt.measurement.signal import add_noise, convert, num_tones, to_sampl
 from rislam_rt.model import RadioConfig
 
 LARGEST = 1e12
-"""Largest value of a fault; float64 carries its square, and nothing is worse."""
+"""Largest value of a hardware fault's setting: float64 carries its square."""
 
 
 @dataclass(frozen=True, slots=True)
 class HardwareConfig:
-    """How far a front end strays, all 0: an ideal one. Amplitude ratios are linear: 0.01 is -40 dB."""
+    """Tolerances of a receiver's hardware faults, all 0 for an ideal front end. Amplitude ratios are linear: 0.01 is
+    -40 dB."""
 
     gain_std_db: float = 0.0
-    """Standard deviation of the gain of an element and its receive chain."""
+    """Standard deviation [dB] of the gain of an element and its receive chain."""
     phase_std_deg: float = 0.0
-    """Standard deviation of their phase."""
+    """Standard deviation [degrees] of the phase of an element and its receive chain."""
     position_std_m: float = 0.0
-    """Standard deviation of an element's place along each axis."""
+    """Standard deviation [m] of an element's position along each axis."""
     coupling: float = 0.0
     """Amplitude that an element takes from its nearest neighbours; it falls with distance, and turns with it."""
     leakage_residue: float = 0.0
     """Amplitude of what the cancellation leaves, over that of the leakage before it; independent over tones and
     antennas."""
     iq_image: float = 0.0
-    """Amplitude of the image of the band in itself, of a phase of its own in every receive chain."""
+    """Amplitude of the mixer's image of the band (I/Q imbalance), of a phase of its own in every receive chain."""
     phase_noise_deg: float = 0.0
-    """Root mean square of the phase of single samples, the same in all chains."""
+    """Root mean square [degrees] of the phase noise of single samples, the same in all chains."""
     phase_step_deg: float = 0.0
-    """Root mean square of the common phase of one code's signal against its twin's."""
+    """Root mean square [degrees] of the common phase of one code's signal against the other's."""
     carrier_offset_hz: float = 0.0
     """Carrier of the Tx less that of the Rx: turns all paths within the slot."""
     agc_std_db: float = 0.0
-    """Standard deviation of the gain from cycle to cycle, not reported."""
+    """Standard deviation [dB] of the gain control's gain from cycle to cycle, not reported."""
     clip_rms: float = 0.0
     """Full scale of the converters over the root mean square of real or imaginary part; 0: the largest sample fits."""
     told: bool = False
-    """Whether the estimator reckons with the power of all this as with noise."""
+    """Whether the estimator counts the expected power of all these faults as noise."""
     calibration_cycles: int = 0
     """Cycles at the start whose signals are recorded, to calibrate on the direct path and the walls; 0 for none."""
 
@@ -68,57 +69,58 @@ class HardwareConfig:
 
     @property
     def ideal(self) -> bool:
-        """Whether the hardware has no fault."""
+        """Whether the front end has no hardware fault."""
         return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
 
 
 class Correction(NamedTuple):
-    """What calibration takes out of L M samples."""
+    """Correction of a front end's faults that calibration found, applied to samples (L, M)."""
 
     matrix: Complexes
-    """(L, L) by which antennas are multiplied."""
+    """(L, L) by which antennas are multiplied: the inverse of the array's matrix."""
     residue: Complexes
-    """(L, M) that is taken off before [sqrt(J)], at the energy E."""
+    """(L, M) [sqrt(J)] leakage residue that is subtracted first, at the energy E."""
     image: Complexes
-    """(L,) amplitude of the image that is taken off."""
+    """(L,) amplitude of the mixer's image that is subtracted."""
     direct: Complexes
-    """(L, M) signal of the direct path, of unit energy, that the gain control is measured on."""
+    """(L, M) signal of the direct path, of unit energy, on which the gain control's gain is measured."""
     loudness: float
-    """Its amplitude in the calibration [sqrt(J)], at the energy E; 0 leaves the gain as it is."""
+    """Amplitude [sqrt(J)] of the direct path in the calibration, at the energy E; 0 leaves the gain as it is."""
     left: float
     """Share of the signal's power that the calibrated model leaves unexplained."""
 
 
 class FrontEnd(NamedTuple):
-    """One receiver as it was built."""
+    """One receiver's front end with the hardware faults that were drawn for it."""
 
     config: HardwareConfig
     offset: Floats
-    """(L, 3) of elements from where they are drawn [wavelengths]."""
+    """(L, 3) [wavelengths] offsets of the elements from their drawn positions."""
     matrix: Complexes
     """(L, L) coupling, gains and phases."""
     residue: Complexes
     """(L, M) left of a leakage of unit gain and unit energy a tone."""
     image: Complexes
-    """(L,)."""
+    """(L,) amplitude of the mixer's image of the band."""
     correction: Correction | None = None
+    """Correction by calibration, None if the front end is not calibrated."""
 
 
-class Sent(NamedTuple):
-    """What a capture's energy and direct path are."""
+class SentSignal(NamedTuple):
+    """Energy share, leakage and gain of one code's signal in a slot, for the front end that receives it."""
 
     unit: float
-    """Root of the share of the slot's energy that the capture has."""
+    """Root of the share of the slot's energy that the code's signal has."""
     leakage: complex
-    """Gain of the direct path before its cancellation, times the root of the capture's energy a tone [sqrt(J)]."""
+    """Gain of the direct path before its cancellation, times the root of the signal's energy a tone [sqrt(J)]."""
     swing: float = 1.0
-    """Of the gain control, in this cycle."""
+    """Amplitude ratio of the gain control in this cycle."""
 
 
 def build_front_end(
     config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, *, rng: np.random.Generator
 ) -> FrontEnd:
-    """Draw the faults of a receiver's hardware, each with draws of its own, so that one more leaves the others."""
+    """Draw the hardware faults of a receiver's front end within their tolerances, each with draws of its own."""
     array, count = radio.array, radio.array.num_antennas
     offset = config.position_std_m / radio.wavelength * rng.standard_normal((count, 3))
     loud = 10.0 ** (config.gain_std_db * rng.standard_normal(count) / 20.0)
@@ -131,17 +133,17 @@ def build_front_end(
 
 
 def digitise(
-    clean: Complexes, sent: Sent, radio: RadioConfig, receiver: ReceiverConfig, front_end: FrontEnd | None,
+    clean: Complexes, sent: SentSignal, radio: RadioConfig, receiver: ReceiverConfig, front_end: FrontEnd | None,
     *, rng: np.random.Generator,
 ) -> tuple[Complexes, float]:  # fmt: skip
-    """Tones that the hardware makes of noiseless ones, and the noise variance a tone that the estimator reckons
-    with."""
+    """Received tones (L, M) after noise and hardware faults, from noiseless ones, and the noise variance [J] a tone
+    that the estimator assumes."""
     if front_end is None:
         samples, extra = convert(add_noise(clean, radio.noise_psd, rng=rng), receiver.converter_bits, radio)
         return samples, radio.noise_psd + extra
     config, leakage = front_end.config, sent.leakage
     heard = front_end.matrix @ clean + leakage * front_end.residue
-    noisy = add_noise(_shaken(heard, config, radio, rng), radio.noise_psd, rng=rng)
+    noisy = add_noise(_with_phase_noise(heard, config, radio, rng), radio.noise_psd, rng=rng)
     mixed = sent.swing * (noisy + front_end.image[:, None] * image_spectrum(noisy))
     samples, extra = convert(mixed, receiver.converter_bits, radio, config.clip_rms)
     level = radio.noise_psd + extra
@@ -156,8 +158,10 @@ def digitise(
 
 
 def correct(samples: Complexes, unit: float, correction: Correction) -> Complexes:
-    """Samples with residue, image, the array's errors and the gain control taken out; `unit` is the root of the energy
-    a tone over that of a whole sounding."""
+    """Correct received tones (L, M) by calibration: leakage residue, mixer's image, array errors and gain control.
+
+    `unit` is the root of the energy a tone over that of a whole sounding.
+    """
     plain = samples - correction.image[:, None] * image_spectrum(samples)
     if correction.loudness:
         direct = abs(np.vdot(correction.direct, plain))
@@ -166,22 +170,24 @@ def correct(samples: Complexes, unit: float, correction: Correction) -> Complexe
 
 
 def draw_gain_variation(config: HardwareConfig, *, rng: np.random.Generator) -> float:
-    """Gain of the hardware's gain control in one cycle, an amplitude ratio."""
+    """Draw the gain control's gain in one cycle, an amplitude ratio."""
     return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
 
 
 def scaled_to_fit(samples: Complexes, other: Complexes) -> Complexes:
-    """Samples (L, M) turned and scaled to fit the other's best, which share direct path and walls with them."""
+    """Scale samples (L, M) by the complex factor that fits `other` best; both share direct path and wall returns."""
     return np.asarray(samples * (np.vdot(samples, other) / np.vdot(samples, samples)))
 
 
 def image_spectrum(spectrum: Complexes) -> Complexes:
-    """Conjugate tones (..., M) in reverse order: what a mixer's image adds to them."""
+    """Image of a spectrum (..., M) by I/Q imbalance of the mixers: the conjugate tones in reverse order."""
     return np.conj(spectrum[..., ::-1])
 
 
-def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator) -> Complexes:
-    """Tones after a hardware oscillator whose phase trembles from sample to sample and steps from code to code."""
+def _with_phase_noise(
+    spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator
+) -> Complexes:
+    """Tones (L, M) with the oscillator's phase noise from sample to sample and its phase step from code to code."""
     if config.phase_step_deg:
         spectrum = spectrum * np.exp(1j * np.radians(config.phase_step_deg) * rng.standard_normal())
     if not config.phase_noise_deg:
@@ -191,7 +197,7 @@ def _shaken(spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng
 
 
 def _neighbours(positions: Floats, spacing: float) -> Complexes:
-    """(L, L) hardware coupling of antennas in units of that of the nearest: as one over the distance, with its
+    """Mutual coupling (L, L) of antennas relative to that of nearest neighbours: as one over the distance, with its
     phase."""
     distance = np.linalg.norm(positions[:, None] - positions, axis=-1)
     apart = np.where(distance > 0.0, distance, np.inf)
@@ -202,9 +208,10 @@ def _neighbours(positions: Floats, spacing: float) -> Complexes:
 def expected_distortion(
     config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, power: Floats, direct: Floats
 ) -> Floats:
-    """Power a tone [J] (K,) of hardware faults that an estimator told of their tolerances counts as noise.
+    """Expected power (K,) [J] a tone of hardware faults, which an estimator that knows their tolerances counts as
+    noise.
 
-    Of a calibrated front end what no calibration takes out, phase noise and clipping: at least that is left.
+    Of a calibrated front end only what no calibration takes out: phase noise and clipping.
 
     Parameters
     ----------
@@ -220,7 +227,8 @@ def expected_distortion(
 
 
 def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) -> float:
-    """Power of multiplicative hardware faults over the signal's: as tolerances say, or what calibration `left`."""
+    """Power of multiplicative hardware faults relative to the signal's: by tolerances, or the share that calibration
+    `left`."""
     trembling = np.radians(config.phase_noise_deg) ** 2 + _clipped(config.clip_rms)
     if left is not None:
         return float(trembling + left)
@@ -231,8 +239,8 @@ def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) 
 
 
 def _clipped(level: float) -> float:
-    """Share of the power of a normal signal that hardware clips above `level` deviations, what is cut off squared; 0
-    for none."""
+    """Power of clipping errors relative to that of a Gaussian signal clipped above `level` standard deviations; 0
+    clips nothing."""
     if not level:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))
@@ -240,5 +248,6 @@ def _clipped(level: float) -> float:
 
 
 def _circular(shape: tuple[int, ...], rng: np.random.Generator) -> Complexes:
+    """Draw circular complex normal numbers of unit variance."""
     parts = rng.standard_normal((2, *shape)) / np.sqrt(2.0)
     return parts[0] + 1j * parts[1]

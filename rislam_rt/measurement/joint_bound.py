@@ -1,4 +1,4 @@
-"""Errors from the joint bound of all paths: what overlapping signals cost each other, and what cannot be told apart."""
+"""Errors of components drawn from the joint bound of all paths, which counts overlap and merges unresolved ones."""
 
 import numpy as np
 
@@ -13,13 +13,13 @@ from rislam_rt.measurement.signal import num_tones
 from rislam_rt.model import RadioConfig
 
 LEAST_CERTAINTY = 2.0
-"""A path whose amplitude is less than this many times its standard deviation is not resolved from its neighbour."""
+"""Ratio of a path's amplitude to its standard deviation below which it is not resolved from its neighbour."""
 
 
 def joint_errors(
     received: Received, radio: RadioConfig, config: ReceiverConfig, draws: Floats
 ) -> tuple[NoiselessComponents, ComponentErrors]:
-    """Components that can be resolved, and errors drawn from their joint bound.
+    """Components of the resolved paths of one capture, and errors drawn from their joint Cramér-Rao bound.
 
     Paths merge until every component is certain enough, or has no neighbour to merge with.
 
@@ -52,20 +52,20 @@ def joint_errors(
 
 
 def _bound(parts: NoiselessComponents, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
+    """Joint bound of components: covariance (3N, 3N) of delays and cosines, variance (N,) of amplitudes, in `unit`."""
     parameters = np.column_stack([parts.tau * radio.bandwidth, parts.cosines])
     return joint_bound(inner_of(sounding, waves_at(sounding, parameters)), parts.gain * unit)
 
 
 def _absorbed(faint: Booleans, near: Floats) -> Integers:
-    """Leaders (N,) for the joint bound when each path too faint to stand alone joins the nearest within a cell."""
+    """Leaders (N,) of paths when each path too faint to be resolved merges with the nearest other within a cell."""
     distance = np.where(~faint & (near < 1.0), near, np.inf)
     joins = faint & np.isfinite(distance).any(axis=1)
     return np.where(joins, np.argmin(distance, axis=1), np.arange(len(faint))) if len(faint) else np.arange(0)
 
 
 def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats) -> Integers:
-    """Leaders (N,) for the joint bound after doubtful paths, in their order, joined their nearest neighbours, each
-    once."""
+    """Leaders (N,) of paths after unresolved ones, in their order, merged with their nearest neighbours, each once."""
     merged = leader.copy()
     free = leader == np.arange(len(leader))
     for row in doubtful:
@@ -81,7 +81,7 @@ def _paired(leader: Integers, doubtful: Integers, strength: Floats, near: Floats
 def _draw(
     parts: NoiselessComponents, covariance: Floats, gain_std: Floats, draws: Floats, radio: RadioConfig
 ) -> ComponentErrors:
-    """Correlated errors of all components by their joint bound, from independent draws."""
+    """Draw correlated errors of components by their joint bound, from independent standard normal draws."""
     scale = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(np.float64).tiny))
     correlation = covariance / scale[:, None] / scale
     value, vector = np.linalg.eigh(correlation)

@@ -1,13 +1,13 @@
-"""Measuring a cycle: from its channel to what the receiver reports."""
+"""Measure a cycle: from the channel's paths to the multipath components that the receiver reports."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement.bound import measure_bound
+from rislam_rt.measurement.bound_receiver import measure_bound
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.hardware import FrontEnd
 from rislam_rt.measurement.received import Clutter, direct_gain, receive
-from rislam_rt.measurement.waveform import measure_waveform
+from rislam_rt.measurement.waveform_receiver import measure_waveform
 from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
 
@@ -24,13 +24,13 @@ def measure(
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
-    """Measure one cycle: multipath components in the order of their delays, and which path each of them was.
+    """Measure one cycle with the receiver: multipath components in the order of their delays, and their true paths.
 
     Parameters
     ----------
     paths
-        Under the code that the panel is set to. With `config.alternation` the twin's paths follow from it: those over
-        the panel change their sign.
+        Under the code that the panel is set to. With `config.alternation` those under the phase-reversed code follow:
+        paths over the panel change their sign.
     cycle
         Row of `paths`.
     heading
@@ -43,7 +43,7 @@ def measure(
     front_end
         A receiver as it was built (`waveform`); None for an ideal one.
     clutter
-        What is heard besides and has no identity (row `cycle` too): a component that it made is -1 in the truth.
+        Paths without identity that are heard besides (row `cycle` too): a component of theirs is -1 in the truth.
     """
     if front_end is not None and front_end.config.carrier_offset_hz:
         doppler = (np.zeros(paths.num_paths) if doppler is None else doppler) + front_end.config.carrier_offset_hz

@@ -1,4 +1,4 @@
-"""Noise level and SNR, in the three ways in which it can be stated: directly, by a reference path, as in the paper."""
+"""Noise level and SNR: by a reference path, and as the paper defines it."""
 
 from dataclasses import replace
 
@@ -11,13 +11,13 @@ from rislam_rt.model import Paths, RadioConfig
 from rislam_rt.waveform import delay_response, subcarrier_frequencies
 
 REFERENCE_RADIUS = 0.05
-"""Radius [m] of the paper's sphere."""
+"""Radius [m] of the paper's sphere, the scatterer of the reference SNR."""
 REFERENCE_DISTANCE = 3.0
-"""Distance [m] from both ends at which it serves as the reference."""
+"""Distance [m] of the reference SNR's sphere from Tx and Rx."""
 
 
 def reference_gain(radio: RadioConfig) -> float:
-    """|alpha| of the paper's sphere that sets the noise, 3 m from both ends: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5
+    """Path gain |alpha| of the reference SNR's sphere, 3 m from Tx and Rx: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5
     d^2)`."""
     rcs = np.pi * REFERENCE_RADIUS**2
     free_space = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain * rcs)
@@ -38,7 +38,7 @@ def paper_snr_db(
     heading: Floats | float = 0.0,
     num_samples: int = 128,
 ) -> Floats:
-    """SNR (K,) [dB] as the paper has it, `||Y||^2 / (L U sigma_n^2)` without the noise in Y.
+    """SNR (K,) [dB] of the received signal as the paper defines it, `||Y||^2 / (L U sigma_n^2)` without the noise in Y.
 
     It counts the leakage and the wall returns, and falls with the number of samples U that one sounding is spread over.
 

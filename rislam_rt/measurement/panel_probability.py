@@ -1,9 +1,9 @@
-"""With what probability a component came over a panel, from what the receiver sees of it alone.
+"""Probability that a component came over a panel, from the sum and the differences of alternated codes.
 
-What is found in the difference of the codes came over the panel, or is what motion within the slot left there of a path
+A component in the difference of the codes came over the panel, or is what motion within the slot left there of a path
 that another capture (the sum, another panel's difference) shows at the same place. The second kind has the source's
-complex amplitude times a factor that its Doppler shift sets, within the speed that the receiver reckons with; the first
-has any. The captures change their roles for what is found in the sum.
+complex amplitude times a factor that its Doppler shift sets, within the speed that the receiver assumes; the first
+has any. The captures change their roles for components in the sum.
 """
 
 from typing import NamedTuple
@@ -16,39 +16,40 @@ from rislam_rt.measurement.slot_motion import code_signs, slot_mean
 from rislam_rt.model import RadioConfig
 
 DENSITY = 0.5
-"""Paths of either kind to be expected in one resolution cell next to a path of the other: panels hang on walls, whose
+"""Expected number of panel paths in a wall return's resolution cell, and the reverse: panels hang on walls, whose
 returns come in beside theirs."""
 DYNAMIC_RANGE = np.log(1e3)
-"""e-folds of amplitude over which a path may lie anywhere, 60 dB."""
+"""Range of the log amplitude over which a path's prior is uniform: 60 dB."""
 SHIFTS = 33
-"""Doppler shifts, evenly up to the largest, over which a leak is averaged."""
+"""Number of Doppler shifts, evenly up to the largest, over which the likelihood of a leak is averaged."""
 MIXTURE = 0.3
-"""Relative error of a leak's factor: paths that came out as one have not one Doppler shift."""
+"""Relative error of a leak's factor: unresolved paths have not one Doppler shift."""
 BLUR = 0.1
-"""Standard deviation of a leak's place about its source's [cells], likewise."""
+"""Standard deviation [cells] of a leak's delay and cosines about its source's, for the same reason."""
 SUREST = 1e-6
-"""No probability is nearer to 0 or 1: the model has its own errors."""
+"""Least distance of the probability from 0 and 1: the model has its own errors."""
 
 
 class ComponentSides(NamedTuple):
-    """N components."""
+    """N multipath components with the capture of alternated codes in which each was found."""
 
     points: Floats
     """(N, 3) delay [s] and cosines."""
     deviation: Floats
-    """(N, 3)."""
+    """(N, 3) standard deviations of delay [s] and cosines."""
     gain: Complexes
-    """(N,)."""
+    """(N,) complex gain."""
     gain_std: Floats
-    """(N,) of the complex gain."""
+    """(N,) standard deviation of the complex gain."""
     capture: Integers
-    """(N,) 0 for the sum, 1 + q for the difference of panel q."""
+    """(N,) 0 for the sum of the codes, 1 + q for the difference of panel q."""
 
 
 def panel_probability(
     found: ComponentSides, radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Floats, Integers | None]:
-    """(N,) probability that each component, if a path made it, ran over a panel, and which (N,): the likeliest.
+    """Probability (N,) that each component, if a path made it, came over a panel, and number (N,) of the likeliest
+    panel.
 
     Where there is one panel the second is None.
     """
@@ -70,8 +71,8 @@ def panel_probability(
 
 
 def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
-    """(`SHIFTS`,) how a path leaks between captures, which blurs whether a panel made it: amplitude there over that
-    here.
+    """Amplitude ratios (`SHIFTS`,) at which a moving path leaks from the capture `of` into the capture `into`, by
+    Doppler shift.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
@@ -81,8 +82,8 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
 
 
 def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
-    """(A,) odds of each component for being a leak of one of the sources and no panel's, against a path of its own
-    kind."""
+    """Odds (N,) of each component for being the leak of a source from another capture, against a path of its own
+    capture."""
     array = radio.array
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     gap = found.points[:, None] - sources.points
@@ -98,4 +99,5 @@ def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexe
 
 
 def _pick(found: ComponentSides, rows: Booleans) -> ComponentSides:
+    """Select multipath components by row."""
     return ComponentSides._make(field[rows] for field in found)

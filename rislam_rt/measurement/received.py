@@ -1,4 +1,4 @@
-"""What reaches the receiver in one cycle: the audible paths, in the body frame, with the leakage cancelled."""
+"""Received paths of one cycle: those within the array's view, in the body frame, with the leakage attenuated."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,8 @@ from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
 
 HORIZON_MARGIN = 1e-3
-"""An `upper` array hears rays whose third cosine exceeds minus this: leakage and level wall returns come in level."""
+"""Depth below the horizon [direction cosine] down to which an `upper` array receives, as leakage and level wall returns
+come in level."""
 
 
 class Received(NamedTuple):
@@ -25,19 +26,19 @@ class Received(NamedTuple):
     direction: Floats
     """(N, 3) unit vectors towards the arriving rays, body frame."""
     gain: Complexes
-    """(N,)."""
+    """(N,) complex gain."""
     panel: Integers
     """(N,) number of the panel that the path meets, whose phase-reversed code changes its sign; -1 for none."""
     wave_radius: Floats
     """(N,) distance [m] from the array back to the point from which the wave spreads: the mirrored Tx or landmark."""
     doppler: Floats
-    """(N,) Doppler shift [Hz]: what the paths turn by within the slot."""
+    """(N,) Doppler shift [Hz], by which the paths' phases turn within the slot."""
 
 
 def receive(
     paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig, doppler: Floats | None = None
 ) -> Received:
-    """Received paths of a cycle: those that the array hears.
+    """Received paths of one cycle: those that the array sees, turned to the body frame, the leakage attenuated.
 
     Parameters
     ----------
@@ -62,32 +63,34 @@ def receive(
 
 
 class Clutter(NamedTuple):
-    """Paths without an identity, heard like any other: their columns mean nothing from one cycle to the next."""
+    """Clutter paths without an identity, received like any other: their columns mean nothing from cycle to cycle."""
 
     paths: Paths
     doppler: Floats
-    """(K, P) [Hz]."""
+    """(K, P) [Hz] Doppler shifts."""
 
     def of_cycle(self, cycle: int) -> "Clutter":
-        """Received clutter of one cycle alone."""
+        """Clutter paths of one cycle alone."""
         return Clutter(self.paths.of_cycle(cycle), self.doppler[[cycle]])
 
     def beside(
         self, received: Received, num_paths: int, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig
     ) -> Received:
-        """All that reaches the receiver in a cycle; the clutter's columns count on from `num_paths`."""
+        """Received paths of a cycle with the clutter's appended, whose columns count on from `num_paths`."""
         more = receive(self.paths, cycle, heading, radio, config, self.doppler[cycle])
         more = more._replace(path=more.path + num_paths)
         return Received._make(np.concatenate(pair) for pair in zip(received, more, strict=True))
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:
-    """Received gain of the direct path from Tx to Rx, nothing cancelled; 0 where it is hidden."""
+    """Complex gain of the direct path from Tx to Rx (leakage) in a cycle, before cancellation; 0 where it is
+    hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
 
 
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
-    """(N,) [m] length of the Tx legs of received paths; 0 for leakage and wall returns, whose wave spreads from the Tx.
+    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, whose wave spreads from the
+    Tx.
 
     The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
     """
@@ -109,7 +112,7 @@ def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
 
 
 def phase_reversed(code: RisCode) -> RisCode:
-    """Received paths under the phase-reversed code: those over the panel change sign, and nothing else does.
+    """Panel code with every phase turned by pi: it changes the sign of the paths over the panel and nothing else.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The sensor model that a receiver's settings make: what the simulation draws from."""
+"""Sensor model of a receiver: detection threshold, false alarms and resolution that follow from its settings."""
 
 from functools import lru_cache
 
@@ -9,15 +9,15 @@ from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.model.sensor import ONE_PULSE
 
 GRID_SHARE = 0.83
-"""Share of the noise's peaks that a search on a grid finds: measured on noise alone (docs/receiver.md)."""
+"""Share of the noise's peaks above the threshold that the search on a grid finds: measured on noise alone
+(docs/receiver.md)."""
 
 
 @lru_cache(maxsize=64)
 def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
-    """The sensor model of these settings: detection, false alarms, resolution.
+    """Sensor model of a receiver's settings: detection threshold, false-alarm rate, delay window, resolution.
 
-    The bound-driven receiver invents its false components, as many as it is set to; the waveform's are the peaks of its
-    noise.
+    The bound-driven receiver draws as many false components as it is set to; the waveform's are the peaks of its noise.
     """
     threshold = detection_threshold(radio, config)
     rate, period = config.clutter_rate, ONE_PULSE

@@ -16,10 +16,11 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies
 
 FEWEST_TONES = 16
+"""Smallest number of tones of a sounding that is not set."""
 
 
 def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
-    """Tones M of the received signal: as set, or the power of two that leaves a quarter of its period after the last
+    """Number M of tones of a sounding: as set, or the power of two that leaves a quarter of its period after the last
     delay.
 
     Raises
@@ -40,8 +41,8 @@ def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
 
 
 def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elements: Floats | None = None) -> Complexes:
-    """Signal of all paths as noiseless tones (L, M) [sqrt(J)]; `elements` (L, 3) are true places in wavelengths, if
-    given."""
+    """Noiseless received signal of all paths as tones (L, M) [sqrt(J)]; `elements` (L, 3) [wavelengths] are true
+    positions, if given."""
     count = num_tones(radio, config)
     frequencies = subcarrier_frequencies(count, radio.bandwidth)
     scale = np.sqrt(radio.energy / count)
@@ -53,7 +54,7 @@ def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elemen
 
 
 def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
-    """Signal as noiseless samples (L, U) [sqrt(W)] at times n / B, n = 0 .. U-1, after a single flat pulse; U is
+    """Noiseless received signal of a single flat pulse as samples (L, U) [sqrt(W)] at times n / B, n = 0 .. U-1; U is
     `num_tones`.
 
     Unlike the tones, which repeat, the pulse's tails are cut off at the window's ends.
@@ -65,15 +66,15 @@ def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig
 
 
 def to_tones(samples: Complexes, radio: RadioConfig) -> Complexes:
-    """Signal as tones (..., M) [sqrt(J)] from samples (..., M) [sqrt(W)] at rate B from time 0; noise N0 B becomes
-    N0."""
+    """Transform received samples (..., M) [sqrt(W)] at rate B from time 0 to tones (..., M) [sqrt(J)]; noise N0 B
+    becomes N0."""
     count = samples.shape[-1]
     advance = np.exp(1j * np.pi * (count - 1) / count * np.arange(count))
     return np.fft.fft(samples * advance, axis=-1, norm="ortho") / np.sqrt(radio.bandwidth)
 
 
 def to_samples(spectrum: Complexes, radio: RadioConfig) -> Complexes:
-    """Signal as samples (..., M) [sqrt(W)] at rate B from time 0 on, from tones (..., M) [sqrt(J)]; undoes
+    """Transform tones (..., M) [sqrt(J)] to received samples (..., M) [sqrt(W)] at rate B from time 0 on; undoes
     `to_tones`."""
     count = spectrum.shape[-1]
     delay = np.exp(-1j * np.pi * (count - 1) / count * np.arange(count))
@@ -81,13 +82,14 @@ def to_samples(spectrum: Complexes, radio: RadioConfig) -> Complexes:
 
 
 def add_noise(signal: Complexes, variance: float, *, rng: np.random.Generator) -> Complexes:
-    """The signal in white circular normal noise of this variance per complex sample: N0 for tones, N0 B for samples."""
+    """Add white circular Gaussian noise of this variance per complex sample: N0 for tones, N0 B for samples."""
     parts = rng.standard_normal((2, *signal.shape))
     return signal + np.sqrt(variance / 2.0) * (parts[0] + 1j * parts[1])
 
 
 def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float = 0.0) -> tuple[Complexes, float]:
-    """Signal's tones (L, M) after converters of so many bits for real and imaginary part each, 0 for steps without end.
+    """Quantise tones (L, M) by analogue-to-digital converters of `bits` bits for real and imaginary part each, 0 for
+    none.
 
     The converters see samples in time. Full scale is the largest sample of all, or `clip_rms` times the root mean
     square of a component; what lies above is cut off. Also returns the variance [J] that the steps add to a tone: a
@@ -105,7 +107,7 @@ def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float 
 
 
 def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
-    """Signal values on the steps of a mid-rise converter; as they are without one."""
+    """Quantise values to the levels of a mid-rise converter; 0 bits leave them as they are."""
     if not bits:
         return value
     level = np.clip(np.floor(value / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
@@ -113,7 +115,7 @@ def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
 
 
 def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats, elements: Floats) -> Complexes:
-    """Signal as a sum of spherical waves, each element at its own distance from where the wave comes from.
+    """Received signal (L, M) as a sum of spherical waves, each element at its own distance from the wave's source.
 
     No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the part
     at the array's centre and the carrier is in the gain.

@@ -1,7 +1,7 @@
-"""What becomes of a path while the agent moves within the measurement slot.
+"""Motion within the measurement slot: how Doppler shifts weigh paths in the sum and differences of alternated codes.
 
-The codes take turns over the slot, and a path of Doppler shift f turns by `2 pi f t` meanwhile. What all codes hear in
-common goes to the sum, what changes its sign with a panel's code to that panel's difference; a path that turns goes
+The codes take turns over the slot, and a path of Doppler shift f turns by `2 pi f t` meanwhile. What is the same under
+all codes goes to the sum, what changes its sign with a panel's code to that panel's difference; a path that turns goes
 into all of them. The order A-B-B-A cancels the first order of it.
 """
 
@@ -17,9 +17,9 @@ from rislam_rt.measurement.received import Received
 
 @lru_cache(maxsize=64)
 def code_signs(order: str, panels: int) -> Floats:
-    """Signs (1 + panels, S) over the looks of a slot in an `order`: of what meets no panel, and of each panel's paths.
+    """Signs (1 + panels, S) over the S codes of a slot, of paths that meet no panel and of each panel's paths.
 
-    Rows of a Hadamard matrix, so that each sum over the looks with the signs of one panel holds its paths alone. `ABBA`
+    Rows of a Hadamard matrix, so that the sum over the codes with the signs of one panel holds its paths alone. `ABBA`
     goes through them and back: products of such rows are even about the middle as well, so that what moves evenly
     leaks to first order neither from the walls to a panel nor from panel to panel.
     """
@@ -30,12 +30,13 @@ def code_signs(order: str, panels: int) -> Floats:
 
 
 def codes_in_turn(panels: int) -> Floats:
-    """(C, C) Hadamard matrix of the codes that a slot goes through: code and twin for one panel, four codes for two."""
+    """Hadamard matrix (C, C) of the signs of the codes in a slot: a code and its phase-reversed one for one panel, four
+    for two."""
     return scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
 
 
 def slot_mean(doppler: Floats, signs: Floats, config: ReceiverConfig) -> Complexes:
-    """Mean over the slot (N,), with a sign for every look (S,), of paths of Doppler shifts (N,) [Hz].
+    """Mean phase factor (N,) over the slot of paths of Doppler shifts (N,) [Hz], with a sign for each code (S,).
 
     Every code is held for the same time, the order repeated until the slot is full; phases are those at its middle.
     """
@@ -51,9 +52,9 @@ def slot_mean(doppler: Floats, signs: Floats, config: ReceiverConfig) -> Complex
 
 
 def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, ...]:
-    """`slot_mean` plain, and with the signs of each panel.
+    """Weights (N,) of paths of Doppler shifts (N,) [Hz] in the sum of a slot's codes and in each panel's difference.
 
-    Without alternation the mean, and zero.
+    Without alternation the mean over the slot, and zero.
     """
     if not config.alternation:
         return np.sinc(doppler * config.slot).astype(np.complex128), np.zeros(len(doppler), dtype=np.complex128)
@@ -61,7 +62,8 @@ def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, ..
 
 
 def split_by_code(received: Received, config: ReceiverConfig) -> list[Received]:
-    """Paths of a slot as they are in the sum of its codes, and with alternation in each panel's difference."""
+    """Received paths with their gains in the sum of a slot's codes and, with alternation, in each panel's
+    difference."""
     if not config.alternation:
         return [received._replace(gain=received.gain * slot_weights(received.doppler, config)[0])]
     signs = code_signs(config.order, config.panels)

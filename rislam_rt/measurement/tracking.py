@@ -1,4 +1,5 @@
-"""Tracking of components across cycles: one keeps its label while its path lives, also through a crossing.
+"""Tracking of multipath components across cycles: each gets a label that it keeps while its path lives, crossings
+included.
 
 One small Kalman filter a track over path length and both cosines with their rates; optimal assignment of predicted
 tracks to components within a gate. The amplitude takes part, so that a strong and a weak path keep their labels where
@@ -19,26 +20,26 @@ from rislam_rt.model import Measurement
 
 @dataclass(frozen=True, slots=True)
 class TrackingConfig:
-    """Settings of the tracker. SI units."""
+    """Settings of the tracker of multipath components. SI units."""
 
     length_acceleration: float = 0.05
     """Standard deviation of the white acceleration of a path's length [m/s^2]."""
     cosine_acceleration: float = 0.05
-    """Likewise of a cosine [1/s^2]."""
+    """Standard deviation of the white acceleration of a direction cosine [1/s^2]."""
     length_rate: float = 0.5
     """Standard deviation of a new track's rate of length [m/s]."""
     cosine_rate: float = 0.2
-    """Likewise of a cosine [1/s]."""
+    """Standard deviation of a new track's rate of a cosine [1/s]."""
     std_scale: float = 1.5
-    """By how much true errors exceed the reported standard deviations: unresolved neighbours pull at a component."""
+    """Factor of true errors over the reported standard deviations: unresolved neighbours pull at a component."""
     loudness_std: float = 0.35
     """Standard deviation of the change of the log amplitude (natural) from cycle to cycle; 0.35 is 3 dB."""
     gate: float = 20.0
     """Largest squared distance of length, cosines and log amplitude together (chi^2, 4 dof: 0.9995)."""
     confirm_hits: int = 3
-    """Components after which a track counts as a path; before, one miss ends it."""
+    """Number of components after which a track is confirmed as a path; before, one miss ends it."""
     max_misses: int = 10
-    """Cycles without a component after which a confirmed track ends."""
+    """Number of cycles without a component that a confirmed track survives."""
 
     def __post_init__(self) -> None:
         for name in ("length_acceleration", "cosine_acceleration", "length_rate", "cosine_rate", "std_scale"):
@@ -53,36 +54,39 @@ class TrackingConfig:
 
 
 class TrackState(NamedTuple):
-    """T living tracks."""
+    """T living tracks of multipath components."""
 
     label: Integers
-    """(T,)."""
+    """(T,) label of each track."""
     mean: Floats
     """(T, 3, 2) length [m] and cosines, each with its rate [1/s]."""
     covariance: Floats
-    """(T, 3, 2, 2)."""
+    """(T, 3, 2, 2) covariance of each value and its rate."""
     loudness: Floats
     """(T,) log amplitude."""
     hits: Integers
-    """(T,) components so far."""
+    """(T,) number of components so far."""
     misses: Integers
-    """(T,) cycles since the last one."""
+    """(T,) number of cycles since the last one."""
     next_label: int
+    """Label of the next new track."""
 
 
 class TrackInfo(NamedTuple):
-    """What the tracker made of a cycle's M components."""
+    """Track labels of a cycle's M components, and how many tracks began and ended."""
 
     label: Integers
     """(M,) label of each component: every one gets one, a new one if it fits no track."""
     confirmed: Booleans
     """(M,) whether its track has been seen often enough to be a path."""
     born: int
+    """Number of tracks that began in this cycle."""
     died: int
+    """Number of tracks that ended in this cycle."""
 
 
 def init_tracks() -> TrackState:
-    """No tracks."""
+    """Empty set of tracks, with which tracking begins."""
     none = np.zeros(0, dtype=np.int64)
     return TrackState(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, 0)
 
@@ -90,7 +94,7 @@ def init_tracks() -> TrackState:
 def step_tracks(
     state: TrackState, measurement: Measurement, dt: float, config: TrackingConfig
 ) -> tuple[TrackState, TrackInfo]:
-    """Carry the tracks over `dt` [s], give the components of this cycle to them, start and end tracks."""
+    """Predict tracks over `dt` [s], assign this cycle's components to them, update, start and end tracks."""
     seen = np.column_stack([SPEED_OF_LIGHT * measurement.tau, measurement.cosines])
     noise = config.std_scale**2 * np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std]) ** 2
     loudness = np.log(np.maximum(measurement.amplitude, 1e-300))
@@ -126,7 +130,7 @@ def step_tracks(
 
 
 def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState:
-    """Tracked components one cycle on: discrete white-noise acceleration."""
+    """Kalman prediction of tracks over `dt` [s] by discrete white-noise acceleration."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     shape = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
     strength = np.array([config.length_acceleration, config.cosine_acceleration, config.cosine_acceleration]) ** 2
@@ -137,7 +141,7 @@ def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState
 def _assign(
     state: TrackState, seen: Floats, noise: Floats, loudness: Floats, config: TrackingConfig
 ) -> tuple[Integers, Integers]:
-    """Rows of tracks and of components that belong together: least cost, each pair within the gate."""
+    """Optimal assignment of tracks to components within the gate: rows of tracks, rows of components."""
     innovation = seen - state.mean[:, None, :, 0]
     spread = state.covariance[:, None, :, 0, 0] + noise
     distance = np.sum(innovation**2 / spread, axis=-1)
@@ -152,14 +156,14 @@ def _assign(
 
 
 def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Tracked components after measurement: Kalman update of (N, 3) independent pairs of value and rate."""
+    """Kalman update of tracks by their components, (N, 3) independent pairs of value and rate."""
     gain = covariance[..., :, 0] / (covariance[..., 0, 0] + noise)[..., None]
     mean = mean + gain * (seen - mean[..., 0])[..., None]
     return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]
 
 
 def _start(seen: Floats, noise: Floats, config: TrackingConfig) -> tuple[Floats, Floats]:
-    """Tracks of one component each: its value, and a rate about 0."""
+    """Mean and covariance of new tracks of one component each: its value, and a rate about 0."""
     mean = np.stack([seen, np.zeros_like(seen)], axis=-1)
     covariance = np.zeros((*seen.shape, 2, 2))
     covariance[..., 0, 0] = noise

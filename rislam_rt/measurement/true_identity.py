@@ -1,4 +1,4 @@
-"""True identity of components: which path each was, for scoring only, never shown to the agent."""
+"""True identity of estimated components: which path each most likely is, for scoring only, never shown to the agent."""
 
 import numpy as np
 import scipy
@@ -8,17 +8,17 @@ from rislam_rt.measurement.received import Received
 from rislam_rt.model import RadioConfig
 
 TOLERANCE = 0.3
-"""Misfit of a delay or cosine, in resolution cells, that counts as much as..."""
+"""Misfit of a delay or cosine [resolution cells] that counts as one unit."""
 LOUDNESS = 6.0
-"""...this misfit of the amplitude [dB]."""
+"""Misfit of the amplitude [dB] that counts as one unit."""
 GATE = 9.0
 """Largest sum of squared misfits at which a component is taken for a path."""
 FAINTEST = 1.0
-"""SNR over all antennas (linear) below which no path is held to have been seen."""
+"""SNR over all antennas (linear) below which no path is taken for the cause of a component."""
 
 
 def identify(tau: Floats, cosines: Floats, gain: Complexes, received: Received, radio: RadioConfig) -> Integers:
-    """True identity of components: column (N,) of the path that each most likely is, -1 for none.
+    """Column (N,) of the true path that each estimated component most likely is, -1 for none.
 
     The assignment with the least sum of squared misfits in delay, cosines and amplitude. The scale is the resolution
     cell, not the bound: next to a stronger path a component errs by more than its bound, and is still that path. So it

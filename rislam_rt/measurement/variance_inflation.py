@@ -16,19 +16,21 @@ parameters over which the peak is the highest."""
 REACH = 6.0
 """Resolution cells of delay on either side over which neighbours are counted."""
 SAME = 0.7
-"""Cells in the other two parameters within which a neighbour counts: one further off does not pull."""
+"""Distance [cells] in the other two parameters within which a neighbour counts: one further off does not pull."""
 UNSEEN = 0.4
-"""SNR of the unseen neighbours in a cell, over the threshold, for each seen neighbour in a cell: set to the wall
-returns of the paper's room, tried on everything else (`benchmarks/receiver/room.py`)."""
+"""SNR of the undetected neighbours in a cell, over the threshold, for each detected neighbour in a cell: set to the
+wall returns of the paper's room, tried on everything else (`benchmarks/receiver/room.py`)."""
 
 
 def peak_bias(snr: Floats) -> Floats:
-    """By how much the variances (...,) at the measured SNR over all antennas, linear, are too small."""
+    """Factor (...,) by which variances are too small because the SNR (...,) was measured at a peak (linear, all
+    antennas)."""
     return snr / np.maximum(snr - PEAK_EXCESS, 0.25 * snr)
 
 
 def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats:
-    """By how much the variances (P, 3) of paths (P, 3), in (B tau, u, v), are too small for unseen neighbours.
+    """Factors (P, 3) by which the variances of paths (P, 3), in (B tau, u, v), are too small because of undetected
+    neighbours.
 
     Neighbours along one axis, `density` a cell and of SNR q each, do to the estimate on that axis what `q density` of
     N0 would add: the square of the autocorrelation's slope, integrated over all offsets, is the bound's own second
@@ -47,24 +49,25 @@ def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats
 
 
 def unmirrored(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Cosines (N, 2) for inflated variances, those outside the sky moved by a period of the array to where they may
-    lie."""
+    """Direction cosines (N, 2) with those outside the unit disc moved by a period of the array (grating lobe) into
+    it."""
     period = 1.0 / radio.array.spacing
     outside = np.linalg.norm(cosines, axis=-1, keepdims=True) > 1.0
     return np.where(outside, cosines - period * np.round(cosines / period), cosines)
 
 
 def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> Floats:
-    """Variances (N, 2) for the chance that a direction is its own image, a period of the array away.
+    """Variances (N, 2) of direction cosines from the ambiguity between a direction and its grating lobe, a period of
+    the array away.
 
     The samples are the same for both. Their odds are those of lying in the sky, given the estimate and its deviation.
     """
     period = 1.0 / radio.array.spacing
     image = cosines - period * np.where(cosines < 0.0, -1.0, 1.0)
     other = cosines[:, ::-1]
-    sure, inflation = (
+    inside, image_inside = (
         scipy.special.ndtr((np.sqrt(np.maximum(1.0 - other**2, 0.0)) - np.abs(x)) / np.maximum(deviation, 1e-12))
         for x in (cosines, image)
     )
     aperture = np.array([radio.array.rows, radio.array.cols]) > 1
-    return aperture * period**2 * inflation / np.maximum(sure + inflation, 1e-12)
+    return aperture * period**2 * image_inside / np.maximum(inside + image_inside, 1e-12)

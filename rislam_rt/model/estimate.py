@@ -24,13 +24,13 @@ class MapEstimate:
     covariance: Floats
     """(N, 3, 3) [m^2] of the positions."""
     parent: Integers
-    """(N,) row of the parent, -1 for a point."""
+    """(N,) row of the landmark whose mirror image this is, -1 for a point."""
     ris_probability: Floats
     """(N,) probability that the landmark is a RIS panel, of several panels the likeliest; 0 for images."""
     strength: Floats
     """(N,) estimated square root of the cross-section [m]; for an image, amplitude ratio to the parent's law."""
     wall_normal: Floats
-    """(W, 3) unit normals, from the room's inside outwards as seen by the agent."""
+    """(W, 3) unit normals of the walls, from the room's inside outwards as seen by the agent."""
     wall_offset: Floats
     """(W,) [m] offset of each wall's plane: `normal . x = offset`."""
     wall_std: Floats

@@ -61,7 +61,7 @@ class Measurement:
 
     @property
     def arrival(self) -> Floats:
-        """(M, 3) unit vectors in the body frame, from the Rx towards the arriving ray."""
+        """Unit vectors (M, 3) of a measurement's components in the body frame, from the Rx towards the arriving ray."""
         z = np.sqrt(np.clip(1.0 - np.sum(self.cosines**2, axis=-1), 0.0, None))
         vector = np.concatenate([self.cosines, z[:, None]], axis=-1)
         return vector / np.linalg.norm(vector, axis=-1, keepdims=True)

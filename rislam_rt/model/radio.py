@@ -12,7 +12,8 @@ from rislam_rt.model.antennas import Antennas
 
 @dataclass(frozen=True, slots=True)
 class RxArray:
-    """Planar array in the body's x-y plane, boresight up, rows along body x and columns along body y.
+    """Receive array of the agent: planar, in the body's x-y plane, boresight up, rows along body x and columns along
+    body y.
 
     Elements are isotropic over the upper hemisphere and blind below it (`upper`), or isotropic (`isotropic`).
     A planar array cannot tell a direction from its mirror image in the array's plane; the blind side settles that.

@@ -35,7 +35,7 @@ class SchemeResult:
     heading: Floats
     """(K,) [rad] headings of the agent."""
     covariance: Floats
-    """(K, 6, 6) of position and velocity, as the filter believes."""
+    """(K, 6, 6) covariance of position and velocity, as the filter believes."""
     sent: Integers
     """(K, N, M) code that the agent sent; (K, 0, 0) without a panel."""
     applied: Integers
@@ -64,7 +64,7 @@ class SchemeResult:
     info: Mapping[str, Floats]
     """Diagnostics of the filter, (K,) each."""
     outcome: tuple[str, ...]
-    """(K,) how each cycle went, in the filter's words."""
+    """(K,) how each cycle went, by the filter's own word."""
     map: MapEstimate
     """Estimated map after the last cycle."""
     panel: Any = None
@@ -127,7 +127,7 @@ class SlamResult:
     schemes: Mapping[str, SchemeResult]
     """Result of each scheme, by name."""
     config: Mapping[str, Any]
-    """The whole specification, defaults filled in."""
+    """The whole specification of the run, defaults filled in."""
     seed: int | None
     """Seed of the run; None if the caller gave a generator of another origin."""
     versions: Mapping[str, str]

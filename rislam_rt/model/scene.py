@@ -22,7 +22,7 @@ class Material:
     polarisation, a slab of an ITU-R P.2040 material, or a slab of a given permittivity and conductivity."""
 
     reflection: float | None = None
-    """R in (0, 1]: amplitude, the same for every angle and polarisation."""
+    """Reflection coefficient R in (0, 1] of the amplitude, the same for every angle and polarisation."""
     itu: str | None = None
     """Name in ITU-R P.2040, e.g. `concrete`."""
     thickness: float = 0.1
@@ -37,8 +37,8 @@ class Material:
     """Reflection coefficient in [-1, 1] of the field in the plane of incidence (TM); signs as Fresnel's: of a dense
     dielectric near normal incidence, TE is negative and TM positive."""
     scattering: float = 0.0
-    """S in [0, 1): share of the reflected field that the surface scatters in all directions; the mirrored ray keeps
-    `sqrt(1 - S^2)` of its field."""
+    """Scattering coefficient S in [0, 1): share of the reflected field that the surface scatters in all directions; the
+    mirrored ray keeps `sqrt(1 - S^2)` of its field."""
 
     def __post_init__(self) -> None:
         if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
@@ -247,7 +247,7 @@ class Scene:
 
 
 def _freeze_mesh(mesh: Any, place: str) -> None:
-    """Check and freeze `vertices` and `faces` of a mesh in a scene."""
+    """Check and freeze `vertices` and `faces` of a reflector's or occluder's mesh."""
     freeze(mesh, "vertices", np.float64, (None, 3))
     freeze(mesh, "faces", np.int64, (None, 3))
     if len(mesh.faces) == 0:

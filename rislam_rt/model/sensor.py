@@ -21,7 +21,8 @@ when all else is unknown (`information.resolved_probability`); always."""
 ONE_PULSE = 1.0
 """Period [s] that stands for a sounding which does not repeat: longer than any path."""
 CERTAIN_SNR = 10.0
-"""Standard deviations above the threshold from which on the detection probability is 1 to double precision."""
+"""Standard deviations of the measured SNR's root above the threshold from which on the detection probability is 1 to
+double precision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class SensorModel:
     radio: RadioConfig
     """Radio (noise, band, gains and array) that the rest refers to."""
     threshold: float = 10.0
-    """A component is reported when its measured SNR exceeds this."""
+    """Detection threshold: a component is reported when its measured SNR exceeds this."""
     false_alarms: float = 0.5
     """Mean number of false components a cycle."""
     window: tuple[float, float] = (0.0, 80e-9)

@@ -34,8 +34,6 @@ from rislam_rt.worker_pool import run_side_by_side
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
 """Libraries that a run's numbers depend on; their versions are written into every result."""
-
-
 IN_ONE_PIECE = 50_000
 """Most cycles of a run that is held in memory as a whole: 5 GB in the paper's room."""
 SAME_CYCLE = 0.01

@@ -35,6 +35,8 @@ def print_advice(advice: Advice) -> None:
         title = f"SNR of the strongest path over the threshold of {advice.threshold_db:.1f} dB [dB]"
         console.print(title, style="bold", markup=False)
         console.print(table)
+        if any("(" in _cell(link, at) for link in advice.links for at in link.three):
+            console.print("in brackets: not heard there, for the reason in the last column or for want of SNR")
     for line in advice.remedies:
         console.print(line, markup=False, soft_wrap=True)
     console.print(f"to trace {advice.costs[0].walls} walls: {'; '.join(map(cost_words, advice.costs))}", soft_wrap=True)

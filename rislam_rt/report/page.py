@@ -30,7 +30,8 @@ CAPTIONS = {
     "the filter believes in. Walls are those found from the mirror images of the landmarks.",
     "error": "Distance between true and estimated position; the shaded band is the filter's own standard deviation.",
     "landmarks": "Distance between each landmark and the estimate that stands for it; a gap where there is none.",
-    "levels": "Gain of the strongest path of each class. The panel's direct path depends on the code.",
+    "levels": "Gain of the strongest path of each class, and its SNR over all antennas. The panel's direct path "
+    "depends on the code: until the panel is in the map, designed codes are beams in search of it; most of them miss.",
     "paths": "Paths with at most one wall bounce, halfway through the run, with the levels of the first scheme.",
     "codes": "Phase levels of the panel at five moments, and the gain of its direct path under them.",
     "timing": "Median of each step, with a whisker to the 99th percentile.",
@@ -129,12 +130,17 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
 <h2>RMSE</h2>
 <div class="scroll"><table><tr><th></th>{head}</tr>{rows}</table></div>
 <p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).
+Path aligned: the estimated path shifted and turned onto the true one, which takes out what the agent was told wrong
+of its start (within {100.0 * result.config["start"]["position_std_m"]:.3g} cm an axis), which no measurement can mend.
 Walls, at the end: distance of the estimated plane over the true surface, and the angle between them. The bound is the
 posterior bound of the same motion, codes and noise with landmarks and walls unknown. GOSPA is of the last map's points,
-cut off at 1 m.</p>
+cut off at 1 m. Association: of the components taken for a landmark or wall, how many rightly (precision); of those
+that came from one, how many were taken for it (recall). Budget: the settings <code>budget.*</code>, against the mean
+time of each step on this machine.</p>
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
-The folder's <code>config.toml</code> and <code>scene/</code> hold everything.</p>
+<code>rislam-rt run config.toml</code> in this folder does it again: all settings are there, the room in
+<code>scene/</code>.</p>
 <script>{view_script()}</script>
 </body></html>
 """

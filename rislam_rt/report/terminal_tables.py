@@ -27,8 +27,6 @@ def print_summary(summary: Mapping[str, Any]) -> None:
     for row in summary_rows(summary):
         table.add_row(*row)
     _show(title, table)
-    for line in summary["warnings"]:
-        print(f"warning: {line}")
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
@@ -36,6 +34,8 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     schemes = list(summary["schemes"].values())
     first = schemes[0]
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
+    aligned = [s["rmse_aligned_m"] for s in schemes]
+    rows.append(["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)])
     for name in first["landmarks"]:
         rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
     known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it
@@ -46,8 +46,9 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         rows.append([f"{len(first['walls']) - len(heard)} walls", *("not heard" for _ in schemes)])
     rows.append(["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)])
     rows.append(["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)])
-    rows.append(["association right", *(f"{s['association']['accuracy']:.0%}" for s in schemes)])
-    rows.append(["over budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
+    association = [s["association"] for s in schemes]
+    rows.append(["association: precision, recall", *(f"{a['precision']:.0%}, {a['recall']:.0%}" for a in association)])
+    rows.append(["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
     rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])
     return rows

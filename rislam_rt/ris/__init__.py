@@ -1,4 +1,4 @@
-"""Floor 3: physics of the panel, and amplitudes of believed points: pure functions that channel and belief call."""
+"""Floor 3: physics of the RIS panel, and predicted amplitudes of paths over landmarks: pure functions."""
 
 from rislam_rt.ris.element import element_gain_area, element_pattern
 from rislam_rt.ris.impairments import PanelErrors, PanelTolerance, draw_panel, flip_bits

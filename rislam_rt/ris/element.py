@@ -1,4 +1,4 @@
-"""One element of the panel: radiation pattern F and gain-area product G dx dy of eq. `single`."""
+"""One element of a RIS panel: radiation pattern F and gain-area product G dx dy of eq. `single`."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from rislam_rt.arrays import Floats
 from rislam_rt.model.ris import RisSpec
 
 TANG_GAIN = 8.0
-"""G of the cos^3 element (Tang et al., IEEE TWC 2021): 2 (q + 1) for F = cos^q, q = 3."""
+"""Gain G of a panel's element of pattern cos^3 (Tang et al., IEEE TWC 2021): 2 (q + 1) for F = cos^q, q = 3."""
 
 
 def element_pattern(spec: RisSpec, cos_theta: Floats) -> Floats:
-    """F(theta) for cosines (...,) of the angle to the panel's normal; 0 behind the panel.
+    """Power pattern F(theta) of a panel's element at cosines (...,) of the angle to its normal; 0 behind the panel.
 
     `tang`: cos^3 theta. `energy`: cos theta, the projected area of the cell.
     """

@@ -1,4 +1,4 @@
-"""Impairments of a real panel: elements weak, dead, out of phase or stuck, and commands that arrive damaged."""
+"""Impairments of a RIS panel: weak, dead, stuck or phase-shifted elements, and bit errors on its control link."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ FREE = -1
 
 @dataclass(frozen=True, slots=True)
 class PanelTolerance:
-    """How far the elements of a panel stray; all zero: a perfect panel."""
+    """Tolerances of a RIS panel's elements; all zero: a perfect panel."""
 
     amplitude_std: float = 0.0
     """Standard deviation of an element's amplitude about that of the data sheet, relative; at least 0 remains."""
@@ -37,7 +37,7 @@ class PanelTolerance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PanelErrors:
-    """The panel as it came out of the factory, element by element (N, M); of several all elements, (1, E)."""
+    """Errors of a built RIS panel, element by element (N, M); of several panels all elements (1, E)."""
 
     amplitude: Floats
     """Factor on the data sheet's amplitude, 0 or more."""
@@ -46,7 +46,7 @@ class PanelErrors:
     dead: Booleans
     """True where an element reflects nothing."""
     stuck: Any
-    """Level at which an element stays, `FREE` where it obeys."""
+    """Level at which an element is stuck, `FREE` where it takes on the code's."""
 
     def __post_init__(self) -> None:
         shape = np.shape(self.amplitude)
@@ -58,16 +58,17 @@ class PanelErrors:
 
     @property
     def weight(self) -> Complexes:
-        """What each element (N, M) does to its signal beside its commanded phase, for `rephase` and `panel_gain`."""
+        """Complex factor (N, M) of each panel element beside its commanded phase: amplitude and phase error, 0 if
+        dead."""
         return np.where(self.dead, 0.0, self.amplitude) * np.exp(-1j * self.phase)
 
     def applied(self, code: RisCode) -> RisCode:
-        """The code (..., N, M) that the elements take on: stuck ones keep their level."""
+        """Panel code (..., N, M) that the elements take on under a commanded code: stuck ones keep their level."""
         return RisCode(np.where(self.stuck == FREE, code.index, self.stuck), code.levels)
 
 
 def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Generator) -> PanelErrors:
-    """Draw a panel's impairments, or several panels', independently for each element.
+    """Draw the element errors of a RIS panel, or of several, independently for each element.
 
     Every kind of error has a draw of its own, so that changing one tolerance leaves the other errors as they are.
     """
@@ -80,7 +81,7 @@ def draw_panel(spec: DataSheet, tolerance: PanelTolerance, *, rng: np.random.Gen
 
 
 def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) -> RisCode:
-    """The code as it arrives over a link that turns each bit of each level over with a probability.
+    """Panel code after a control link that flips each bit of each level with a probability.
 
     A level travels as a plain binary number of log2(H) bits.
 
@@ -98,5 +99,6 @@ def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) ->
 
 
 def _check_probability(name: str, value: float) -> None:
+    """Raise `ConfigError` unless a value lies in [0, 1]."""
     if not 0.0 <= value <= 1.0:
         raise ConfigError(f"{name}: {value} received; give a probability from 0 to 1")

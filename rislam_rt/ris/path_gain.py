@@ -1,4 +1,4 @@
-"""What a believed point returns: amplitudes of scatterers, gains of panels, from places and strengths alone."""
+"""Predicted path gains over mirror images, point scatterers and panels, from positions and strengths alone."""
 
 import numpy as np
 
@@ -8,12 +8,14 @@ from rislam_rt.ris.response import leg_parts
 
 
 def image_amplitude(length: Floats, radio: RadioConfig) -> Floats:
-    """|alpha| of eq. `a1` over perfect walls: free space along a path of `length` [m]."""
+    """Amplitude |alpha| of a wall return over perfect walls, eq. `a1`: free space along a path of `length` (...,)
+    [m]."""
     return radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * length)
 
 
 def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
-    """Gain of a path over a point, |alpha| of eq. `a2` for `strength`, the square root of a cross-section [m]."""
+    """Amplitude |alpha| of a path over a point scatterer, eq. `a2`, for `strength`, the root of its cross-section
+    [m]."""
     scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2
     return scale * strength / (tx_length * rx_length)
 
@@ -21,7 +23,9 @@ def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radi
 def panel_path_gain(
     spec: RisSpec, code: RisCode, center: Floats, tx: Floats, rx: Floats, ratio: Floats, radio: RadioConfig
 ) -> Complexes:
-    """Gain (...,) of a panel at `center` (..., 3) between (unfolded) ends (..., 3); `ratio` (...,) of the walls.
+    """Complex gain (...,) of a path over a panel at `center` (..., 3) between (mirrored) ends (..., 3), under a code.
+
+    `ratio` (...,) is the amplitude ratio of the wall reflections.
 
     Both legs and the code turn an element's signal together; in single precision an element errs by 1e-7 of a turn.
     """

@@ -1,4 +1,4 @@
-"""Rephasing panel paths under a code: gains are linear in exp(-j xi), so that a new code needs no new trace."""
+"""Rephase panel paths: their gains under a new phase code, linear in exp(-j xi), so that nothing is traced again."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,7 +12,8 @@ from rislam_rt.model.ris import RisCode
 
 
 class Block(NamedTuple):
-    """Tx legs (I,) of which each meets all of the Rx legs (J,): the paths (I J,), those of the first Tx leg first."""
+    """Block of panel paths (I J,) that join each of the Tx legs (I,) with each of the Rx legs (J,), first Tx leg
+    first."""
 
     tx: Integers
     rx: Integers
@@ -20,17 +21,17 @@ class Block(NamedTuple):
 
 
 def panel_gain(tx: Complexes, rx: Complexes, code: RisCode, weight: Complexes | float = 1.0) -> Complexes:
-    """Gain (...,) of panel paths from the responses (..., N, M) of their two legs under a code (..., N, M).
+    """Gain (...,) of panel paths under a code (..., N, M), from the element responses (..., N, M) of their two legs.
 
-    `weight` (..., N, M): what the elements really do to the signal, divided by what they should.
+    `weight` (..., N, M): the elements' true factor relative to the commanded one (`PanelErrors.weight`).
     """
     return np.einsum("...nm,...nm,...nm->...", tx, rx, weight * phasor(-code.xi))
 
 
 def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Paths:
-    """The same paths under another code, (N, M) or one a cycle (K, N, M): no new trace.
+    """The same paths with their gains under another panel code, (N, M) or one a cycle (K, N, M), without a new trace.
 
-    `weight` (N, M) or (K, N, M): what the elements really do, divided by what they should (`PanelErrors.weight`).
+    `weight` (N, M) or (K, N, M): the elements' true factor relative to the commanded one (`PanelErrors.weight`).
 
     Raises
     ------
@@ -58,7 +59,7 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
 
 
 def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
-    """Panel paths sorted into full products of legs: Tx legs that meet the same Rx legs go together.
+    """Sort panel paths into blocks of Tx legs that all join the same Rx legs.
 
     With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
     """
@@ -74,6 +75,6 @@ def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
 
 
 def _span(legs: Integers) -> Integers | slice:
-    """Neighbouring legs as a slice, which numpy reads in place."""
+    """Leg numbers (I,) as a slice if they are consecutive, which numpy reads without a copy."""
     first, last = int(legs[0]), int(legs[-1])
     return slice(first, last + 1) if last - first + 1 == len(legs) else legs

@@ -1,4 +1,4 @@
-"""Response of a panel, gain of paths over it: element-wise (eq. `single`, the default) and far-field (eq. `a3`)."""
+"""Response of a panel's elements to the legs of a path: element-wise (eq. `single`, default) and far-field (`a3`)."""
 
 import numpy as np
 
@@ -8,7 +8,8 @@ from rislam_rt.ris.element import element_gain_area, element_pattern
 
 
 def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float) -> Complexes:
-    """Response (..., N, M) of every element to one leg: eq. `single` without its phase shift is the product of two.
+    """Response (..., N, M) of every panel element to one leg: eq. `single` without its phase shift is the product of
+    two.
 
     Parameters
     ----------
@@ -29,7 +30,8 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
 
 
 def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) -> tuple[Floats, Floats]:
-    """Amplitudes (..., N, M) of `leg_response` for a coefficient of 1, and the elements' distances [m] alike."""
+    """Amplitudes (..., N, M) of a panel's element responses to one leg, for a coefficient of 1, and distances [m] of
+    the elements."""
     ray, offsets = np.asarray(device - center), spec.offsets()
     along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
     distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
@@ -40,7 +42,8 @@ def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) 
 def far_field_response(
     spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float
 ) -> Complexes:
-    """`leg_response` with the distances of Appendix A: plane waves, amplitude and pattern of the centre.
+    """Response (..., N, M) of every panel element to one leg in the far field (Appendix A): plane waves, amplitude of
+    the centre.
 
     Valid for distances above `2 D^2 / lambda`, D the panel's diagonal.
     """
@@ -59,7 +62,7 @@ def far_field_response(
 
 
 def zero_code(spec: DataSheet) -> RisCode:
-    """The code to which a panel responds at rest: every element at level 0."""
+    """Panel code with every element at phase level 0."""
     return RisCode(np.zeros((spec.rows, spec.cols), dtype=np.int64), spec.levels)
 
 

@@ -1,4 +1,4 @@
-"""Findings on a scene: where, what is wrong, and how to mend it."""
+"""Findings of the scene check: errors, warnings and notes, each with its place in the scene file and how to mend it."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,8 @@ from rislam_rt.errors import SceneError
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One remark on a scene. An `error` makes the scene unusable, a `warning` may be meant, a `note` is no fault."""
+    """One finding of the scene check. An `error` makes the scene unusable, a `warning` may be meant, a `note` is no
+    fault."""
 
     severity: str
     """`error`, `warning` or `note`."""
@@ -22,29 +23,29 @@ class Finding:
 
     @property
     def line(self) -> str:
-        """The whole finding on one line."""
+        """Text of a finding of the scene check on one line: file, field, message, and how to mend it."""
         place = f"{self.file}: {self.field}" if self.field else self.file
         return one_line(f"{place}: {self.message}; {self.mend}")
 
 
 class Fault(SceneError):
-    """Something wrong at a place that only the caller can name."""
+    """Error in a scene's file or mesh, raised where its place (file and field) is not known; the caller adds that."""
 
     def __init__(self, message: str, mend: str) -> None:
         super().__init__(one_line(f"{message}; {mend}"))
         self.message = message
         self.mend = mend
         self.key = ""
-        """Below the place that the caller names, where one key is at fault."""
+        """Key below the field that the caller names, where one key is at fault."""
         self.faults: list[Fault] = [self]
 
     def at(self, file: str, field: str) -> Finding:
-        """The finding at its place."""
+        """Make this fault an error of the scene check, at the file and field that the caller names."""
         return Finding("error", file, f"{field}.{self.key}" if self.key else field, self.message, self.mend)
 
 
 class Faults(Fault):
-    """Several things wrong in one file."""
+    """Several faults of one scene file, raised as one exception."""
 
     def __init__(self, faults: list[Fault]) -> None:
         super().__init__(faults[0].message, faults[0].mend)
@@ -53,17 +54,17 @@ class Faults(Fault):
 
 
 def panel_key(number: int, panels: int) -> str:
-    """Key of a panel in the scene file: `ris` of one, `ris[number]` of several."""
+    """Key of a RIS panel in the scene file: `ris` of one, `ris[number]` of several."""
     return "ris" if panels == 1 else f"ris[{number}]"
 
 
 def one_line(text: str) -> str:
-    """Text without line breaks and other control characters (names in hostile files may hold both)."""
+    """Text of a finding without line breaks and other control characters (names in hostile files may hold both)."""
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))
 
 
 def raise_errors(findings: list[Finding]) -> None:
-    """Raise the findings that are errors, each a line of one exception.
+    """Raise one exception with a line for each finding of the scene check that is an error.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Loading a scene folder as a `Scene`."""
+"""Loading of a scene folder as a `Scene`."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -22,10 +22,11 @@ from rislam_rt.shipped import find_room
 from rislam_rt.toml import parse_toml
 
 SCENE_FILE = "scene.toml"
+"""Name of the scene file in a scene folder."""
 
 
 class SceneDraft(NamedTuple):
-    """A scene as far as it could be read."""
+    """A scene folder as far as it could be read: the scene, None if it is unusable, and what is wrong with it."""
 
     file: str
     scene: Scene | None
@@ -35,7 +36,7 @@ class SceneDraft(NamedTuple):
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene of a folder, of its `scene.toml`, or the built-in room of that name.
+    """Load a scene from its folder, its `scene.toml`, or the name of a built-in room.
 
     Raises
     ------
@@ -51,23 +52,24 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
-    """Everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
+    """Find everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
 
     A bad scene is an answer, not an exception. Materials are held against the carrier of a radio that is given;
     warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, of the
     warnings only those about units are looked for: such a mistake often is what the errors come from.
     """
     if isinstance(scene, Scene):
-        return _look_at(scene, scene.name, radio)
+        return _check_read(scene, scene.name, radio)
     draft = read_draft(scene)
-    findings = draft.findings if draft.scene is None else _look_at(draft.scene, draft.file, radio)
+    findings = draft.findings if draft.scene is None else _check_read(draft.scene, draft.file, radio)
     units = list(unit_warnings(draft.file, _plain_table(Path(draft.file)), draft.bounds))
     if any(finding.severity == "error" for finding in findings):
         return findings + units
     return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it
 
 
-def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+    """Check a scene that has been read: its errors, or if it has none its warnings and notes."""
     errors = find_errors(scene, file)
     if radio is not None:
         errors += material_errors(scene, file, radio)
@@ -75,7 +77,7 @@ def _look_at(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding
 
 
 def _plain_table(file: Path) -> dict[str, Any]:
-    """The scene file as TOML gives it; empty if it is none."""
+    """Content of a scene file as TOML gives it, not validated; empty if it cannot be read."""
     try:
         return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
     except (OSError, ValueError):
@@ -83,7 +85,7 @@ def _plain_table(file: Path) -> dict[str, Any]:
 
 
 def read_draft(path: str | Path) -> SceneDraft:
-    """Read a scene, collecting what is wrong with it instead of raising."""
+    """Read a scene folder, collecting what is wrong with it instead of raising."""
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
@@ -93,18 +95,20 @@ def read_draft(path: str | Path) -> SceneDraft:
 
 
 def scene_file(path: str | Path) -> Path:
-    """The scene file of a scene folder; a file is taken as it is."""
+    """Path of the scene file that a scene folder, a scene file or the name of a built-in room stands for."""
     path = find_room(path)
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
-    """Read what a specification names and put the scene together."""
-    shelf = MeshFiles(file.parent, spec.limits, spec.meshes)
+    """Build a scene from the validated content of its file: read the meshes that it names, and collect what is wrong
+    with them."""
+    mesh_files = MeshFiles(file.parent, spec.limits, spec.meshes)
     findings: list[Finding] = []
 
     def made(kind: str, sections: Sequence[Any], build: Callable[[Any], Any]) -> list[Any]:
-        """The parts that can be made; what is wrong with the others goes to the findings."""
+        """Reflectors, scatterers, occluders or panels made from their sections of the scene file; what is wrong with a
+        section goes to the findings."""
         found = []
         for number, section in enumerate(sections):
             try:
@@ -118,15 +122,15 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     reflectors = made(
         "reflector",
         spec.reflector,
-        lambda one: Reflector(one.name, *shelf.mesh(one.mesh, one), _material(one.material)),
+        lambda one: Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material)),
     )
-    scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, shelf))
-    occluders = made("shade", spec.shade, lambda one: Occluder(*shelf.mesh(one.mesh, one), one.name))
+    scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, mesh_files))
+    occluders = made("shade", spec.shade, lambda one: Occluder(*mesh_files.mesh(one.mesh, one), one.name))
     panels = made("ris", spec.ris, build_panel)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
             surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
-            agent, shelf.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
+            agent, mesh_files.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
     corners = np.concatenate([np.zeros((0, 3)), *(reflector.vertices for reflector in reflectors)])
@@ -134,17 +138,18 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     if findings:
         return SceneDraft(str(file), None, findings, bounds)
     ris = join_panels(tuple(panels))
-    digest = _digest(content, shelf.contents)
+    digest = _digest(content, mesh_files.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
     return SceneDraft(str(file), scene, [], bounds)
 
 
 def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
-    """(T, 3, 3) [m] of all loaded surfaces that stand in an agent's way."""
+    """Triangles (T, 3, 3) [m] of all reflectors and occluders of a scene, from which a random walk keeps away."""
     return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
 
 
 def _material(section: MaterialSection) -> Material:
+    """Material of a reflector from its section of the scene file."""
     given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
     return Material(
         section.reflection,
@@ -158,8 +163,9 @@ def _material(section: MaterialSection) -> Material:
     )
 
 
-def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
-    """Load a scatterer: the paper's sphere has the cross-section pi r^2, unless the file gives another one.
+def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:
+    """Scatterer from its section of the scene file: a sphere has the cross-section pi r^2, as in the paper, unless the
+    file gives another one.
 
     A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.
     """
@@ -172,7 +178,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
         rcs = np.pi * (radius or 0.0) ** 2
     mesh = None
     if section.mesh is not None:
-        mesh = shelf.mesh(section.mesh, section)
+        mesh = mesh_files.mesh(section.mesh, section)
     elif section.shadow:
         mesh = solid_mesh(position, radius or 0.0, height, axis)
     shade = None if mesh is None else Occluder(*mesh)
@@ -180,7 +186,7 @@ def _scatterer(section: ScattererSection, shelf: MeshFiles) -> Scatterer:
 
 
 def build_panel(section: RisSection) -> RisPanel:
-    """Build the panel of a scene file's section.
+    """RIS panel from its section of the scene file.
 
     Raises
     ------

@@ -1,15 +1,16 @@
-"""How a mesh file lies in the room: its unit of length, which axis points up, which point is the room's zero."""
+"""Placement of a mesh file in the room: its unit of length, which axis points up, which point is the room's zero."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-"""[m]."""
+"""Length [m] of each unit that a mesh file may be in."""
 
 
 def place_points(points: Floats, up: str, unit: float, origin: Floats) -> Floats:
-    """A file's points (..., 3) in the room: turned so that its axis `up` is z, scaled, moved so that `origin` is zero.
+    """Turn, scale and move points (..., 3) of a mesh file into the room's frame: its axis `up` becomes z, and `origin`
+    zero.
 
     Parameters
     ----------

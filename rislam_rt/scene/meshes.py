@@ -1,4 +1,5 @@
-"""Meshes on disk: only from inside the scene's folder, checked before anything else sees them."""
+"""Meshes read from the content of files (PLY, OBJ, STL, GLB) and checked before anything else sees them, and written as
+PLY."""
 
 import io
 import logging
@@ -13,16 +14,18 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.mesh_containers import check_glb, too_many_faces, without_comments
+from rislam_rt.scene.mesh_file_checks import check_glb, too_many_faces, without_comments
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
+"""Endings of the mesh files that can be read."""
 MAX_MESH_BYTES = 200_000_000
+"""Most bytes of a mesh file."""
 MAX_FACES = 50_000
-"""What check and trace serve within minutes; a scene file can raise it."""
+"""Most faces of a scene by default: what check and trace serve within minutes; a scene file can raise it."""
 MAX_COORDINATE = 1e5
-"""[m]."""
+"""Largest coordinate [m] of a mesh in the room."""
 MAX_NODES = 1_000
-"""Of a GLB file: reading takes time in proportion to their square."""
+"""Most nodes of a GLB file by default: reading takes time in proportion to their square."""
 
 _PLY_HEADER = re.compile(
     rb"ply\nformat binary_little_endian 1\.0\n"
@@ -33,27 +36,28 @@ _PLY_FACE = np.dtype([("count", "u1"), ("corner", "<i4", 3)])
 
 
 class Mesh(NamedTuple):
-    """Triangles as they stand in the file: neither merged nor reordered."""
+    """A triangle mesh, vertices and faces as they stand in the file: neither merged nor reordered."""
 
     vertices: Floats
     """(V, 3) [m]."""
     faces: Integers
-    """(F, 3)."""
+    """(F, 3) indices into `vertices`."""
 
     @property
     def triangles(self) -> Floats:
-        """(F, 3, 3) [m] corners of the mesh's faces."""
+        """Corners (F, 3, 3) [m] of a mesh's faces: face, corner, xyz."""
         return self.vertices[self.faces]
 
 
 def as_mesh(triangles: Floats) -> Mesh:
-    """Triangles (T, 3, 3) as a mesh with shared corners."""
+    """Make triangles (T, 3, 3) a mesh with shared corners."""
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
 
 
 class MeshReader:
-    """Reads meshes, and keeps the last file unfolded: a scene picks many nodes of one GLB file, one after the other."""
+    """Parser of mesh files that keeps the last file parsed: a scene picks many nodes of one GLB file, one after the
+    other."""
 
     def __init__(self) -> None:
         self._key: tuple[str, bytes] = ("", b"")
@@ -68,7 +72,7 @@ class MeshReader:
         max_nodes: int = MAX_NODES,
         reach: float = MAX_COORDINATE,
     ) -> Mesh:
-        """Triangles of a mesh file's content; `node` picks one named node of a GLB file.
+        """Parse a mesh file's content into triangles; `node` picks one named node of a GLB file.
 
         What is too large is refused before it is unfolded: a GLB file may name one mesh in thousands of nodes. `reach`
         is the largest coordinate in the file's unit.
@@ -93,16 +97,17 @@ class MeshReader:
         return sound_mesh(mesh or self._by_trimesh(content, suffix[1:], node), max_faces, reach)
 
     def _by_trimesh(self, content: bytes, file_type: str, node: str | None) -> Mesh:
-        """Mesh of any format that trimesh reads."""
+        """Mesh from a file's content in any format that trimesh reads."""
         if self._key != (file_type, content):
             self._loaded = unfold(content, file_type)
             self._key = (file_type, content)
-        with _one_answer(file_type):
+        with _errors_as_faults(file_type):
             return _flatten(self._loaded, node)
 
 
 def unfold(content: bytes, file_type: str) -> Any:
-    """A file's content as trimesh's scene. It gets bytes, not a path, so it can follow no reference to another file.
+    """Parse a mesh file's content into trimesh's scene of nodes. It gets bytes, not a path, so it can follow no
+    reference to another file.
 
     Raises
     ------
@@ -111,12 +116,12 @@ def unfold(content: bytes, file_type: str) -> Any:
     """
     import trimesh
 
-    with _one_answer(file_type):
+    with _errors_as_faults(file_type):
         return trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
 
 
 def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
-    """A binary PLY file in float64, the same bytes for the same mesh."""
+    """Content of a binary PLY file in float64 for a mesh, the same bytes for the same mesh."""
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
         "property double x\nproperty double y\nproperty double z\n"
@@ -129,7 +134,8 @@ def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
 
 
 def _own_ply(content: bytes) -> Mesh | None:
-    """The common layout of PLY without trimesh, whose import takes half a second; None for any other layout."""
+    """Mesh from a PLY file of the common binary layout, read without trimesh, whose import takes half a second; None
+    for any other layout."""
     header = _PLY_HEADER.match(content)
     if header is None:
         return None
@@ -146,8 +152,8 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 
 @contextmanager
-def _one_answer(file_type: str) -> Iterator[None]:
-    """One error for a damaged mesh, which makes trimesh raise nearly anything and numpy warn."""
+def _errors_as_faults(file_type: str) -> Iterator[None]:
+    """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep numpy's warnings back."""
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
             warnings.simplefilter("ignore")
@@ -161,7 +167,8 @@ def _one_answer(file_type: str) -> Iterator[None]:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """No library logs anything meanwhile, tracebacks of failures that have an answer here least of all."""
+    """Keep libraries from logging while a mesh file is parsed, tracebacks of failures that have an answer here least of
+    all."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:
@@ -171,7 +178,7 @@ def _silence() -> Iterator[None]:
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:
-    """All nodes of a loaded file (or one and those below it) as one mesh, transforms applied."""
+    """Join all nodes of trimesh's scene (or one and those below it) into one mesh, transforms applied."""
     graph = loaded.graph
     nodes = list(graph.nodes_geometry)
     if node is not None:
@@ -190,7 +197,7 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
 
 
 def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
-    """The mesh of a node of trimesh's scene, its transform applied (no faces of points or lines), and its geometry."""
+    """Mesh of one node of trimesh's scene, its transform applied (no faces of points or lines), and its geometry."""
     matrix, name = loaded.graph[node]
     geometry = loaded.geometry[name]
     faces = getattr(geometry, "faces", None)
@@ -201,7 +208,7 @@ def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
 
 
 def sound_mesh(mesh: Mesh, max_faces: int, reach: float) -> Mesh:
-    """The mesh without unused vertices (they would widen the room), if its numbers make sense on their own.
+    """Mesh without unused vertices (they would widen the room), after a check of its faces and coordinates.
 
     Raises
     ------

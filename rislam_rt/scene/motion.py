@@ -1,4 +1,4 @@
-"""The agent's true motion: a straight line, a recording (TUM or CSV), a way along waypoints, or a walk at random."""
+"""The agent's true motion: a straight line, a recording (TUM or CSV), a path along waypoints, or a random walk."""
 
 from pathlib import Path
 from typing import Any
@@ -9,22 +9,24 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import GeometryError
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.inside_folder import read_inside
 from rislam_rt.scene.random_walk import draw_walk
+from rislam_rt.scene.read_inside_folder import read_inside
 from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv, parse_tum
 from rislam_rt.scene.schema import AgentSection
 from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 MAX_TUM_BYTES = 100_000_000
+"""Most bytes of a recording of the agent's motion."""
 MAX_CYCLES = 1_000_000
+"""Most cycles of a trajectory."""
 SAME_STEP = 1e-6
-"""[s] Steps this near to the cycle are the cycle; time stamps from the epoch on are no finer."""
+"""Steps [s] of a recording this near to the cycle are the cycle; time stamps from the epoch on are no finer."""
 LONGEST_GAP = 5.0
-"""[s] Over a longer gap in a recording nothing is interpolated: where the agent went is not known."""
+"""Longest gap [s] in a recording over which poses are interpolated: where the agent went is not known."""
 
 
 def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[Trajectory, bytes]:
-    """The trajectory of a scene file's agent section, and the bytes of its recording (empty without one).
+    """Trajectory of the agent from its section of the scene file, and the bytes of its recording (empty without one).
 
     Parameters
     ----------
@@ -62,7 +64,8 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
-    """Constant velocity (3,) [m/s] from `start` (3,) [m]; heading along it, 0 if it has no horizontal part."""
+    """Trajectory at constant velocity (3,) [m/s] from `start` (3,) [m]; heading along it, 0 if it has no horizontal
+    part."""
     time = np.arange(cycles, dtype=np.float64) * cycle_s
     speed = np.asarray(velocity, dtype=np.float64)
     heading = np.arctan2(speed[1], speed[0]) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
@@ -71,7 +74,8 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
 
 
 def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
-    """Along a way at constant speed [m/s], heading along it; to its end, or for so many cycles.
+    """Trajectory along a path with rounded corners at constant speed [m/s], heading along it; to its end, or for so
+    many cycles.
 
     Raises
     ------
@@ -92,7 +96,8 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
 
 
 def along_heading(course: Floats) -> Floats:
-    """(K,) [rad] of courses (K, 3); where one has no horizontal part, that of the one before, or after."""
+    """Headings (K,) [rad] along velocities or tangents (K, 3); where one has no horizontal part, that of the one
+    before, or after."""
     level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
     if not level.any():
         return np.zeros(len(course))
@@ -102,8 +107,8 @@ def along_heading(course: Floats) -> Floats:
 
 
 def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
-    """A recorded motion at even times, from its first on: monotone cubics through the places, straight lines through
-    angles.
+    """Interpolate recorded poses at even times, `cycle_s` [s] apart from the first on: positions by monotone cubics,
+    headings linearly.
 
     Raises
     ------
@@ -130,7 +135,7 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
 
 
 def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Trajectory:
-    """The motion of a recording (TUM or CSV), as far as the agent section contradicts none of it."""
+    """Trajectory from a recording (TUM or CSV), as far as the agent section contradicts none of it."""
     assert agent.trajectory is not None
     named = agent.columns or {}
     is_csv = agent.trajectory.lower().endswith(".csv")
@@ -154,13 +159,14 @@ def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Traject
 
 
 def _velocity(time: Floats, position: Floats) -> Floats:
-    """Velocity of a motion (K, 3) [m/s] by central differences; zero for a single pose."""
+    """Velocities (K, 3) [m/s] of a recorded motion by central differences of its positions; zero for a single pose."""
     if len(time) < 2:
         return np.zeros_like(position)
     return np.asarray(np.gradient(position, time, axis=0), dtype=np.float64)
 
 
 def _body(agent: AgentSection) -> Body:
+    """Offsets of Tx and Rx from the agent section of the scene file."""
     offsets = {"tx_offset": agent.tx_offset_m, "rx_offset": agent.rx_offset_m}
     try:
         return Body(**{name: np.array(value) for name, value in offsets.items() if value is not None})

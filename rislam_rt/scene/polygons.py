@@ -1,4 +1,4 @@
-"""Polygons in a plane: outlines of triangles, fewer corners, and back to triangles."""
+"""Polygons in a plane: outlines of triangles, simplified to fewer corners, and triangulated."""
 
 import numpy as np
 
@@ -6,7 +6,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 
 
 def outline_loops(faces: Integers) -> list[list[int]]:
-    """Closed loops of corners around triangles (T, 3) that are all turned the same way; holes run the other way."""
+    """Closed loops of corners that outline triangles (T, 3), all turned the same way; loops around holes run the other
+    way."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     there = {(int(a), int(b)) for a, b in edges}
     follow: dict[int, list[int]] = {}
@@ -43,7 +44,8 @@ def signed_area(corners: Floats) -> float:
 
 
 def inside_loop(corners: Floats, points: Floats) -> Booleans:
-    """Which points (..., 2) a polygon (n, 2) holds: a ray towards +x crosses its outline an odd number of times."""
+    """Whether (...,) points (..., 2) lie inside a polygon (n, 2): a ray towards +x crosses its outline an odd number of
+    times."""
     a, b = corners, np.roll(corners, -1, axis=0)
     y = points[..., None, 1]
     spans = (a[:, 1] > y) != (b[:, 1] > y)
@@ -53,9 +55,9 @@ def inside_loop(corners: Floats, points: Floats) -> Booleans:
 
 
 def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: float) -> list[int]:
-    """The corners of a loop that matter: all that are `kept` (V,), and as few others as keep it within a tolerance.
+    """Simplify a closed polygon to the corners that are `kept` (V,), and as few others as keep it within a tolerance.
 
-    The chain between two kept corners is thinned from its lower-numbered end, so that the two facets that it parts
+    The chain between two kept corners is simplified from its lower-numbered end, so that the two facets that it parts
     agree on it. Douglas and Peucker, Cartographica 1973.
     """
     anchors = [i for i, corner in enumerate(loop) if kept[corner]]
@@ -68,12 +70,13 @@ def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: fl
     for begin, end in zip(anchors, [*anchors[1:], anchors[0] + len(loop)], strict=True):
         chain = [loop[i % len(loop)] for i in range(begin, end + 1)]
         turned = chain[0] > chain[-1]
-        chain = _drop_slivers(chain[::-1] if turned else chain, points, tolerance)
+        chain = _simplify_chain(chain[::-1] if turned else chain, points, tolerance)
         thinned += (chain[::-1] if turned else chain)[:-1]
     return thinned
 
 
-def _drop_slivers(chain: list[int], points: Floats, tolerance: float) -> list[int]:
+def _simplify_chain(chain: list[int], points: Floats, tolerance: float) -> list[int]:
+    """Simplify an open chain of corners within a tolerance by Douglas and Peucker's algorithm; its ends stay."""
     keep, stack = {0, len(chain) - 1}, [(0, len(chain) - 1)]
     while stack:
         low, high = stack.pop()
@@ -89,6 +92,7 @@ def _drop_slivers(chain: list[int], points: Floats, tolerance: float) -> list[in
 
 
 def _off_segment(points: Floats, start: Floats, end: Floats) -> Floats:
+    """Distance (n,) of points (n, 3) from a segment."""
     along = end - start
     square = float(along @ along)
     fraction = np.clip((points - start) @ along / square, 0.0, 1.0) if square else np.zeros(len(points))
@@ -96,7 +100,7 @@ def _off_segment(points: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def triangulate(outer: Floats, holes: list[Floats]) -> Integers | None:
-    """Triangles (T, 3) of a polygon (n, 2), counter-clockwise, with holes that run clockwise.
+    """Triangulate a polygon (n, 2) that runs counter-clockwise, with holes that run clockwise: corner numbers (T, 3).
 
     Numbers count through the outer loop, then the holes in their order. Ears are clipped off (Meisters, Am. Math.
     Monthly 1975), holes joined by a bridge before. None where the polygon crosses itself.
@@ -121,7 +125,8 @@ def triangulate(outer: Floats, holes: list[Floats]) -> Integers | None:
 
 
 def _bridged(ring: list[int], hole: list[int], points: Floats, others: list[list[int]]) -> list[int] | None:
-    """A ring with a hole joined to it, by the shortest bridge from the hole's rightmost corner that crosses nothing."""
+    """Join a hole to a polygon's outline by the shortest bridge from the hole's rightmost corner that crosses nothing;
+    None if there is none."""
     tip = max(range(len(hole)), key=lambda i: points[hole[i], 0])
     start = points[hole[tip]]
     loops = [ring, hole, *others]
@@ -136,7 +141,7 @@ def _bridged(ring: list[int], hole: list[int], points: Floats, others: list[list
 
 
 def _opens_to(ring: list[int], i: int, points: Floats, target: Floats) -> bool:
-    """Whether a target lies on the inner side of a ring's corner."""
+    """Whether a target lies on the inner side of a polygon at one of its corners."""
     before, here, after = (points[ring[(i + k) % len(ring)]] for k in (-1, 0, 1))
     left, right = _turn(before, here, target) >= 0.0, _turn(here, after, target) >= 0.0
     convex = _turn(before, here, after) >= 0.0
@@ -144,7 +149,7 @@ def _opens_to(ring: list[int], i: int, points: Floats, target: Floats) -> bool:
 
 
 def _crosses_any(start: Floats, end: Floats, heads: Floats, tails: Floats) -> bool:
-    """Whether a segment passes through the inside of any other."""
+    """Whether a segment crosses any of several others, other than at its ends."""
     a, b = _turn(heads, tails, start), _turn(heads, tails, end)
     c, d = _turn(start, end, heads), _turn(start, end, tails)
     small = 1e-12 * float(np.abs(heads).max(initial=1.0)) ** 2
@@ -153,12 +158,12 @@ def _crosses_any(start: Floats, end: Floats, heads: Floats, tails: Floats) -> bo
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Twice the signed area of a polygon's triangles."""
+    """Twice the signed area of triangles (a, b, c) in a plane, positive if they run counter-clockwise."""
     return np.asarray((b - a)[..., 0] * (c - a)[..., 1] - (b - a)[..., 1] * (c - a)[..., 0])
 
 
 def _clip_ears(ring: list[int], points: Floats) -> list[tuple[int, int, int]] | None:
-    """Triangles of a polygon's ring, ear by ear; None where none can be clipped off."""
+    """Triangulate a polygon without holes by clipping ears; None where none can be clipped off."""
     ring, found = list(ring), []
     size = float(np.ptp(points, axis=0).max())
     flat = 1e-12 * size * size
@@ -181,7 +186,8 @@ def _clip_ears(ring: list[int], points: Floats) -> list[tuple[int, int, int]] | 
 
 
 def _is_empty(ear: tuple[int, int, int], ring: list[int], points: Floats, flat: float) -> bool:
-    """Whether no other corner of the ring lies in an ear; copies of its own corners (bridges) do not count."""
+    """Whether no other corner of a polygon lies in an ear to be clipped; copies of the ear's own corners (bridges) do
+    not count."""
     a, b, c = points[list(ear)]
     rest = points[ring]
     inside = (_turn(a, b, rest) > -flat) & (_turn(b, c, rest) > -flat) & (_turn(c, a, rest) > -flat)

@@ -1,4 +1,5 @@
-"""A walk through a room at random: waypoints drawn one after the other, each as far from every surface as is asked."""
+"""A random walk of the agent through a room: waypoints drawn one after the other, each as far from every surface as is
+asked."""
 
 import numpy as np
 
@@ -9,22 +10,23 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 WIDEST_TURN = np.radians(110.0)
-"""[rad] Largest turn at a corner."""
+"""Largest turn [rad] at a corner of a random walk."""
 LEG = (0.5, 6.0)
-"""[m] Range of the legs drawn, log-uniform, besides what the arcs at both ends take."""
+"""Range [m] of the lengths drawn for a random walk's legs, log-uniform, besides what the arcs at both ends take."""
 LOOK = 0.05
-"""[m] Step along the way at which its distance from the surfaces is looked at; a quarter of the clearance, if less."""
+"""Spacing [m] of the points of a random walk at which its distance from the surfaces is checked; a quarter of the
+clearance, if less."""
 TRIES, STEPS_BACK = 40, 3
-"""Draws of a next waypoint before the last few are given up, and how many those are."""
+"""Draws of a random walk's next waypoint before the last few waypoints are given up, and how many those are."""
 GIVE_UP = 400
-"""Waypoints given up before the walk is."""
+"""Times that waypoints are given up before the random walk is."""
 
 
 def draw_walk(
     start: Floats, length: float, radius: float, clearance: float, triangles: Floats, *, rng: np.random.Generator
 ) -> RoundedPath:
-    """A level way of at least `length` [m] from `start` (3,) with corners of `radius` [m], `clearance` [m] or more from
-    all triangles (T, 3, 3).
+    """Draw a level random walk of at least `length` [m] from `start` (3,), with corners of `radius` [m], `clearance`
+    [m] or more from all triangles (T, 3, 3).
 
     Raises
     ------
@@ -32,7 +34,7 @@ def draw_walk(
         The start is nearer than that to a surface, or no way is found.
     """
     gap = float(distance_to_triangles(start[None], triangles).min())
-    if gap < clearance + 0.5 * _look(clearance):
+    if gap < clearance + 0.5 * _check_step(clearance):
         raise Fault(f"the start is {gap:.3g} m from a surface", "move it, or lower agent.random_walk.clearance_m")
     points, given_up = [start], 0
     while True:
@@ -56,6 +58,7 @@ def draw_walk(
 
 
 def _next(points: list[Floats], radius: float, rng: np.random.Generator) -> Floats:
+    """Draw the next waypoint (3,) [m] of a random walk."""
     if len(points) > 1:
         last = points[-1] - points[-2]
         course = np.arctan2(last[1], last[0]) + rng.uniform(-WIDEST_TURN, WIDEST_TURN)
@@ -66,18 +69,19 @@ def _next(points: list[Floats], radius: float, rng: np.random.Generator) -> Floa
 
 
 def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: Floats) -> bool:
-    """Whether the last two legs of a random walk and the corner between them keep clear."""
+    """Whether the last two legs of a random walk and the corner between them keep their clearance from all surfaces."""
     corners = triangles.reshape(-1, 3)
     if (points[-1] < corners.min(axis=0)).any() or (points[-1] > corners.max(axis=0)).any():
         return False
     way = round_corners(np.array(points[-3:]), radius)
-    count = int(np.ceil(way.total / _look(clearance))) + 1
+    count = int(np.ceil(way.total / _check_step(clearance))) + 1
     places, _ = way.at(np.linspace(0.0, way.total, count))
     if len(crossings(places[:-1], places[1:], triangles)[0]):
         return False
-    return float(distance_to_triangles(places, triangles).min()) >= clearance + 0.5 * _look(clearance)
+    return float(distance_to_triangles(places, triangles).min()) >= clearance + 0.5 * _check_step(clearance)
 
 
-def _look(clearance: float) -> float:
-    """Step [m] at which a random walk is looked at: between two looks it comes nearer by half of it at most."""
+def _check_step(clearance: float) -> float:
+    """Spacing [m] of the points at which a random walk's clearance is checked: between two of them it comes nearer by
+    half of it at most."""
     return min(LOOK, clearance / 4.0)

@@ -1,4 +1,5 @@
-"""Recorded poses: TUM files (`timestamp x y z qx qy qz qw`, one pose a line) and CSV files whose columns have names."""
+"""Recorded poses of the agent: TUM files (`timestamp x y z qx qy qz qw`, one pose a line) and CSV files whose columns
+have names."""
 
 import csv
 import io
@@ -13,26 +14,27 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.schema import SMALLEST
 
 MAX_TIME = 1e11
-"""[s] From the epoch on, three thousand years: a recording's clock, and float64 still tells microseconds apart."""
+"""Largest time stamp [s] of a recording: three thousand years from the epoch on, where float64 still tells 20
+microseconds apart."""
 MAX_STEP = 1e6
-"""[s] Twelve days: longer gaps lie between recordings, not within one."""
+"""Longest step [s] within a recording, twelve days: longer gaps lie between recordings."""
 MAX_TILT = 1e-3
-"""Largest angle [rad] of a pose's z axis from the room's: the body turns about z only."""
+"""Largest angle [rad] of a recorded pose's z axis from the room's: the body turns about z only."""
 QUATERNION = ("qx", "qy", "qz", "qw")
 COLUMNS = ("time", "x", "y", "z", "heading", *QUATERNION)
-"""What a CSV file may tell of each pose."""
+"""Quantities of each pose that a CSV file may hold."""
 ALIASES = {"time": ("time", "timestamp", "t"), "heading": ("heading", "yaw")}
-"""Names that are looked for where the scene file names no column."""
+"""Names of CSV columns that are looked for where the scene file names no column."""
 UNITS = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "heading": {"rad": 1.0, "deg": float(np.pi / 180.0)},
     **{axis: {"m": 1.0, "cm": 1e-2, "mm": 1e-3} for axis in "xyz"},
 }
-"""Endings of column names, after `_`, and what they stand for; seconds, radians and metres without one."""
+"""Units of CSV columns by the endings of their names, after `_`; seconds, radians and metres without one."""
 
 
 class RecordedPoses(NamedTuple):
-    """K poses."""
+    """K recorded poses of the agent."""
 
     time: Floats
     """(K,) [s]."""
@@ -43,7 +45,7 @@ class RecordedPoses(NamedTuple):
 
 
 def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
-    """Time (K,) [s], position (K, 3) [m] and heading (K,) [rad] of a TUM file; `#` starts a comment.
+    """Parse a TUM file into times (K,) [s], positions (K, 3) [m] and headings (K,) [rad]; `#` starts a comment.
 
     Raises
     ------
@@ -63,8 +65,8 @@ def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
 
 
 def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
-    """Poses of a CSV file with one line of column names; `named` says which columns hold what, where they are not
-    called `time`, `x`, `y`, `z`, `heading`, `qx` to `qw` anyway.
+    """Parse recorded poses from a CSV file with one line of column names; `named` says which columns hold what, where
+    they are not called `time`, `x`, `y`, `z`, `heading`, `qx` to `qw` anyway.
 
     A name's ending tells its unit: `stamp_ns`, `x_mm`, `yaw_deg`. Other columns are left alone.
 
@@ -93,7 +95,8 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
 
 
 def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
-    """Column of a recorded trajectory's file that holds a quantity, and its unit; None for one that may be left out."""
+    """Index of the column of a recording's CSV file that holds a quantity, and its unit in SI; None for one that may be
+    left out."""
     if what in named:
         if named[what] not in header:
             raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {_few(header)}")
@@ -108,14 +111,17 @@ def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple
 
 
 def _unit(what: str, name: str) -> float:
+    """Unit of a recording's CSV column in SI, by the ending of its name."""
     return UNITS.get(what, {}).get(name.lower().rpartition("_")[2], 1.0)
 
 
 def _few(header: Sequence[str]) -> str:
+    """Column names of a recording's CSV file for an error message, a dozen at most."""
     return ", ".join(f"'{name[:20]}'" for name in header[:12]) or "no columns"
 
 
 def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[float]:
+    """Numbers of one line of a recording; an error unless there are `count` finite ones."""
     try:
         row = [float(word) for word in words]
     except ValueError:
@@ -127,7 +133,7 @@ def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[f
 
 
 def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
-    """Times and places as they are, if they can be a recording's."""
+    """Check that times and positions can be a recording's, and return them as they are."""
     if np.abs(time).max() > MAX_TIME:
         raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", "give seconds")
     step = np.diff(time)
@@ -147,7 +153,7 @@ def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
 
 
 def _heading(q: Floats) -> Floats:
-    """Heading (K,) [rad] of recorded quaternions (K, 4) of turns about z."""
+    """Headings (K,) [rad] of recorded unit quaternions (K, 4), which must be turns about z."""
     length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
     if (np.abs(length - 1.0) > 1e-3).any():
         raise Fault(

@@ -1,4 +1,4 @@
-"""A room as the files of its scene folder, and the tables of `scene.toml` that most rooms share."""
+"""A room in the making as the files of its scene folder, and the tables of `scene.toml` that most rooms share."""
 
 from dataclasses import dataclass, field
 from textwrap import fill
@@ -10,16 +10,19 @@ from rislam_rt.scene.write import mesh_file
 from rislam_rt.toml import toml_bytes
 
 PAPER_MATERIAL = {"reflection": 0.85}
+"""Material of the paper's walls, as a table of the scene file."""
 
 BASELINE = {"tx_offset_m": [-0.04388, -0.02397, 0.0], "rx_offset_m": [0.04388, 0.02397, 0.0]}
-"""0.1 m between Tx and Rx, turned 0.5 rad: parallel to no edge and no diagonal."""
+"""Offsets [m] of Tx and Rx in the scene file: 0.1 m apart, turned 0.5 rad, parallel to no edge and no diagonal."""
 
 CYCLES = {"cycles": 600, "cycle_s": 0.1}
+"""Number of cycles and their length in the scene file."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomFiles:
-    """A scene as files: the table of `scene.toml`, meshes by file name, other files, and what its README says."""
+    """A room as the files of its scene folder: the table of `scene.toml`, meshes by file name, other files, and what
+    its README says."""
 
     table: dict[str, Any]
     meshes: dict[str, Mesh]
@@ -28,20 +31,20 @@ class RoomFiles:
 
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Table in a room's file of a reflector with a PLY mesh of its own."""
+    """Table of a scene file for a reflector with a PLY mesh of its own."""
     return {"name": name, "mesh": mesh_file(name), "material": material or PAPER_MATERIAL}
 
 
 def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
 ) -> dict[str, Any]:
-    """Table in a room's file of a panel like the paper's, anywhere."""
+    """Table of a scene file for a RIS panel like the paper's, anywhere."""
     lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [0.015, 0.015]}
     return lie | {"levels": 4, "element": "tang", "host": host}
 
 
 def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:
-    """The files of a scene folder: relative name -> content. `origin` says where the room comes from."""
+    """Files of a room's scene folder: relative name -> content. `origin` says where the room comes from."""
     files = {mesh_file(name): ply_bytes(*mesh) for name, mesh in room.meshes.items()}
     readme = f"# {room.table['name']}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
     return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

@@ -10,11 +10,13 @@ from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
+from rislam_rt.wanted import wanted
 
 MAX_SCENE_BYTES = 4_000_000
-"""A scene file is written by people; anything larger is another file by mistake."""
+"""Most bytes of a scene file, which people write; anything larger is another file by mistake."""
 SMALLEST = 1e-6
-"""A micrometre, or a microsecond: light's wavelength, and the time of a code. Nothing that a radio sees is finer."""
+"""Smallest length [m] or time [s] in a scene file, a micrometre or a microsecond: nothing that a radio sees is
+finer."""
 
 Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
 Length = Annotated[float, Field(ge=SMALLEST, le=1e5, allow_inf_nan=False)]
@@ -25,7 +27,8 @@ Name = Annotated[
     Field(pattern=r"^[.\-]*[\p{L}\p{N}_][\p{L}\p{M}\p{N}_.\-]*$", max_length=64),
     AfterValidator(lambda name: unicodedata.normalize("NFC", name)),
 ]
-"""Letters and digits of any script, in the composed form, so that names which look alike are alike."""
+"""Name in a scene file: letters and digits of any script, in the composed form, so that names which look alike are
+alike."""
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
@@ -39,16 +42,15 @@ Units = Literal["mm", "cm", "m", "in"]
 
 
 class SceneSection(BaseModel):
-    """A table of the scene file: no conversions, no unknown keys."""
+    """Base of the scene file's tables: no conversions, no unknown keys."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 class MaterialSection(SceneSection):
-    """One of `reflection` (the same at every angle), `reflection_te` with `reflection_tm` (one for each polarisation),
-    `itu`, a slab of an ITU-R P.2040 material, and `permittivity` (relative, with `conductivity_s_m`), a slab of one's
-    own. `scattering` takes a share from the mirrored ray.
-    """
+    """Material of a reflector in the scene file: one of `reflection` (the same at every angle), `reflection_te` with
+    `reflection_tm` (one for each polarisation), `itu`, a slab of an ITU-R P.2040 material, and `permittivity`
+    (relative, with `conductivity_s_m`), a slab of one's own. `scattering` takes a share from the mirrored ray."""
 
     reflection: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     itu: ItuMaterial | None = None
@@ -77,9 +79,9 @@ class MaterialSection(SceneSection):
 
 
 class MeshSection(SceneSection):
-    """How one mesh file lies. `up_axis = "y"` turns a file whose y axis points up (as glTF's standard says) into the
-    room's frame with z up, `units` and `origin` are those of `[meshes]`, for this mesh alone.
-    """
+    """Placement of one mesh file in the scene file. `up_axis = "y"` turns a file whose y axis points up (as glTF's
+    standard says) into the room's frame with z up, `units` and `origin` are those of `[meshes]`, for this mesh
+    alone."""
 
     up_axis: Literal["y", "z"] | None = None
     units: Units | None = None
@@ -87,7 +89,8 @@ class MeshSection(SceneSection):
 
 
 class ReflectorSection(MeshSection):
-    """A smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file, with its transform applied."""
+    """`[[reflector]]` of the scene file: a smooth mesh. `mesh = "room.glb#node"` takes one named node of a GLB file,
+    with its transform applied."""
 
     name: Name
     mesh: str
@@ -95,26 +98,27 @@ class ReflectorSection(MeshSection):
 
 
 class OccluderSection(MeshSection):
-    """A mesh that hides what lies behind it and reflects nothing: clutter too small or too round to be a mirror."""
+    """`[[shade]]` of the scene file: a mesh that hides what lies behind it and reflects nothing, clutter too small or
+    too round to be a mirror."""
 
     name: Name
     mesh: str
 
 
 class MeshesSection(SceneSection):
-    """How the mesh files of the scene lie, unless a mesh says otherwise."""
+    """`[meshes]` of the scene file: placement of all its mesh files, unless a mesh says otherwise."""
 
     up: Literal["y", "z"] = "z"
-    """The axis of the file that points up."""
+    """Axis of the files that points up."""
     units: Units = "m"
-    """What a unit of the file is."""
+    """Unit of length of the files."""
     origin: Vector = [0.0, 0.0, 0.0]
     """[m] The point, z up, that becomes the room's zero."""
 
 
 class ScattererSection(MeshSection):
-    """A small object: a sphere by its `radius` (cross-section pi r^2, or by `mie` the exact series), a cylinder by
-    `radius` and `height_m`, or a point by its `rcs_m2`.
+    """`[[scatterer]]` of the scene file, a small object: a sphere by its `radius` (cross-section pi r^2, or by `mie`
+    the exact series), a cylinder by `radius` and `height_m`, or a point by its `rcs_m2`.
 
     It shades nothing, unless `shadow` asks for the shadow of its own shape or `mesh` gives a shape (PLY, OBJ, STL or
     GLB in the room's frame, as a reflector's).
@@ -146,7 +150,7 @@ class ScattererSection(MeshSection):
 
 
 class RisSection(SceneSection):
-    """The panel. `normal` and `up` need not have length 1."""
+    """`[ris]` of the scene file: a RIS panel. `normal` and `up` need not have length 1."""
 
     name: Name = "ris"
     center: Vector
@@ -162,27 +166,27 @@ class RisSection(SceneSection):
 
 
 class WalkSection(SceneSection):
-    """A walk at random through the room, level, from the agent's start."""
+    """`random_walk` of the scene file's `[agent]`: a random walk through the room, level, from the agent's start."""
 
     seed: Annotated[int, Field(ge=0, lt=2**63)]
     clearance_m: Length = 0.4
-    """Least distance from every surface."""
+    """Least distance [m] of the walk from every surface."""
 
 
 class AgentSection(SceneSection):
-    """The agent's true motion, one of four: straight from `start` with `velocity`; recorded, `trajectory`, a TUM or CSV
-    file; along `waypoints`; or a `random_walk`."""
+    """`[agent]` of the scene file, the agent's true motion, one of four: straight from `start` with `velocity`;
+    recorded, `trajectory`, a TUM or CSV file; along `waypoints`; or a `random_walk`."""
 
     start: Vector | None = None
     velocity: Vector | None = None
     trajectory: str | None = None
     columns: dict[str, str] | None = None
-    """What the columns of a CSV file are called, where not as `recorded.COLUMNS`."""
+    """Names of a CSV file's columns, where not as `recorded_poses.COLUMNS`."""
     waypoints: Annotated[list[Vector], Field(min_length=2, max_length=10_000)] | None = None
     random_walk: WalkSection | None = None
     speed_m_s: Length | None = None
     acceleration_m_s2: Length = 0.5
-    """At the corners of a way: their arcs have the radius speed squared over this."""
+    """Acceleration at the corners of waypoints or a random walk: their arcs have the radius speed squared over this."""
     cycles: Count | None = None
     cycle_s: Length | None = None
     tx_offset_m: Vector | None = None
@@ -213,27 +217,28 @@ MOTIONS = {
     "waypoints": ("speed_m_s", "cycle_s"),
     "random_walk": ("start", "speed_m_s", "cycles", "cycle_s"),
 }
-"""Keys of a motion, one of which is given, and what each needs beside it."""
+"""Keys of the agent's motion in the scene file, one of which is given, and what each needs beside it."""
 
 
 class LimitsSection(SceneSection):
-    """How large a room may be. The defaults keep check and trace within minutes; a file that knows better says so."""
+    """`[limits]` of the scene file: how large a room may be. The defaults keep check and trace within minutes; a file
+    that knows better says so."""
 
     faces: Annotated[int, Field(ge=1, le=20_000_000)] = 50_000
-    """Triangles of all meshes together: check and trace take time in proportion to them, times cycles."""
+    """Most triangles of all meshes together: check and trace take time in proportion to them, times cycles."""
     nodes: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
-    """Nodes of a GLB file: reading takes time in proportion to their square."""
+    """Most nodes of a GLB file: reading takes time in proportion to their square."""
     scatterers: Annotated[int, Field(ge=1, le=1_000_000)] = 1_000
-    """Each is traced on its own, with every wall on both legs."""
+    """Most point scatterers: each is traced on its own, with every wall on both legs."""
 
 
 def _listed(value: Any) -> Any:
-    """The schema's one table `[ris]` as a list of one."""
+    """Make the scene file's one table `[ris]` a list of one."""
     return [value] if isinstance(value, dict) else value
 
 
 class SceneSpec(SceneSection):
-    """A whole scene file."""
+    """Validated content of a whole scene file."""
 
     name: Name
     reflector: Annotated[list[ReflectorSection], Field(min_length=1, max_length=10_000)]
@@ -266,7 +271,7 @@ class SceneSpec(SceneSection):
 
 
 def parse_spec(content: bytes) -> SceneSpec:
-    """The validated content of a scene file.
+    """Parse and validate the content of a scene file.
 
     Raises
     ------
@@ -285,7 +290,7 @@ def parse_spec(content: bytes) -> SceneSpec:
 
 
 def validate_spec(table: dict[str, Any]) -> SceneSpec:
-    """A scene's table that was already read, against the schema.
+    """Validate the table of a scene file that was already read against the schema.
 
     Raises
     ------
@@ -296,12 +301,12 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
         return SceneSpec.model_validate(table)
     except ValidationError as error:
         lone = isinstance(table.get("ris"), dict)
-        remarks = [_remark(item, lone) for item in error.errors(include_url=False, include_context=False)]
-    raise Faults([Fault(remark, "mend this field") for remark in remarks])
+        faults = [_fault(item, lone) for item in error.errors(include_url=False, include_context=False)]
+    raise Faults(faults)
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
-    """Specification and bytes of a scene file.
+    """Read and validate a scene file: its specification and its bytes.
 
     Raises
     ------
@@ -320,32 +325,35 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     return parse_spec(content), content
 
 
-def _remark(item: Any, lone_panel: bool) -> str:
-    """One bad field against the schema: where, what was received, what is wanted."""
+def _fault(item: Any, lone_panel: bool) -> Fault:
+    """Fault of one bad field of a scene file: where, what was received, what is wanted."""
     where = item["loc"]
     if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
         where = ("ris", *where[2:])
     place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
     place = _short(place, 80)
     if item["type"] == "missing":
-        return f"{place}: missing"
+        return Fault(f"{place}: missing", "add it")
     if item["type"] == "extra_forbidden":
         hint = did_you_mean(nearest(str(item["loc"][-1]), _known_keys()))
-        return f"{place}: unknown key" + (f" ({hint})" if hint else "")
-    message = item["msg"].removeprefix("Value error, ")
+        return Fault(f"{place}: unknown key", hint or "remove it or mend its name")
+    message = wanted(item)
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
-        return f"{place}: {message}"
-    return f"{place}: {_short(repr(item['input']), 60)} received, {message[:1].lower()}{message[1:]}"
+        return Fault(f"{place}: {item['msg'].removeprefix('Value error, ')}", "mend this field")
+    received = f"{place}: {_short(repr(item['input']), 60)} received"
+    return Fault(received, message) if message.startswith("give ") else Fault(f"{received}, {message}", "mend it")
 
 
 def _known_keys() -> list[str]:
+    """All keys of the scene file's tables, to suggest one for a key that is not known."""
     sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, OccluderSection, MeshesSection,
                 RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
     return [key for section in sections for key in section.model_fields]
 
 
 def _short(text: str, length: int) -> str:
+    """Text of a message on one line, cut to a length."""
     text = one_line(text)
     return text if len(text) <= length else text[: length - 3] + "..."

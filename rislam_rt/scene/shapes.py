@@ -9,12 +9,13 @@ from rislam_rt.scene.meshes import Mesh
 
 
 def quad(corners: Floats | Sequence[Floats] | Sequence[Sequence[float]]) -> Mesh:
-    """A planar quadrilateral from its corners (4, 3) in order; seen from where they run counter-clockwise."""
+    """Mesh of a planar quadrilateral from its corners (4, 3) in order; seen from where they run counter-clockwise."""
     return Mesh(np.array(corners, dtype=np.float64), np.array([[0, 1, 2], [0, 2, 3]]))
 
 
 def hexahedron(corners: Floats) -> dict[str, Mesh]:
-    """The six faces, normals inwards, of a box-like solid from its corners (2, 2, 2, 3), indexed by x, y and z side."""
+    """Meshes of the six faces, normals inwards, of a box-like solid from its corners (2, 2, 2, 3), indexed by x, y and
+    z side."""
     c = np.asarray(corners, dtype=np.float64)
     return {
         "floor": quad([c[0, 0, 0], c[1, 0, 0], c[1, 1, 0], c[0, 1, 0]]),
@@ -33,14 +34,14 @@ def box_corners(low: Sequence[float], high: Sequence[float]) -> Floats:
 
 
 def block(low: Sequence[float], high: Sequence[float], without: Sequence[str] = ()) -> Mesh:
-    """An axis-aligned object, normals outwards; faces named in `without` (as in `hexahedron`) are left out."""
+    """Mesh of an axis-aligned box, normals outwards; faces named in `without` (as in `hexahedron`) are left out."""
     faces = hexahedron(box_corners(low, high))
     mesh = joined([face for name, face in faces.items() if name not in without])
     return Mesh(mesh.vertices, mesh.faces[:, ::-1])
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Several meshes as one, in order."""
+    """Join several meshes into one, their vertices and faces in order."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))

@@ -1,4 +1,5 @@
-"""Closed meshes of round solids, for their shadows: as large as the true shape, seen from all sides in the mean."""
+"""Closed meshes of solids (sphere, cylinder) as occluders: seen from all sides, they cast in the mean as large a shadow
+as the true shape."""
 
 import numpy as np
 
@@ -9,15 +10,16 @@ from rislam_rt.geometry.triangles import triangle_areas
 from rislam_rt.scene.meshes import Mesh, as_mesh
 
 CYLINDER_SIDES = 32
+"""Number of flat sides of a cylinder's mesh."""
 
 
 def solid_mesh(center: Floats, radius: float, height: float | None, axis: Floats) -> Mesh:
-    """A cylinder if it has a height, else a sphere."""
+    """Closed mesh of a scatterer's solid: a cylinder if it has a height, else a sphere."""
     return sphere_mesh(center, radius) if height is None else cylinder_mesh(center, radius, height, axis)
 
 
 def sphere_mesh(center: Floats, radius: float) -> Mesh:
-    """A sphere of 320 triangles with the true sphere's surface.
+    """Mesh of a sphere, 320 triangles with the true sphere's surface.
 
     A convex body's shadow has, in the mean over all directions, a fourth of its surface (Cauchy): so the mean shadow
     is the true one, pi r^2. Its outline is off the true one by up to 2 % of the radius.
@@ -30,7 +32,8 @@ def sphere_mesh(center: Floats, radius: float) -> Mesh:
 
 
 def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) -> Mesh:
-    """A prism with closed ends about a unit vector `axis`; its girth is the true cylinder's, as Cauchy asks."""
+    """Mesh of a cylinder, a prism with closed ends about a unit vector `axis`; its girth is the true cylinder's, as
+    Cauchy asks."""
     across, aside = plane_tangents(axis)
     # turned by a fraction of a side, so that no edge lies along the room's axes
     angle = 2.0 * np.pi * (np.arange(CYLINDER_SIDES) + 0.37) / CYLINDER_SIDES
@@ -46,7 +49,7 @@ def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) ->
 
 
 def _icosahedron() -> Floats:
-    """Triangles (20, 3, 3) with corners on the unit sphere, outwards."""
+    """Triangles (20, 3, 3) of an icosahedron with corners on the unit sphere, turned outwards."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0
     signs = np.array([[a, b * golden] for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
     corners = np.concatenate([np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)])
@@ -61,7 +64,7 @@ def _icosahedron() -> Floats:
 
 
 def _quartered(triangles: Floats) -> Floats:
-    """Every triangle (T, 3, 3) of a solid cut into four: (4 T, 3, 3)."""
+    """Cut every triangle (T, 3, 3) of a solid's mesh into four: (4 T, 3, 3)."""
     a, b, c = triangles.swapaxes(0, 1)
     ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])

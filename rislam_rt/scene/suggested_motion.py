@@ -1,4 +1,5 @@
-"""A first motion for a room that comes without one: from a place that sees far, along the longest free way."""
+"""Suggested motion of the agent for a room that comes without one: through an open place, along the longest free
+straight line."""
 
 from typing import Any
 
@@ -11,20 +12,24 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.room_files import BASELINE
 
 NUM_PLACES, NUM_RAYS, NUM_WAYS = 120, 64, 24
-"""Places looked at (a fifth of them in rooms of many faces), rays cast from each, directions of the motion."""
+"""Places that are tried for a suggested motion (a fifth of them in rooms of many faces), rays cast from each, and
+directions of the motion."""
 MANY_FACES = 5000
+"""Faces of a room from which on fewer places are tried."""
 HEADROOM = 1.0
 """[m] Free height above what counts as a floor, where there is such a place."""
 CARRIED = 1.5
-"""[m] Height above what lies below at which a person carries a radio; half of the height where there is less."""
+"""[m] Height above what lies below at which a person carries a radio, that of the suggested motion; half of the height
+where there is less."""
 CLEAR, LEAST_CLEAR = 0.5, 0.02
-"""[m] Distance that the motion keeps from all surfaces, and the least it makes do with in a tight room."""
+"""[m] Distance that the suggested motion keeps from all surfaces, and the least it makes do with in a tight room."""
 SPEED, CYCLE, CYCLES = 0.1, 0.1, 600
-"""The paper's pace [m/s], time between cycles [s] and number of cycles; slower where the way is shorter than that."""
+"""Suggested speed [m/s], the paper's, time between cycles [s] and number of cycles; slower where the line is shorter
+than that."""
 
 
 def suggest_agent(triangles: Floats) -> dict[str, Any]:
-    """The `[agent]` table of a scene file for a room of triangles (T, 3, 3) [m].
+    """Suggest the `[agent]` table of a scene file for a room of triangles (T, 3, 3) [m].
 
     It starts above a floor, where the mean of the free ways in all directions is largest (the hall and not the
     cupboard), in the open if there is ground under the sky (the street and not the house behind it), and goes straight
@@ -52,7 +57,8 @@ def suggest_agent(triangles: Floats) -> dict[str, Any]:
 
 
 def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats) -> Floats:
-    """Distance (D,) [m] from a place (3,) along directions (D, 3) to the first surface, or out of the box (2, 3)."""
+    """Free distance (D,) [m] from a place (3,) along directions (D, 3) to the first surface, or out of the box (2,
+    3)."""
     with np.errstate(divide="ignore"):
         out = (np.where(directions > 0.0, box[1], box[0]) - place) / directions
     leaves = np.where(directions == 0.0, np.inf, out).min(axis=1)
@@ -64,8 +70,8 @@ def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats)
 
 
 def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
-    """Places (N, 3) [m] for a suggested start, spread over the plan at hand's height above the lowest surface there
-    with headroom, and which of them have nothing above (N,)."""
+    """Places (N, 3) [m] for a suggested motion to pass, spread over the plan at the height of a carried radio above
+    the lowest surface there with headroom, and whether (N,) each has nothing above it."""
     count = NUM_PLACES if len(triangles) < MANY_FACES else NUM_PLACES // 5
     k = np.arange(count) + 0.5
     share = np.stack([k / count, (k * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0], axis=-1)  # Fibonacci lattice
@@ -82,8 +88,8 @@ def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
 
 
 def _levels(plan: Floats, triangles: Floats) -> Floats:
-    """Heights [m], ascending, at which the vertical line through a point (2,), for a suggested start, meets
-    triangles."""
+    """Heights [m], ascending, at which the vertical line through a point (2,) of the plan meets a room's triangles, to
+    find floors and what is above them."""
     corners = triangles[:, :, :2] - plan
     after = np.roll(corners, -1, axis=1)
     turn = corners[..., 0] * after[..., 1] - corners[..., 1] * after[..., 0]
@@ -96,8 +102,8 @@ def _levels(plan: Floats, triangles: Floats) -> Floats:
 def _motion(
     place: Floats, ways: Floats, ahead: Floats, behind: Floats, keep: float, triangles: Floats
 ) -> dict[str, Any]:
-    """Suggested motion: the longest line through a place that keeps clear all along, of the length that the pace asks
-    for."""
+    """Suggested `[agent]` table: the longest straight line through a place that keeps clear of all surfaces, no longer
+    than the suggested speed and cycles make it."""
     wanted = SPEED * CYCLE * (CYCLES - 1)
     for row in np.argsort(-np.minimum(ahead + behind, wanted), kind="stable"):
         length = min(wanted, float(ahead[row] + behind[row]))

@@ -1,4 +1,4 @@
-"""Templates: new scene folders from the rooms that come with the package."""
+"""Templates of scenes: new scene folders copied from the rooms that come with the package."""
 
 import os
 import re
@@ -12,7 +12,7 @@ from rislam_rt.toml import parse_toml, toml_bytes
 
 
 def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write one of the rooms that come with the package into a folder, named after it. Returns the folder.
+    """Copy one of the rooms that come with the package into a new scene folder, named after it. Returns the folder.
 
     Raises
     ------
@@ -34,6 +34,6 @@ def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> 
 
 
 def room_name(folder: Path, template: str) -> str:
-    """What a room is called that lies in a folder: the folder's name, with what a room's name cannot hold as `_`."""
+    """Name of a room from the folder that it lies in: the folder's name, with what a room's name cannot hold as `_`."""
     name = re.sub(r"[^A-Za-z0-9_.\-]", "_", os.path.basename(os.path.realpath(folder)))[:64]
     return name if name.strip("._-") else template

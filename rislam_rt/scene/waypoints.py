@@ -1,4 +1,4 @@
-"""A way along waypoints at constant speed: straight legs, and corners rounded so that an acceleration is kept."""
+"""Path of the agent along waypoints: straight legs, and corners rounded so that an acceleration is kept."""
 
 from typing import NamedTuple
 
@@ -8,32 +8,33 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault
 
 SHARPEST = np.radians(170.0)
-"""Largest turn [rad] at a waypoint: an arc that turns back needs no end of room."""
+"""Largest turn [rad] at a waypoint: the arc of one that turns back would never end."""
 STRAIGHT = 1e-9
-"""[rad] A smaller turn is none."""
+"""Turn [rad] at a waypoint below which it needs no arc."""
 
 
 class RoundedPath(NamedTuple):
-    """Legs and arcs in turn, P pieces; a leg is an arc of no curvature."""
+    """Path along waypoints with rounded corners: P pieces, straight legs and arcs in turn."""
 
     start: Floats
-    """(P, 3) [m]."""
+    """(P, 3) [m] where each piece begins."""
     along: Floats
-    """(P, 3) unit vector at the start."""
+    """(P, 3) unit tangent at the start of each piece."""
     inward: Floats
-    """(P, 3) unit vector at the start to the arc's centre; of a leg, zero."""
+    """(P, 3) unit vector from the start to the arc's centre; of a leg, zero."""
     radius: Floats
-    """(P,) [m]; of a leg, one, which counts for nothing."""
+    """(P,) [m] of the arcs; of a leg, one, which counts for nothing."""
     length: Floats
-    """(P,) [m]."""
+    """(P,) [m] of the pieces."""
 
     @property
     def total(self) -> float:
-        """Length of a path through waypoints [m]."""
+        """Length [m] of a path along waypoints."""
         return float(np.sum(self.length))
 
     def at(self, travelled: Floats) -> tuple[Floats, Floats]:
-        """Positions (K, 3) [m] and unit tangents (K, 3) at distances (K,) [m] from the start."""
+        """Positions (K, 3) [m] and unit tangents (K, 3) of a path along waypoints at distances (K,) [m] from its
+        start."""
         begin = np.concatenate([[0.0], np.cumsum(self.length)[:-1]])
         piece = np.clip(np.searchsorted(begin, travelled, side="right") - 1, 0, len(begin) - 1)
         gone, radius = travelled - begin[piece], self.radius[piece]
@@ -46,7 +47,8 @@ class RoundedPath(NamedTuple):
 
 
 def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
-    """The way along waypoints (W, 3) [m], each but the first and the last cut by an arc of that radius [m].
+    """Path along waypoints (W, 3) [m], the corner at each but the first and the last rounded by an arc of that radius
+    [m].
 
     Raises
     ------
@@ -80,7 +82,8 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
 
 
 def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> RoundedPath:
-    """Path through waypoints as leg, arc, leg, ..., leg."""
+    """Path along waypoints as leg, arc, leg, ..., leg, from the legs' directions, the turns, and the lengths that the
+    arcs cut off."""
     count = 2 * len(along) - 1
     start, way, inward = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
     start[::2], way[::2] = waypoints[:-1] + cut[:-1, None] * along, along

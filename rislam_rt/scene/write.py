@@ -1,4 +1,4 @@
-"""Writing a `Scene` as a scene folder, whole or not at all."""
+"""Writing of a `Scene` as a scene folder, whole or not at all."""
 
 import os
 import shutil
@@ -19,10 +19,11 @@ from rislam_rt.scene.solids import solid_mesh
 from rislam_rt.toml import toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
+"""Name of the agent's path in a scene folder."""
 
 
 def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a scene's files into a folder, which it returns.
+    """Write a scene as the files of a scene folder. Returns the folder.
 
     Raises
     ------
@@ -35,7 +36,8 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
-    """A scene as files, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless straight."""
+    """Files of a scene folder, name -> content: `scene.toml`, one PLY mesh a reflector, the agent's path unless
+    straight."""
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
@@ -49,7 +51,8 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
 
 
 def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write files (relative name -> content) under a folder: a new folder appears complete, by one rename.
+    """Write files (relative name -> content) under a folder, such as a scene's: a new folder appears complete, by one
+    rename.
 
     With `overwrite`, files of an existing folder are replaced one by one and others in it stay.
 
@@ -81,7 +84,7 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
-    """Poses as TUM lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
+    """Content of a TUM file of poses, lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
         row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
@@ -91,6 +94,7 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
 
 
 def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
+    """Write files into a temporary folder, each synchronised with the disk."""
     for name, content in files.items():
         target = staged / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -101,6 +105,7 @@ def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
 
 
 def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
+    """Move a temporary folder to its place by one rename, or its files one by one into a folder that exists."""
     if not folder.exists():
         staged.chmod(0o755)
         staged.rename(folder)
@@ -111,6 +116,7 @@ def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
+    """Table of `scene.toml` for a scene, with the table of its agent."""
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
         {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
@@ -124,6 +130,7 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
 
 
 def _panel_table(panel: RisPanel) -> dict[str, Any]:
+    """Table of `scene.toml` for a RIS panel."""
     spec, table = panel.spec, {"name": panel.name, "center": panel.center.tolist()}
     table |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
     table |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
@@ -132,7 +139,7 @@ def _panel_table(panel: RisPanel) -> dict[str, Any]:
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
-    """Table to write for a scatterer: a cross-section where it does not follow from shape and law."""
+    """Table of `scene.toml` for a scatterer: a cross-section where it does not follow from shape and law."""
     radius, table = scatterer.radius, {"name": scatterer.name, "position": scatterer.position.tolist()}
     table |= {"radius": radius} if radius is not None else {}
     if scatterer.height is not None:
@@ -149,7 +156,8 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
 
 
 def _has_own_shadow(scatterer: Scatterer) -> bool:
-    """Whether to write a shade as `shadow = true`, which makes the same."""
+    """Whether a scatterer's occluder is the mesh of its own sphere or cylinder, so that `shadow = true` is written for
+    it."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
@@ -158,11 +166,12 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
 
 
 def mesh_file(name: str) -> str:
-    """Where the mesh of a part lies in a scene folder."""
+    """Relative path in a scene folder of the PLY file of a reflector's or occluder's mesh."""
     return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:
+    """Table of `scene.toml` for a material."""
     thick = {"thickness_m": material.thickness}
     if material.reflection is not None:
         own: dict[str, Any] = {"reflection": material.reflection}
@@ -176,7 +185,7 @@ def _material_table(material: Material) -> dict[str, Any]:
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:
-    """Table to write for the agent: a straight motion by its velocity, any other by its path file."""
+    """Table of `scene.toml` for the agent: a straight motion by its velocity, any other by its path file."""
     offsets = {"tx_offset_m": agent.body.tx_offset.tolist(), "rx_offset_m": agent.body.rx_offset.tolist()}
     cycles, velocity = len(agent), agent.velocity[0]
     heading = float(np.arctan2(velocity[1], velocity[0])) if velocity[:2].any() else 0.0

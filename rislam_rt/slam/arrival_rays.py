@@ -4,10 +4,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.predicted_returns import Poses
 
 
-def places(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
+def scatterer_positions(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
     """Positions (..., 3) [m] of point scatterers that explain lengths and cosines (..., 3), and distances (...,) to Rx.
 
     A point on the ray `u` from the Rx lies as far out as the two legs have length for: `|r u - b| = l - r` with `b`

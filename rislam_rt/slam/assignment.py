@@ -40,7 +40,8 @@ def pair_costs(
     candidates: Candidates, observations: Observations, gate: float, strangers: Floats | float,
     pairs: tuple[Integers, Integers] | None = None,
 ) -> Floats:  # fmt: skip
-    """Costs (C, M) of pairs of a candidate and a measurement: -2 log likelihood ratio against a stranger, at most 0.
+    """Costs (C, M) of assigning measurements to candidates: -2 log likelihood ratio against a new or false component,
+    at most 0.
 
     A pair competes against "the candidate is missed and the measurement is new or false", of which `strangers` (M,) are
     to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
@@ -63,7 +64,8 @@ def pair_costs(
 def within_reach(
     seen: Floats, variance: Floats, candidates: Candidates, observations: Observations, gate: float
 ) -> tuple[Integers, Integers]:
-    """Pairs (P,), (P,) of candidates and observations that may be in the gate: by each axis, amplitude and side alone.
+    """Pairs (P,), (P,) of candidates and observations that may be in the gate: each axis and the amplitude are, and the
+    sides agree.
 
     Candidates are taken at `seen` (C, 3), with at most `variance` (C, 3) along each axis: no Mahalanobis distance is
     less than that along one axis alone.

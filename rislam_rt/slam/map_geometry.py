@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.returns import AXES, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, by_wall, reflect
 
 MAX_LEAN = np.radians(1.0)
 """Largest RMS angle [rad] between a wall's normal and its mean at which the wall is shown on the map: beyond it the

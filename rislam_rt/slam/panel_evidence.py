@@ -76,8 +76,8 @@ def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
 
 
 def add_evidence(log_grid: Floats, log_ris: Floats, scatterer: Floats, panel: Floats) -> tuple[Floats, Floats]:
-    """Update of P landmarks' scatterer strengths (P, G) and log odds of panel against scatterer by a cycle's
-    amplitudes.
+    """Log probabilities (P, G) of scatterer strengths and log odds of panel against scatterer of P landmarks, after one
+    cycle's amplitudes.
 
     Grids are log probabilities. The odds, and what `panel` says of them, are (P,), or (P, Q) for Q panels.
     """

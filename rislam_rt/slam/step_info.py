@@ -13,9 +13,13 @@ class StepOutcome(StrEnum):
     """How a filter's cycle went. Values, not exceptions: a filter must survive every one of them."""
 
     OK = "ok"
+    """Components were heard, the map holds landmarks, and the filter does not hold itself for lost."""
     NO_MEASUREMENTS = "no measurements"
+    """The receiver reported no component."""
     NO_LANDMARKS = "no landmarks"
+    """The map holds no landmark."""
     DIVERGED = "diverged"
+    """The filter holds itself for lost."""
 
 
 class StepInfo(NamedTuple):

@@ -2,17 +2,8 @@
 
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.pipeline_kinds import load_any
-from rislam_rt.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec, StudySpec
+from rislam_rt.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
 from rislam_rt.studies.swept.spec import SweptSpec
 from rislam_rt.studies.unseen.spec import UnseenSpec
 
-__all__ = [
-    "ClaimsSpec",
-    "ClassifierSpec",
-    "CompareSpec",
-    "Fig4aSpec",
-    "StudySpec",
-    "SweptSpec",
-    "UnseenSpec",
-    "load_any",
-]
+__all__ = ["ClaimsSpec", "ClassifierSpec", "CompareSpec", "Fig4aSpec", "SweptSpec", "UnseenSpec", "load_any"]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from rislam_rt.channel.compare import PathReport, Validation, compare_paths, validate_rooms
-from rislam_rt.channel.compare.both_channels import room_rng, trace_both
+from rislam_rt.channel.compare.channel_comparison import room_rng, trace_both
 from rislam_rt.errors import RislamError
 from rislam_rt.model import Paths, RadioConfig, Scene
 from rislam_rt.pipeline.specification.radio import build_radio
@@ -96,7 +96,7 @@ def compare_room(
 
 
 def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, seed: int) -> Certificate:
-    """Compare both channels at the pose of a room where most paths are found by one alone (the first if there is none)."""
+    """Compare both channels at the pose of a room where most paths are found by one alone, or else the first pose."""
     traced, analytic, motion = trace_both(
         scene, radio, poses=poses, depth=depth, rng=room_rng(scene, seed), refine=False
     )

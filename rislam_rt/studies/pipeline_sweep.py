@@ -19,6 +19,7 @@ from rislam_rt.pipeline.specification.read import Table, build_spec, make_way, r
 from rislam_rt.pipeline.specification.section import Positive, Section
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
+from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.sweeps.axes import Axis, Scalar, Value, parse_axis
 from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
@@ -167,7 +168,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     beside = Path(plain.pop("beside"))
     spec = PipelineSpec.model_validate({**plain, "seed": seed})
     prepare_channel(spec.channel)
-    result = run_slam(load_scene(beside / str(spec.scene)), spec, rng=np.random.default_rng(seed))
+    result = run_slam(load_scene(room_beside(beside, str(spec.scene))), spec, rng=np.random.default_rng(seed))
     summary = summarise(result)
     told = {name: summary[name] for name in ("source", "schemes")}
     return {**_split(told, times=False), "timing": _split(summary, times=True)}
@@ -211,7 +212,7 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
-        room: Scene = load(path.parent / str(spec.scene))
+        room: Scene = load(room_beside(path.parent, str(spec.scene)))
         check_run(room, spec)
         own = own_digests([*spec.schemes, spec.channel])
         return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})

@@ -18,7 +18,7 @@ class ComparedRoomSection(Section):
     """One room in which both channels are compared."""
 
     scene: str
-    """Scene folder, relative to the pipeline file."""
+    """Scene folder, relative to the pipeline file, or a built-in room's name."""
     depth: Depth = 3
     """Largest number of wall bounces on a path, both legs together."""
     picture: bool = False
@@ -64,7 +64,7 @@ class Fig4aSpec(StudySpec):
     kind: Literal["fig4a"]
     """Kind of the pipeline file."""
     scene: str | None = None
-    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
     channel: Literal["traced", "image_source"] = "traced"
     """Channel model: ray tracer, or exact image sources."""
     elements: list[Literal["tang", "energy"]] = Field(default=["tang", "energy"], min_length=1)

@@ -1,14 +1,13 @@
 """The sweep engine: evaluates a function over axes of settings and seeds, with a file for each cell, resumable."""
 
 from rislam_rt.sweeps.axes import Axis, parse_axis
-from rislam_rt.sweeps.cost import SweepCost, estimate_cost
+from rislam_rt.sweeps.cost import SweepCost
 from rislam_rt.sweeps.run import SweepOptions, SweepProgress, SweepReport, run_sweep
 from rislam_rt.sweeps.store import Row
-from rislam_rt.sweeps.sweep import Cell, Sweep, build_cells
+from rislam_rt.sweeps.sweep import Sweep, build_cells
 
 __all__ = [
     "Axis",
-    "Cell",
     "Row",
     "Sweep",
     "SweepCost",
@@ -16,7 +15,6 @@ __all__ = [
     "SweepProgress",
     "SweepReport",
     "build_cells",
-    "estimate_cost",
     "parse_axis",
     "run_sweep",
 ]

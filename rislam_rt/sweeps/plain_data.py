@@ -1,7 +1,7 @@
 """Plain data: conversion of a cell's result to numbers, text, lists and mappings as in JSON, and its dotted names."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from rislam_rt.errors import RislamError
@@ -18,15 +18,6 @@ def plain_result(result: Any) -> dict[str, Any]:
     if not isinstance(result, Mapping) or not all(isinstance(name, str) for name in result):
         raise RislamError(f"the cell returned {type(result).__name__}; return a mapping of names to values")
     return {name: _plain(name, value) for name, value in result.items()}
-
-
-def flatten(result: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """All values of a cell's nested result with dotted names."""
-    for name, value in result.items():
-        if isinstance(value, Mapping):
-            yield from flatten(value, f"{above}{name}.")
-        else:
-            yield f"{above}{name}", value
 
 
 def _plain(name: str, value: Any) -> Any:

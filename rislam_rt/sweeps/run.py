@@ -118,8 +118,9 @@ def run_sweep(
         left = any(read_row(folder, cell).state != DONE for cell in cells)
         # a cluster first: one that is not there leaves no folder behind
         hired = _hire(stack, effort) if left and effort.dask is not None else None
-        stack.enter_context(open_folder(folder, sweep))
-        board = _SweepState(sweep, folder, effort, cells, tell, grow)
+        shown = effort.only_estimate and (folder / "table.csv").is_file()  # tables of what was run stay as they are
+        stack.enter_context(open_folder(folder, sweep, keep=shown))
+        board = _SweepState(sweep, folder, effort, cells, tell, grow, keep=shown)
         stack.callback(board.write)
         if board.left:
             run, board.width = hired or _hire(stack, effort)
@@ -141,7 +142,7 @@ def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
 
 
 def _shares(board: "_SweepState") -> Iterator[list[tuple[str, Task]]]:
-    """Cells of a sweep that are to be run, in batches: one alone first if there is no time to estimate the cost from."""
+    """Cells of a sweep that are to be run, in batches: one alone first if no known time tells the cost."""
     tasks = list(board.left.items())
     if board.cost().seconds is None:
         yield tasks[:1]
@@ -162,7 +163,10 @@ class _SweepState:
         cells: Sequence[Cell],
         tell: Callable[[SweepProgress], None] | None,
         grow: Callable[[Sequence[Row]], None] | None,
+        *,
+        keep: bool,
     ) -> None:
+        self.keep = keep
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
         self.rows = {cell.ident: read_row(folder, cell) for cell in cells}
         self.left = {
@@ -202,7 +206,9 @@ class _SweepState:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Write the table of all cells, and draw the figures of the results so far."""
+        """Write the table of all cells and draw the figures of the results so far, unless those there are to be kept."""
+        if self.keep:
+            return
         begin = monotonic()
         rows = list(self.rows.values())
         write_table(self.folder, rows)

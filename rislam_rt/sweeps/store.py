@@ -24,9 +24,8 @@ from rislam_rt.storage.files import (
     write_atomic,
 )
 from rislam_rt.storage.lock import LOCK_FILE, hold
-from rislam_rt.storage.seal import read_sealed, seal
+from rislam_rt.storage.seal import flatten, read_sealed, seal
 from rislam_rt.sweeps.cell_work import CellOutcome
-from rislam_rt.sweeps.plain_data import flatten
 from rislam_rt.sweeps.sweep import Cell, Sweep
 
 SWEEP_FILE = "sweep.json"
@@ -79,8 +78,10 @@ def check_folder(folder: Path) -> None:
 
 
 @contextmanager
-def open_folder(folder: Path, sweep: Sweep) -> Iterator[None]:
+def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None]:
     """Create a sweep's folder, lock it within this context, remove temporary files and write `sweep.json`.
+
+    With `keep` the `sweep.json` that is there stays.
 
     Raises
     ------
@@ -95,7 +96,8 @@ def open_folder(folder: Path, sweep: Sweep) -> Iterator[None]:
         with hold(folder, "sweep"):
             check_folder(folder)
             remove_temporaries((folder, folder / "cells"))
-            write_sweep(folder, sweep)
+            if not keep:
+                write_sweep(folder, sweep)
             yield
     finally:
         remove_empty(made)

@@ -1,4 +1,4 @@
-"""Floor 3: the sounding signal. Flat-band pulse and multicarrier: autocorrelation, spectrum, samples."""
+"""Floor 3: waveforms of the sounding. Flat-band pulse and multicarrier: autocorrelation, spectrum, samples."""
 
 from rislam_rt.waveform.flat import autocorrelation, effective_bandwidth, flat_pulse
 from rislam_rt.waveform.multicarrier import delay_response, subcarrier_frequencies

@@ -6,12 +6,13 @@ from rislam_rt.arrays import Floats
 
 
 def effective_bandwidth(bandwidth: float) -> float:
-    """Root of zeta^2 [Hz] of Proposition 1, the second moment of the power spectrum: B / sqrt(12)."""
+    """Effective (RMS) bandwidth zeta [Hz] of a flat band of width B [Hz], as in Proposition 1: B / sqrt(12)."""
     return bandwidth / np.sqrt(12.0)
 
 
 def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
-    """`R_s(tau) = int s(t) s(t - tau) dt` of Appendix B, or its first or second derivative.
+    """Autocorrelation `R_s(tau) = int s(t) s(t - tau) dt` of the flat-band pulse (Appendix B), or its 1st or 2nd
+    derivative.
 
     Parameters
     ----------
@@ -52,11 +53,11 @@ def _bessel(order: int, x: Floats) -> Floats:
 
 
 _SERIES_TERMS = 9
-"""Terms of the power series: the next one is below 1e-16 of the first for |x| < 1."""
+"""Number of terms of the Bessel functions' power series: the next one is below 1e-16 of the first for |x| < 1."""
 
 
 def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
-    """Values (...,) of the pulse, or of its first derivative, at times (...,) [s]; real, centred on 0.
+    """Values (...,) of the flat-band pulse, or of its first derivative, at times (...,) [s]; real, centred on 0.
 
     Samples at any rate of at least B carry its whole energy: `sum s^2 / rate = E`.
     """

@@ -142,6 +142,23 @@ def test_a_run_is_shown_and_other_settings_make_another_folder(run, tmp_path):
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*.*")} == before
 
 
+def test_what_config_prints_and_what_a_run_leaves_are_pipelines_that_run(run, tmp_path):
+    """From any folder, with the room that the pipeline names, and with the same numbers from the folder of a run."""
+    code, out, _ = run("config")
+    assert (code, '\nscene = "paper_room"\n' in out) == (0, True)
+    (tmp_path / "mine.toml").write_text(out)
+    words = (*SHORT, "--set", 'schemes=["random"]', "--no-report")
+    assert run("run", "mine.toml", *words, "--out", "first")[0] == 0
+    (tmp_path / "first").rename(tmp_path / "moved")
+    assert run("run", "moved/config.toml", "--no-report", "--out", "again")[0] == 0
+    first, again = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("moved", "again"))
+    assert first["schemes"]["random"]["rmse_m"] == again["schemes"]["random"]["rmse_m"]
+    for study in ("compare_channels", "rooms"):
+        out = run("config", study)[1]
+        assert '"office"' in out
+        assert "../scenes" not in out
+
+
 def test_a_run_touches_nothing_of_the_user(run, tmp_path):
     words = ("run", PIPELINE, *SHORT, "--set", 'schemes=["random"]', "--no-report", "--jobs", 1)
     mine = ("X.partial/notes", "X.old/notes", "runs/notes", ".git-credentials", ".x-y", "Y/run.json", "Y/thesis.tex")
@@ -223,7 +240,7 @@ def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     code, _, err = run("run", PIPELINE, *SHORT, "--no-report", "--jobs", 1)
     signal.signal(signal.SIGINT, before)
     assert code == 130
-    assert err.splitlines()[-1] == "interrupted: 1 schemes kept; the same command goes on from there"
+    assert err.splitlines()[-1] == "interrupted: 1 scheme kept; the same command goes on from there"
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     (folder,) = (tmp_path / "runs").iterdir()
     assert sorted(path.name for path in folder.iterdir()) == [

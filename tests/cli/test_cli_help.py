@@ -32,6 +32,18 @@ def test_every_help_has_examples_of_options_that_are_there(name):
         assert {word for word in words if word.startswith("--")} <= known
 
 
+@pytest.mark.parametrize("name", sorted(commands()))
+def test_no_help_loses_a_unit_in_brackets(name):
+    """Words in square brackets are marks of colour to the help that is shown, and are left out of it."""
+    texts = [commands()[name].help, *(getattr(one, "help", None) or "" for one in commands()[name].params)]
+    assert [text for text in texts if re.search(r"\[[a-zA-Z/]", text)] == []
+
+
+def test_wrong_usage_leads_to_the_help_of_the_command(run):
+    assert run("trace", "paper_room", "more")[2].endswith("; see rislam-rt trace --help\n")
+    assert run("nonsense")[2].endswith("; see rislam-rt --help\n")
+
+
 def test_several_faults_are_several_lines(run, tmp_path):
     (tmp_path / "mine.toml").write_text('name = "a"\nscheems = ["random"]\n[radio]\ncarier_ghz = 10\nnum_samples = 9\n')
     code, _, err = run("run", "mine.toml", "--scene", ROOT / "scenes" / "paper_room", "--set", "depth=-1")

@@ -16,7 +16,7 @@ from rislam_rt.design import (
     problem_from_belief,
 )
 from rislam_rt.design.beam_sweep import LOOK_ROUND, SETTLED, beam_phases, search_code, sweep_codes
-from rislam_rt.design.coordinate import _first_changes, _rank_by_slope, _rank_by_value
+from rislam_rt.design.coordinate_descent import _first_changes, _rank_by_slope, _rank_by_value
 from rislam_rt.errors import ConfigError, GeometryError
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import PanelCandidate, RisCode, empty_map

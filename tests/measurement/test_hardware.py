@@ -17,7 +17,7 @@ from rislam_rt.measurement import (
     receive,
     to_samples,
 )
-from rislam_rt.measurement.hardware import Sent, _clipped, digitise, image_spectrum, scaled_to_fit
+from rislam_rt.measurement.hardware import SentSignal, _clipped, digitise, image_spectrum, scaled_to_fit
 from rislam_rt.measurement.received import direct_gain
 from rislam_rt.measurement.signal import convert, to_tones
 from rislam_rt.model import RadioConfig
@@ -27,7 +27,7 @@ from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 RADIO, RECEIVER = RadioConfig(), ReceiverConfig(estimator="waveform")
-SENT = Sent(1.0, 0.0)
+SENT = SentSignal(1.0, 0.0)
 
 
 def rng(seed=0):
@@ -133,7 +133,7 @@ def test_the_residue_is_there_in_every_cycle_and_scales_with_the_leakage():
     front = build_front_end(HardwareConfig(leakage_residue=0.1), RADIO, RECEIVER, rng=rng())
     quiet = RadioConfig(noise_psd=1e-30)
     one, other = (
-        digitise(np.zeros((16, 128), complex), Sent(1.0, leak), quiet, RECEIVER, front, rng=rng(3))[0]
+        digitise(np.zeros((16, 128), complex), SentSignal(1.0, leak), quiet, RECEIVER, front, rng=rng(3))[0]
         for leak in (1.0, 2.0)
     )
     np.testing.assert_allclose(other, 2.0 * one, atol=1e-12)

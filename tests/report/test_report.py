@@ -152,6 +152,9 @@ def test_page_says_what_is_lost_and_what_held_itself_for_lost():
         page = build_page(lost, summarise(lost), {})
         assert ("lost with no panel." in page) == (scale == 100)
         assert f"<td>{rows[scale]['held itself for lost']}</td>" in page
+    whole, shape = (float(rows[1][key].removesuffix(" cm")) for key in ("agent", "agent, path aligned"))
+    assert shape < whole, "most of an honest run's error is the start's"
+    assert "within 1 cm an axis" in page
     assert (rows[1]["diverged"], rows[1]["held itself for lost"]) == ("no", "never")
     assert rows[100]["diverged"] == "yes"
     assert re.fullmatch("in [1-9] of 10 cycles", rows[100]["held itself for lost"])

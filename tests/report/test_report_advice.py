@@ -33,6 +33,7 @@ def test_a_margin_in_brackets_is_not_heard_and_the_commonest_reason_is_given(
     assert "none" in lamp
     assert "30%" in lamp
     assert "too weak" in lamp
+    assert "in brackets: not heard there" in text
     assert "lamp: heard at times: [too] weak" in text
     assert "to trace 6 walls: 1 bounce: 33 wall sequences" in text
     assert "up to 10^9 wall sequences" in text

@@ -9,8 +9,9 @@ SILENT = {"rmse_m": None, "angle_deg": None, "bound_m": None}
 
 def _scheme(**walls):
     return {
-        "rmse_m": 0.02, "bound_m": 0.01, "landmarks": {}, "walls": walls, "map": {"gospa_m": 0.1},
-        "association": {"accuracy": 0.9}, "over_budget": [], "diverged": False, "outcomes": {"ok": 10},
+        "rmse_m": 0.02, "rmse_aligned_m": 0.004, "bound_m": 0.01, "landmarks": {}, "walls": walls,
+        "map": {"gospa_m": 0.1},
+        "association": {"precision": 0.9, "recall": 0.4}, "over_budget": [], "diverged": False, "outcomes": {"ok": 10},
     }  # fmt: skip
 
 
@@ -25,3 +26,11 @@ def test_walls_that_no_path_meets_share_a_row():
         ["wall far", "not found", "not found"],
         ["2 walls", "not heard", "not heard"],
     ]
+
+
+def test_the_shape_of_the_path_and_what_was_associated_have_rows_of_their_own():
+    one_cycle = _scheme() | {"rmse_aligned_m": None}
+    table = {label: cells for label, *cells in summary_rows({"schemes": {"a": _scheme(), "b": one_cycle}})}
+    assert table["agent, path aligned"] == ["0.4 cm", "-"]
+    assert table["association: precision, recall"] == ["90%, 40%", "90%, 40%"]
+    assert table["slower than its budget"] == ["no step", "no step"]

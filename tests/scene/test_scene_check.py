@@ -113,12 +113,12 @@ CASES: dict[str, tuple[Change, str, str]] = {
     "doubled wall": (
         lambda s: furnished(s, "again", Mesh(s.reflectors[0].vertices + UP, s.reflectors[0].faces[:, ::-1])),
         "warning reflector[0].mesh (floor)",
-        "'floor' lies in the plane of 'again', 1.0e-05 m apart; where they overlap 'floor' reflects",
+        "'floor' lies in the plane of 'again', 0.01 mm apart; where they overlap 'floor' reflects",
     ),
     "poster": (
         lambda s: furnished(s, "poster", grid([0, 1, 1], [0, 1, 0], [0, 0, 1], 1, 1)),
         "warning reflector[6].mesh (poster)",
-        "'poster' lies in the plane of 'wall_x0', 0.0e+00 m apart; where they overlap 'poster' reflects",
+        "'poster' lies in the plane of 'wall_x0', 0 mm apart; where they overlap 'poster' reflects",
     ),
     "foot on the floor": (
         lambda s: furnished(s, "crate", block([2, 4, 0], [3, 5, 1])),
@@ -167,7 +167,12 @@ CASES: dict[str, tuple[Change, str, str]] = {
         "warning ris.normal",
         "never in front",
     ),
-    "large panel": (lambda s: panel(s, rows=40, cols=40), "warning ris.rows", "more than 1/B"),
+    "large panel": (lambda s: panel(s, rows=40, cols=40), "warning ris.rows", "more than 1 / B = 1 ns"),
+    "panel beyond the room": (
+        lambda s: panel(s, rows=300, cols=500),
+        "warning ris.rows",
+        "the panel of 7.5 m x 4.5 m reaches 0.75 m beyond the room",
+    ),
     "open room": (lambda s: without(s, "wall_x6"), "warning reflector", "rays from the start leave the room"),
     "millimetres": (lambda s: scaled(s, 1000.0), "warning reflector", "is it in millimetres?"),
     "too small": (lambda s: scaled(moved(s, [3, 3, 1], [0, 0, 0], TINY), 0.01), "warning reflector", "9 m across"),

@@ -43,6 +43,12 @@ def test_a_start_in_millimetres_is_named_beside_being_outside(damaged: Damage) -
     assert "[0.5, 0.7, 0.5] m" in units.line
 
 
+def test_waypoints_in_millimetres_are_named_one_by_one() -> None:
+    lines = said({"agent": {"waypoints": [[1.0, 1.0, 0.5], [4000.0, 1000.0, 500.0], "there", [4, 1]]}})
+    assert len(lines) == 1
+    assert "agent.waypoints[1]: [4000.0, 1000.0, 500.0] is far outside the room; in millimetres" in lines[0]
+
+
 def test_each_quantity_is_named_with_its_place() -> None:
     wall = {"material": {"itu": "concrete", "thickness_m": 200.0}}
     agent = {"cycle_s": 100, "velocity": [0, 70.7, 0]}

@@ -174,6 +174,9 @@ def test_picture_shows_a_line_for_each_scheme(swept):
     assert main_axis(scores) == "radio.reference_snr_db"
     axis = scores_figure(scores).axes[0]
     assert axis.get_ylabel().endswith("[m]")
+    assert axis.get_xlabel() == "radio.reference_snr_db [dB]"
+    marks = axis.yaxis.get_major_formatter()
+    assert [marks(value, 0) for value in (0.005, 0.02)] == ["0.005", "0.02"], "plain numbers, not 2 x 10^-2"
     assert [container.get_label() for container in axis.containers] == ["random", "no_ris"]
     np.testing.assert_allclose(axis.containers[0].lines[0].get_xydata(), [
         (s.point["radio.reference_snr_db"], s.overall) for s in scores if s.scheme == "random"

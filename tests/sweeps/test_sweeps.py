@@ -267,6 +267,18 @@ def test_estimate_does_one_cell_at_most(tmp_path):
     assert [row.state for row in again.rows].count("done") == 1
 
 
+def test_an_estimate_leaves_the_tables_of_another_sweep_as_they_are(tmp_path):
+    """A folder has one name for all axes of a pipeline; what was run is still to be read after a question."""
+    run_sweep(DRAW, tmp_path)
+    before = {file.name: file.read_bytes() for file in tmp_path.glob("*.*")}
+    assert {"sweep.json", "table.csv", "table.json"} <= set(before)
+    other = Sweep(DRAW.function, (Axis("x", (7, 8)), Axis("word", ("one",))))
+    assert run_sweep(other, tmp_path, SweepOptions(only_estimate=True), grow=pytest.fail).cost.cells == 2
+    assert {file.name: file.read_bytes() for file in tmp_path.glob("*.*")} == before
+    run_sweep(other, tmp_path)
+    assert (tmp_path / "table.csv").read_bytes() != before["table.csv"]
+
+
 def test_cost_comes_from_similar_cells():
     cells = build_cells(DRAW)
     known = [{"point": {"x": x, "word": "one"}, "seconds": float(x)} for x in (1, 2, 3)]

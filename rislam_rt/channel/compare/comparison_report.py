@@ -1,4 +1,4 @@
-"""The report of a comparison of two path sets: what was found."""
+"""Report of a comparison of two path sets: errors of matched paths with their limits, and paths that one side lacks."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -11,32 +11,33 @@ from rislam_rt.channel.compare.error_limits import ErrorLimits
 from rislam_rt.model import PathKind
 
 MOST_LISTED = 20
-"""Breaches that are listed, the worst first; all are counted."""
+"""Largest number of limit violations that a report lists, the worst first; all are counted."""
 
 
 class OneSidedPath(NamedTuple):
-    """A path that only one side has, in one cycle."""
+    """A path that only one of two compared channels has, in one cycle, with the reason."""
 
     cycle: int
     label: str
     """Identity in words."""
     side: str
-    """`traced` or `analytic`: who has it."""
+    """Channel that has the path: `traced` or `analytic`."""
     reason: str
-    """Why the other has not, empty where no proof was found."""
+    """Why the other channel lacks it, empty where no explanation was found."""
     proof: str
-    """What was computed from the geometry, with its size."""
+    """What was computed from the geometry to explain it, with its size."""
     size: float
-    """[m] the length or distance on which the proof rests, 0 where it rests on none."""
+    """[m] the length or distance on which the explanation rests, 0 where it rests on none."""
 
 
 class LimitViolation(NamedTuple):
-    """A matched path on which the two sides are farther apart than precision and geometry explain."""
+    """A matched path on which two compared channels differ by more than numerical precision and geometry explain."""
 
     cycle: int
     label: str
     """Identity in words."""
     quantity: str
+    """Name and unit of the quantity, as in `PathReport.judged`."""
     value: float
     """The error, in the unit that `quantity` names."""
     limit: float
@@ -49,7 +50,8 @@ class LimitViolation(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathReport:
-    """Matched paths with their errors, traced against analytic, and one-sided paths with their proofs."""
+    """Report of a comparison: matched paths with their errors, traced against analytic, and one-sided paths with their
+    explanations."""
 
     cycles: int
     labels: tuple[str, ...]
@@ -57,26 +59,27 @@ class PathReport:
     path: Integers
     """(M,) which of `labels` each matched path has."""
     cycle: Integers
-    """(M,)."""
+    """(M,) cycle of each matched path."""
     kind: Integers
     """(M,) `PathKind` of each matched path."""
     length_error: Floats
-    """(M,) [m] absolute."""
+    """(M,) [m] absolute difference of the path lengths."""
     gain_error_db: Floats
-    """(M,) [dB] absolute."""
+    """(M,) [dB] absolute difference of the gains' magnitudes."""
     gain_error: Floats
-    """(M,) difference of the magnitudes, relative to the coherent scale (`limits.coherent_scale`)."""
+    """(M,) difference of the gains' magnitudes, relative to the coherent scale (`error_limits.coherent_scale`)."""
     phase_error: Floats
-    """(M,) [rad] absolute."""
+    """(M,) [rad] absolute difference of the gains' phases."""
     aod_error: Floats
     """(M,) [rad] angle between the directions of departure."""
     aoa_error: Floats
     """(M,) [rad] angle between the directions of arrival."""
     limits: ErrorLimits
-    """Of `length_error`, `gain_error`, `phase_error`, `aod_error` and `aoa_error`."""
+    """Limits of `length_error`, `gain_error`, `phase_error`, `aod_error` and `aoa_error`."""
     one_sided: tuple[OneSidedPath, ...]
+    """Paths that only one channel has."""
     searched: dict[str, str]
-    """By side: whose numbers, and among which wall sequences paths were looked for (`Paths.source`)."""
+    """How each channel found its paths (`Paths.source`), by side."""
 
     def __post_init__(self) -> None:
         freeze(self, "kind", np.int64, (None,))
@@ -87,17 +90,17 @@ class PathReport:
 
     @property
     def matched(self) -> int:
-        """Compared paths that both sides have, counted per cycle."""
+        """Number of compared paths that both channels have, counted per cycle."""
         return len(self.kind)
 
     @property
     def explained(self) -> dict[str, int]:
-        """Compared paths of one side with a proof, counted by reason."""
+        """Numbers of compared paths that one channel lacks for a reason that was found, by reason."""
         return dict(sorted(Counter(path.reason for path in self.one_sided if path.reason).items()))
 
     @property
     def unexplained(self) -> int:
-        """Compared paths of one side without a proof."""
+        """Number of compared paths that one channel lacks without a reason that was found."""
         return sum(not path.reason for path in self.one_sided)
 
     @property
@@ -113,12 +116,12 @@ class PathReport:
 
     @property
     def num_breaches(self) -> int:
-        """Errors of compared paths beyond their limits, over all paths and quantities."""
+        """Number of errors of matched paths beyond their limits, over all paths and quantities."""
         return sum(int(np.sum(~(error <= limit))) for error, limit in self.judged.values())
 
     @property
     def breaches(self) -> list[LimitViolation]:
-        """The worst breaches of the report first, at most `MOST_LISTED`."""
+        """Errors of matched paths beyond their limits, the worst first, at most `MOST_LISTED`."""
         found = []
         for quantity, (error, limit) in self.judged.items():
             for row in np.flatnonzero(~(error <= limit)):
@@ -135,7 +138,7 @@ class PathReport:
 
     @property
     def explanation_limits(self) -> dict[str, float]:
-        """The weakest proof of each reason: the largest length or distance [m] it rests on."""
+        """Largest length or distance [m] on which an explanation of a missing path rests, by reason."""
         return {r: max(path.size for path in self.one_sided if path.reason == r) for r in self.explained}
 
     def as_dict(self) -> dict[str, Any]:
@@ -167,7 +170,7 @@ class PathReport:
         }
 
     def _nearest(self, error: Floats, limit: Floats) -> dict[str, Any]:
-        """For the comparison's JSON: range of a quantity's limits, and the path that comes nearest to its own."""
+        """Range of a quantity's error limits, and the matched path whose error comes nearest to its own limit."""
         if len(error) == 0:
             return {}
         share = error / limit
@@ -184,12 +187,13 @@ class PathReport:
 
 
 def _largest(errors: Floats) -> float:
-    """Largest error in the comparison's report, 0 of none."""
+    """Largest of the errors (M,) of paths that two channels share, 0 of none."""
     return float(errors.max(initial=0.0))
 
 
 def _percentiles(errors: Floats) -> dict[str, float]:
-    """Median, 90th, 99th percentile and maximum of errors for the comparison's report; nothing of none."""
+    """Median, 90th and 99th percentile and maximum of the errors (M,) of paths that two channels share; empty of
+    none."""
     if len(errors) == 0:
         return {}
     p50, p90, p99, top = np.percentile(errors, [50.0, 90.0, 99.0, 100.0])

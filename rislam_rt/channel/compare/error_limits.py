@@ -1,4 +1,4 @@
-"""Error limits, path by path, between two right answers: rounding, the room's size, the lengths of paths.
+"""Error limits between ray-traced and image-source paths, path by path: what rounding in float32 or float64 explains.
 
 Rounding is half a unit in the last place, `u = 2^-24` in float32, of the numbers rounded: coordinates up to the room's
 extent E about the tracer's zero, and up to E + L for the images of a leg of length L. With b bounces one end of the
@@ -31,41 +31,43 @@ SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """Unit roundoff of float32 and float64."""
 
 STEPS = 8.0
-"""Roundings of a coordinate at a bounce: the image (distance from the plane, product, difference), the ray towards it
-(difference, normalisation) and its hit (distance, product, sum)."""
+"""Number of roundings of a coordinate at a bounce: the image (distance from the plane, product, difference), the ray
+towards it (difference, normalisation) and its hit (distance, product, sum)."""
 
 FIELD_STEPS = 4.0
-"""Roundings of a field at a bounce or an antenna: the coefficient, its real and its imaginary part, the product."""
+"""Number of roundings of a field at a bounce or an antenna: coefficient, its real and its imaginary part, product."""
 
 SLAB_STEPS = 8.0
-"""Roundings in a slab's coefficient, each worth u of it and, through the phase across the slab, of that phase."""
+"""Number of roundings in a slab's reflection coefficient, each worth u of it and of the phase across the slab."""
 
 
 class ErrorLimits(NamedTuple):
-    """Largest errors (M,) that precision and geometry explain."""
+    """Largest errors (M,) of matched paths that numerical precision and geometry explain."""
 
     length: Floats
-    """[m]."""
+    """[m] path length."""
     gain: Floats
-    """Of magnitudes, relative to the coherent scale (`coherent_scale`)."""
+    """Magnitude of the gain, relative to the coherent scale (`coherent_scale`)."""
     phase: Floats
-    """[rad]; pi where the gain vanishes in its own uncertainty."""
+    """[rad] phase of the gain; pi where the gain vanishes in its own uncertainty."""
     aod: Floats
-    """[rad]."""
+    """[rad] direction of departure."""
     aoa: Floats
-    """[rad]."""
+    """[rad] direction of arrival."""
 
 
 class PathLegs(NamedTuple):
-    """The two legs (M, 2) of matched paths; a path without a landmark has one, the other is all zeros."""
+    """Lengths, segments and walls of the two legs (M, 2) of matched paths; without a landmark the second leg is
+    zero."""
 
     length: Floats
     """[m]."""
     bounces: Integers
+    """Number of wall bounces."""
     at_device: Floats
-    """[m] Segment next to the agent, its own end of the path: a direct path's second entry is its segment at the Rx."""
+    """[m] length of the segment at the agent's end; without a landmark the second entry is the segment at the Rx."""
     at_landmark: Floats
-    """[m] Segment next to the landmark."""
+    """[m] length of the segment next to the landmark."""
     segments: list[Floats]
     """Two of (M, V): all segments [m] of the leg, 0 beyond the last."""
     walls: list[Integers]
@@ -74,27 +76,27 @@ class PathLegs(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomPrecision:
-    """What one room, one radio and one kind of numbers leave uncertain."""
+    """Numerical precision of paths in one room, from which their error limits follow: rounding and flatness of
+    walls."""
 
     scene: Scene
     radio: RadioConfig
     roundoff: float
-    """`SINGLE` or `DOUBLE`: of the numbers that are judged."""
+    """Unit roundoff of the numbers that are judged: `SINGLE` or `DOUBLE`."""
     extent: float
     """[m] largest coordinate."""
     offset_rays: float
-    """How far rays start off their surfaces, relative to 1 m + the largest coordinate."""
+    """Distance at which rays start off their surfaces, relative to 1 m + the largest coordinate."""
     offset: Floats
-    """(W,) [m] how far a wall's mesh may be off its plane, twice: a mirror image moves by that."""
+    """(W,) [m] twice the distance by which a wall's mesh may be off its plane: a mirror image moves by that."""
     tilt: Floats
-    """(W,) twice the angle [rad] by which it may be tilted."""
+    """(W,) [rad] twice the angle by which a wall's mesh may be tilted."""
     field: Floats
-    """(W,) error of the field at a bounce, relative to the incident one."""
+    """(W,) error of the field at a bounce, relative to the incident field."""
 
     @classmethod
     def of(cls, scene: Scene, radio: RadioConfig, *, single: bool) -> "RoomPrecision":
-        """Precision from which limits follow: of the tracer's float32 numbers about the room's middle, or of
-        float64."""
+        """Precision of paths in a scene: of the tracer's float32 numbers about the room's middle, or of float64."""
         walls = build_walls(scene)
         u = SINGLE if single else DOUBLE
         extent = float(np.abs(scene.bounds - (scene.bounds.mean(axis=0) if single else 0.0)).max())
@@ -106,7 +108,8 @@ class RoomPrecision:
     def limits(
         self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, scale: Floats
     ) -> ErrorLimits:
-        """Limits of paths (cycle[i], path[i]) of the exact side; `scale` (M,) is their coherent scale."""
+        """Error limits of the paths (cycle[i], path[i]) of the image-source channel; `scale` (M,) is their coherent
+        scale."""
         shape = _shape(paths, cycle, path, trajectory, build_walls(self.scene).names)
         reach = self.extent + shape.length
         shift = (2.0 + STEPS * shape.bounces) * self.roundoff * reach * (shape.length > 0.0)
@@ -129,14 +132,15 @@ class RoomPrecision:
         return ErrorLimits(length, gain, np.minimum(phase, np.pi), angle[:, 0], angle[:, 1])
 
     def _field(self, shape: PathLegs) -> Floats:
-        """(M,) limit of what materials and antennas may be off, relative to the scale."""
+        """Gain's error limit (M,) from rounding in materials and antennas, relative to the coherent scale."""
         error = np.full(len(shape.length), 4.0 * FIELD_STEPS * SINGLE)
         for walls in shape.walls:
             error += np.where(walls >= 0, self.field[walls], 0.0).sum(axis=1)
         return error
 
     def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
-        """(M,) limit of what the antennas' patterns may be off: a half-wave dipole's is a difference over a sine."""
+        """Gain's error limit (M,) from the antennas' patterns: a half-wave dipole's is a small difference over a
+        sine."""
         error, antennas = np.zeros(len(path)), self.radio.antennas
         for pattern, ray in ((antennas.tx, paths.departure), (antennas.rx, paths.arrival)):
             if pattern == "hw_dipole":
@@ -145,8 +149,7 @@ class RoomPrecision:
         return error
 
     def _landmark(self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, turn: Floats) -> Floats:
-        """(M,) limit from turning both directions at the landmark by (M, 2) [rad], for a panel's or a cylinder's
-        field."""
+        """Gain's error limit (M,) from turning both directions at a panel or cylinder by `turn` (M, 2) [rad]."""
         error = np.zeros(len(path))
         wavenumber = 2.0 * np.pi / self.radio.wavelength
         for number, scatterer in enumerate(self.scene.scatterers):
@@ -165,7 +168,7 @@ class RoomPrecision:
 def coherent_scale(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, precision: RoomPrecision
 ) -> Floats:
-    """(M,) scale of a gain's error limits: the sum of the magnitudes of all that contributes to it.
+    """Coherent scale (M,) of gains, to which their errors are related: the sum of the magnitudes of all contributions.
 
     Of a panel path, over its elements: a null is the difference of large numbers, and its own size says nothing about
     their error. Of a cylinder, its broadside. Of all others the gain itself. Where walls are slabs give `paths` with
@@ -192,7 +195,7 @@ def coherent_scale(
 
 
 def with_perfect_mirrors(scene: Scene) -> Scene | None:
-    """The scene with perfect mirrors for slabs, whose gains are the scale of error limits; nothing without slabs."""
+    """The scene with perfect mirrors in place of slabs, for the coherent scale of gains; None without slabs."""
     if not any(reflector.material.is_slab for reflector in scene.reflectors):
         return None
     mirror = Material(reflection=1.0)
@@ -202,14 +205,14 @@ def with_perfect_mirrors(scene: Scene) -> Scene | None:
 
 
 def _polyline(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory) -> Floats:
-    """Tx, interaction points and Rx (M, V + 2, 3) [m] of paths whose limits are wanted, the Rx repeated at the end."""
+    """Points (M, V + 2, 3) [m] of paths from Tx over the interaction points to Rx, the Rx repeated at the end."""
     tx, rx = trajectory.tx[cycle][:, None], trajectory.rx[cycle][:, None]
     there = np.arange(paths.vertices.shape[2]) < paths.num_vertices[path][:, None]
     return np.concatenate([tx, np.where(there[..., None], paths.vertices[cycle, path], rx), rx], axis=1)
 
 
 def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, names: tuple[str, ...]) -> PathLegs:
-    """Legs of paths (cycle[i], path[i]) measured for their error limits; walls as numbers among `names`."""
+    """Lengths, segments and walls of the legs of paths (cycle[i], path[i]); walls as numbers among `names`."""
     segment = np.linalg.norm(np.diff(_polyline(paths, cycle, path, trajectory), axis=1), axis=-1)
     row, on_tx = np.arange(len(path)), (paths.tx_walls[path] >= 0).sum(axis=1)
     joined, last = paths.landmark[path] >= 0, paths.num_vertices[path]
@@ -229,19 +232,19 @@ def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 def _landmark_directions(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 ) -> tuple[Floats, Floats]:
-    """Unit vectors (M, 3) for the limits, from the landmark towards where its path comes from, and goes to."""
+    """Unit vectors (M, 3) from the landmark of each path towards the point before it and the point after it."""
     points, row = _polyline(paths, cycle, path, trajectory), np.arange(len(path))
     at = (paths.tx_walls[path] >= 0).sum(axis=1) + 1
     return unit(points[row, at - 1] - points[row, at]), unit(points[row, at + 1] - points[row, at])
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """a / b for an error limit, 0 where both are nothing."""
+    """Ratio a / b, 0 where a is 0."""
     return np.where(a > 0.0, a / np.where(b > 0.0, b, np.finfo(np.float64).tiny), 0.0)
 
 
 def _bend(segments: Floats, beside: Floats) -> Floats:
-    """(M,) [m] how a line's length errs when its corners move `beside` (M,) across its segments (M, V).
+    """Error (M,) [m] of a polyline's length when its corners move by `beside` (M,) [m] across its segments (M, V).
 
     A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     """
@@ -250,8 +253,8 @@ def _bend(segments: Floats, beside: Floats) -> Floats:
 
 
 def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """(W,) [m] error of a wall's plane: largest distance of its corners from it, and altitude of its largest
-    triangle."""
+    """Flatness of walls (W,) [m], the largest distance of corners from the wall's plane, and altitude (W,) [m] of the
+    largest triangle."""
     corners, owner = walls.triangles, walls.wall_of_triangle
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))
@@ -265,7 +268,7 @@ def _flatness(walls: Walls) -> tuple[Floats, Floats]:
 
 @cache
 def field_error(material: Material, carrier: float) -> float:
-    """Limit of what float32 may do to the field at a bounce, relative to the incident field.
+    """Error limit of the field reflected by a material in float32, relative to the incident field.
 
     A slab's coefficient follows its permittivity eps and the phase `k d sqrt(z)`, `z = eps - sin^2`, across it, which
     may be hundreds of radians: float32 keeps as many digits of it as of all else. The derivatives by ln d and ln eps

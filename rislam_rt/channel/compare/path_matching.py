@@ -1,4 +1,4 @@
-"""Matching by identity: kind, landmark and wall names on either leg; delays and columns' order play no part."""
+"""Matching of the paths of two channels by identity: kind, landmark and wall names on either leg, never by delay."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from rislam_rt.model import Antennas, Paths, RadioConfig, Scene, Trajectory
 
 
 class IdentityColumns(NamedTuple):
-    """For every identity that either side knows: its column on each side, -1 where it is unknown there."""
+    """Path identities of two channels with their columns in either, -1 where a channel does not have them."""
 
     identity: list[Identity]
     traced: Integers
@@ -26,18 +26,18 @@ class IdentityColumns(NamedTuple):
 
 
 class Matched(NamedTuple):
-    """M paths that both sides have."""
+    """M paths that both channels have, with columns, scale and error limits."""
 
     labels: tuple[str, ...]
-    """(I,) of all identities."""
+    """(I,) identities in words."""
     cycle: Integers
-    """(M,)."""
+    """(M,) cycle of each path."""
     path: Integers
-    """(M,) identity."""
+    """(M,) number of its identity in `labels`."""
     traced: Integers
-    """(M,) column."""
+    """(M,) column in the traced paths."""
     analytic: Integers
-    """(M,) column."""
+    """(M,) column in the image-source paths."""
     scale: Floats
     """(M,) coherent scale of the gain."""
     limits: ErrorLimits
@@ -100,7 +100,7 @@ def _scale(
     trajectory: Trajectory,
     precision: RoomPrecision,
 ) -> Floats:
-    """(M,) coherent scale of matched paths, given by cycle, analytic column and identity."""
+    """Coherent scale (M,) of the gains of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched
     mirrors, antennas = with_perfect_mirrors(precision.scene), precision.radio.antennas
     if (mirrors is None and antennas.plain) or len(path) == 0:
@@ -113,7 +113,7 @@ def _scale(
 
 
 def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
-    """Union of both sides' path identities, for matching them."""
+    """Union of the path identities of two channels, with their columns in either."""
     sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
     identity = sorted(sides[0].keys() | sides[1].keys())
     here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
@@ -121,7 +121,7 @@ def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
 
 
 def named_identity(paths: Paths, path: int) -> Identity:
-    """Identity of a path in names, so that paths of two numberings of walls match."""
+    """Identity of a path with landmark and walls by name, so that paths of two channels match."""
     kind, landmark, tx, rx = paths.identity(path)
     walls = paths.walls
     name = paths.landmarks[landmark] if landmark >= 0 else ""
@@ -129,21 +129,21 @@ def named_identity(paths: Paths, path: int) -> Identity:
 
 
 def _valid(paths: Paths, column: Integers) -> Booleans:
-    """(K, I) validity of the identities to match."""
+    """Validity (K, I) of path identities in one channel, given by their columns (I,), -1 for none."""
     valid = np.zeros((paths.num_cycles, len(column)), dtype=np.bool_)
     valid[:, column >= 0] = paths.valid[:, column[column >= 0]]
     return valid
 
 
 def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSidedPath:
-    """The record of a path without a match on the other side."""
+    """Explain a path that only one channel has in a cycle, as a record for the report."""
     side = "traced" if is_traced else "analytic"
     proof = certifier.explain(identity, cycle, side)
     return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
 
 
 def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[OneSidedPath]) -> PathReport:
-    """Errors of the matched paths."""
+    """Assemble the report of a comparison: errors of the matched paths, traced against analytic."""
     at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
     gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
     return PathReport(
@@ -165,17 +165,17 @@ def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[On
 
 
 def is_single(source: str) -> bool:
-    """Whether paths of this source, which are matched, hold the tracer's own float32 numbers."""
+    """Whether `Paths.source` says that the paths hold the tracer's own float32 numbers."""
     return source.startswith("traced") and "refined" not in source
 
 
 def _level_difference(a: Floats, b: Floats) -> Floats:
-    """|20 lg(a / b)| [dB] of the gains of matched paths, 0 where both are nothing (a panel seen edge-on, a horizontal
-    polarisation)."""
+    """Absolute level difference |20 lg(a / b)| [dB] of the gains of matched paths, 0 where both are 0 (a panel seen
+    edge-on)."""
     floor = np.finfo(np.float64).tiny
     return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))
 
 
 def _relative(error: Floats, scale: Floats) -> Floats:
-    """Errors (M,) of matched paths in units of their scale, 0 of nothing."""
+    """Gain errors (M,) of matched paths relative to their coherent scale (M,), 0 where both are 0."""
     return error / np.maximum(scale, np.finfo(np.float64).tiny)

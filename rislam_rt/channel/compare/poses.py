@@ -1,4 +1,4 @@
-"""Random poses for a comparison: inside the room, off every surface, baseline in no special direction."""
+"""Random poses for comparing channels: inside the room, off every surface, baseline in no special direction."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ _ROUNDS = 20
 def random_poses(
     scene: Scene, count: int, *, rng: np.random.Generator, clearance: float = 0.1, baseline: float = 0.1
 ) -> Trajectory:
-    """`count` poses with the midpoint at least `clearance` [m] from every surface and inside the room.
+    """Draw `count` random poses inside the room, the midpoint at least `clearance` [m] from every surface.
 
     Inside means reachable from the scene's start by a chain of free straight lines between poses, so that the
     insides of closed objects are left out and rooms of any shape are covered. The baseline [m] has one random
@@ -41,7 +41,7 @@ def random_poses(
 
 
 def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) -> Trajectory:
-    """Poses at rest, one a second, with generic baselines."""
+    """Trajectory of positions (K, 3) [m] at rest, one a second, with random headings and a random baseline."""
     count = len(position)
     elevation = rng.uniform(np.radians(15.0), np.radians(60.0)) * rng.choice([-1.0, 1.0])
     offset = 0.5 * baseline * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
@@ -52,7 +52,7 @@ def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) 
 
 
 def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
-    """Which poses (N, 3) a chain of free straight lines joins to the start, other poses as stations."""
+    """Which points (N, 3) [m] are reachable from the start by straight lines that nothing blocks, over other points."""
     reached = np.zeros(len(points), dtype=np.bool_)
     walls = facets.possible_blockers(np.concatenate([start[None], points]))
     stations = [start]

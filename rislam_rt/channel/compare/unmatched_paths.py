@@ -1,4 +1,5 @@
-"""Explanations why one side lacks a path: proofs from mirror images in float64 without either channel's own tests."""
+"""Explanations why a channel lacks a path that the other has, from mirror images in float64, without either channel's
+own visibility tests."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,20 +18,21 @@ from rislam_rt.geometry.triangles import distance_to_edges, outline_edges
 from rislam_rt.model import PathKind, Scene, Trajectory
 
 Identity = tuple[int, str, tuple[str, ...], tuple[str, ...]]
-"""Kind, landmark, Tx walls, Rx walls, by name."""
+"""Identity of a path by names: kind, landmark, Tx walls, Rx walls."""
 
 SHORTEST_SEGMENT = 10.07e-3
 """[m] Sionna RT drops a path with a segment below 1 cm; in float32 the limit bites up to this length."""
 
 HIDDEN = ("occluded", "close surfaces")
-"""Reasons of what stands in the way, rather than of a reflection that is none."""
+"""Reasons of failure by something in the way, rather than by a missing reflection."""
 
 ROUNDINGS = 8.0
-"""Float32 operations, each rounding to the last place, between the coordinates and a mirror image or a hit."""
+"""Number of float32 roundings between the coordinates and a mirror image or a hit."""
 
 
 class Explanation(NamedTuple):
-    """Reason (empty: none found), what was computed, and the length [m] on which it rests."""
+    """Explanation of a missing path: reason (empty if none was found), what was computed, the length [m] it rests
+    on."""
 
     reason: str
     text: str
@@ -38,7 +40,7 @@ class Explanation(NamedTuple):
 
 
 class ExistenceCondition(NamedTuple):
-    """One thing that a path needs: it holds where `margin` [m] is positive. `reason` names its failure.
+    """Condition for a path to exist: it holds where `margin` [m] is positive. `reason` names its failure.
 
     Where the margin is smaller than `reach` [m], float32 cannot tell.
     """
@@ -50,47 +52,48 @@ class ExistenceCondition(NamedTuple):
 
 
 class UnfoldedLeg(NamedTuple):
-    """One leg drawn on unbounded planes."""
+    """One specular leg constructed on the walls' unbounded planes, without visibility tests."""
 
     points: Floats
     """(d + 2, 3) [m] device, bounces, far end."""
     walls: Integers
-    """(d,)."""
+    """(d,) numbers of the walls."""
     clearance: float
-    """[m] Smallest distance of a segment's ends from the plane it bounces on, negative where the two neighbours of a
+    """[m] smallest distance of a segment's ends from the plane it bounces on, negative where the two neighbours of a
     bounce do not lie on the same side: then there is no such reflection."""
     shift: Floats
-    """(d + 1,) [m] how far beside each segment its ray may run in float32."""
+    """(d + 1,) [m] largest lateral error of the tracer's float32 ray along each segment."""
     panel: int
-    """The panel at its end, -1 for none."""
+    """Number of the panel at its end, -1 for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DifferenceExplainer:
-    """Scene, poses and the outlines of all walls."""
+    """Explains paths that only one of two compared channels has, by conditions computed from scene and poses."""
 
     scene: Scene
     trajectory: Trajectory
     depth: int
-    """Bounces up to which both sides looked."""
+    """Number of bounces up to which both channels search."""
     shortest: float
-    """[m] Segments below this are lost by the tracer."""
+    """[m] length below which the tracer loses segments."""
     names: tuple[str, ...]
     facets: WallFacets
     edges: Floats
     """(E, 2, 3) [m] outline edges of all walls."""
     wall_of_edge: Integers
-    """(E,)."""
+    """(E,) wall of each edge."""
     tilt: Floats
-    """(W,) [rad] what float32 corners do to the normal of each wall's largest triangle, which the tracer mirrors in."""
+    """(W,) [rad] error by float32 rounding of the normal of each wall's largest triangle, which the tracer mirrors
+    in."""
     center: Floats
-    """(3,) [m] middle of the room, from which the tracer's coordinates count."""
+    """(3,) [m] middle of the room, the origin of the tracer's coordinates."""
     hosts: tuple[int, ...]
     """The wall behind each panel, -1 without one."""
 
     @classmethod
     def of(cls, scene: Scene, trajectory: Trajectory, depth: int, shortest: float) -> "DifferenceExplainer":
-        """Prepare a scene and its poses for explaining differences."""
+        """Prepare the explanation of differences between two channels of a scene at the poses of a trajectory."""
         walls = build_walls(scene)
         facets = build_facets(walls)
         outlines = [outline_edges(facets.corners[a:b]) for a, b in zip(facets.first, facets.first[1:], strict=False)]
@@ -101,13 +104,13 @@ class DifferenceExplainer:
         return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
-        """A path's identity in an explanation, for people; Rx walls after the bar."""
+        """Identity of a path in words, Rx walls after the bar."""
         kind, landmark, tx, rx = identity
         text = " ".join([PathKind(kind).name, *tx, *([landmark] if landmark else [])])
         return f"{text} | {' '.join(rx)}" if rx else text
 
     def explain(self, identity: Identity, cycle: int, side: str) -> Explanation:
-        """The explanation, with proof, of a path that only `side` has.
+        """Explain why a path that `side` has in a cycle is missing in the other channel.
 
         A path exists where all its conditions hold. It is proved absent by an object that stands clearly in the way
         of reflections in order, undecidable where a margin is below what float32 leaves open there
@@ -134,7 +137,7 @@ class DifferenceExplainer:
         return Explanation("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
 
     def _legs(self, identity: Identity, cycle: int) -> list[UnfoldedLeg]:
-        """Legs of the path to explain on unbounded planes, each from its device to the far end."""
+        """Legs of a path constructed on the walls' unbounded planes, each from its device to the far end."""
         _, landmark, tx_names, rx_names = identity
         tx_walls, rx_walls = ([self.names.index(n) for n in names] for names in (tx_names, rx_names))
         tx, rx = self.trajectory.tx[cycle], self.trajectory.rx[cycle]
@@ -145,7 +148,7 @@ class DifferenceExplainer:
         return [self._unfolded(tx_walls, tx, point, panel), self._unfolded(rx_walls[::-1], rx, point, panel)]
 
     def _unfolded(self, walls: list[int], device: Floats, far: Floats, panel: int = -1) -> UnfoldedLeg:
-        """A leg to explain drawn on unbounded planes, by mirroring the far end."""
+        """Construct a leg on the walls' unbounded planes by mirroring the far end."""
         facets, images = self.facets, [far]
         for wall in walls[::-1]:
             images.append(mirror(images[-1], facets.normal[wall], facets.offset[wall]))
@@ -161,7 +164,7 @@ class DifferenceExplainer:
         return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
-        """How far the tracer's ray may run beside each segment of the leg to explain: (d + 1,) [m].
+        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along the segments of a leg.
 
         The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
         largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of what
@@ -182,7 +185,7 @@ class DifferenceExplainer:
         return shift
 
     def _conditions(self, leg: UnfoldedLeg) -> list[ExistenceCondition]:
-        """All conditions that a leg has to meet to be there, with margins from the geometry."""
+        """All conditions for a leg to exist, with margins from the geometry."""
         reach = float(leg.shift.max())
         found = [
             ExistenceCondition(
@@ -202,8 +205,7 @@ class DifferenceExplainer:
         return found
 
     def _on_wall(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Condition: bounce `number` lies on its wall's triangles, not only in its plane, and not on what lies on
-        them."""
+        """Conditions that bounce `number` of a leg lies on its wall's triangles and on no wall that covers them."""
         wall, bounce = int(leg.walls[number]), leg.points[number + 1]
         found = []
         for surface, sign in ((wall, 1.0), *((int(upper), -1.0) for upper in self.facets.over[wall])):
@@ -214,7 +216,7 @@ class DifferenceExplainer:
         return found
 
     def _free(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Condition: no other wall stands across segment `number`: it would have to be crossed, and where it is solid.
+        """Conditions that no wall or occluder stands across segment `number` of a leg.
 
         Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the host
         wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to tell.
@@ -240,10 +242,10 @@ class DifferenceExplainer:
                 found.append(ExistenceCondition("close surfaces", text, -crossed, reach))
             else:
                 found.append(ExistenceCondition("occluded", text, -min(solid, crossed), reach))
-        return found + self._unshaded(leg, number)
+        return found + self._unoccluded(leg, number)
 
-    def _unshaded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Condition: no shade stands across segment `number`; the far end's own does not hide it."""
+    def _unoccluded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
+        """Conditions that no occluder stands across segment `number` of a leg; the far end's own does not hide it."""
         occluders, found = self.facets.occluders, []
         for shade, landmark in enumerate(occluders.landmark):
             last = number == len(leg.walls) and landmark != ALONE
@@ -255,9 +257,10 @@ class DifferenceExplainer:
         return found
 
     def _inside(self, point: Floats, ray: Floats, wall: int) -> float:
-        """Distance [m] of a `ray` (3,) through a point (3,) of a wall's plane from the wall's outline.
+        """Distance [m] of a `ray` (3,) through a point (3,) of a wall's plane from the wall's outline, negative
+        outside.
 
-        Across the ray, since that is how a ray is off; negative outside.
+        It is measured across the ray, as are a ray's errors.
         """
         inside = bool(self.facets.contains(point[None], np.array([wall]))[0])
         along = unit(ray)
@@ -268,7 +271,7 @@ class DifferenceExplainer:
 
 
 def _tilts(facets: WallFacets, center: Floats) -> Floats:
-    """(W,) [rad] how far rounded corners can turn the normal of each wall's largest triangle."""
+    """Largest turn (W,) [rad] of the normal of each wall's largest triangle by float32 rounding of its corners."""
     corners = facets.corners - center
     sides = np.roll(corners, -1, axis=1) - corners
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1)

@@ -1,4 +1,4 @@
-"""Antenna patterns by their formulas, and what two antennas make of a leg between them."""
+"""Antenna patterns in closed form, and the coefficient of a specular leg between two such antennas."""
 
 from typing import NamedTuple
 
@@ -15,20 +15,20 @@ BEAM, DEEPEST, PEAK = np.radians(65.0), 30.0, 8.0
 
 
 class LegEnds(NamedTuple):
-    """What is at the two ends of legs."""
+    """Antennas at the two ends of specular legs, and the agent's heading."""
 
     device: tuple[str, str]
-    """Pattern and polarisation (`model.antennas`),"""
+    """Pattern and polarisation (`model.antennas`) at the device."""
     far: tuple[str, str]
-    """...and those of the far end."""
+    """Pattern and polarisation at the far end: a landmark, or the Rx."""
     heading: Floats
     """(K,) [rad] of the agent, with which its antennas turn."""
 
     def coefficient(
         self, coatings: Coatings, walls: Integers, normals: Floats, direction: Floats, cycle: Integers
     ) -> Complexes:
-        """(N,) what the far end's antenna receives of legs that leave along `direction` (N, 3) and meet `walls` (N,
-        d)."""
+        """Coefficient (N,) of legs that leave along `direction` (N, 3) and bounce on `walls` (N, d): both antenna
+        patterns and the polarised reflections, without spreading loss and carrier phase."""
         heading = self.heading[cycle]
         basis = polarisation_basis(direction)
         parts = radiated(*self.device, direction, heading)
@@ -41,20 +41,21 @@ class LegEnds(NamedTuple):
 
 
 def radiated(pattern: str, polarization: str, direction: Floats, heading: Floats) -> Floats:
-    """Field (N, 2) along theta_hat and phi_hat in `direction` (N, 3), of an antenna turned by `heading` (N,)."""
+    """Field (N, 2) along theta_hat and phi_hat that an antenna turned by `heading` (N,) radiates in `direction` (N,
+    3)."""
     level = amplitude(pattern, direction, heading)
     nothing = np.zeros_like(level)
     return np.stack([level, nothing] if polarization == "V" else [nothing, level], axis=-1)
 
 
 def peak_amplitude(antennas: Antennas) -> float:
-    """What the antennas' patterns make of a path at most: all of them are strongest ahead."""
+    """Largest amplitude factor of the Tx's and the Rx's antenna pattern together: all patterns are strongest ahead."""
     ahead, heading = np.array([[1.0, 0.0, 0.0]]), np.zeros(1)
     return float(amplitude(antennas.tx, ahead, heading)[0] * amplitude(antennas.rx, ahead, heading)[0])
 
 
 def amplitude(pattern: str, direction: Floats, heading: Floats) -> Floats:
-    """Root (N,) of the gain in `direction` (N, 3), 1 for an isotropic antenna."""
+    """Amplitude (N,) of an antenna pattern in `direction` (N, 3): the root of its gain, 1 for an isotropic antenna."""
     cosine, sine = direction[:, 2], np.hypot(direction[:, 0], direction[:, 1])
     if pattern == "dipole":
         return np.asarray(np.sqrt(SHORT) * sine)

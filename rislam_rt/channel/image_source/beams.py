@@ -1,4 +1,4 @@
-"""Mirrored beams: which wall sequences can exist at all, found without trying every sequence.
+"""Beam tracing: the wall sequences that a specular leg can have, found by mirroring beams instead of trying all.
 
 Seen from the far end's mirror image, a ray that bounces on a wall leaves through that wall's bounding rectangle: it
 stays inside the beam of that rectangle. Only walls that reach into the beam can come next, each with a beam of its own,
@@ -23,14 +23,15 @@ _BLOCK = 4_000_000
 
 
 class BoundingBalls(NamedTuple):
-    """B balls of positions: centre (B, 3) and radius (B,) [m]."""
+    """Bounding balls of B groups of positions: centre (B, 3) and radius (B,) [m]."""
 
     center: Floats
     radius: Floats
 
 
 def group_positions(points: Floats, limit: float) -> list[Integers]:
-    """Part positions (K, 3) [m] into groups that each fit a ball of radius `limit`, halving the longest side."""
+    """Split positions (K, 3) [m] into groups of indices that each fit a ball of radius `limit` [m], halving the longest
+    side of their bounding box."""
     groups, waiting = [], [np.arange(len(points))] if len(points) else []
     while waiting:
         group = waiting.pop()
@@ -44,33 +45,34 @@ def group_positions(points: Floats, limit: float) -> list[Integers]:
 
 
 def enclosing_balls(points: Floats, groups: list[Integers]) -> BoundingBalls:
-    """Balls about the middle of each group's bounds, from which beams start."""
+    """Bounding balls of groups of positions (K, 3) [m], each about the middle of its group's bounding box."""
     middle = np.array([(points[g].min(axis=0) + points[g].max(axis=0)) / 2.0 for g in groups]).reshape(-1, 3)
     radius = [np.linalg.norm(points[g] - m, axis=-1).max() for g, m in zip(groups, middle, strict=True)]
     return BoundingBalls(middle, np.array(radius, dtype=np.float64))
 
 
 class Beams(NamedTuple):
-    """N beams, each behind a sequence of d walls from device to far end."""
+    """N beams mirrored in d walls each: from inside a beam a device may see the far end over these walls."""
 
     ball: Integers
-    """(N,) number of the far end's ball."""
+    """(N,) number of the far end's bounding ball."""
     walls: Integers
-    """(N, d), the newest first."""
+    """(N, d) walls in the order from device to far end: the newest first."""
     image: Floats
-    """(N, 3) [m] of the ball's centre in all the walls."""
+    """(N, 3) [m] mirror image of the ball's centre in all d walls."""
     normal: Floats
-    """(N, P, 3) of half-spaces: inside are points with `normal . x >= offset`."""
+    """(N, P, 3) inward unit normals of P half-spaces: inside the beam are points with `normal . x >= offset`."""
     offset: Floats
-    """(N, P) [m]."""
+    """(N, P) [m] offsets of the half-spaces."""
 
     def only(self, keep: Booleans | Integers | slice) -> "Beams":
-        """The beams of the rows chosen."""
+        """Select beams by row."""
         return Beams(self.ball[keep], self.walls[keep], self.image[keep], self.normal[keep], self.offset[keep])
 
 
 class FoundSequences(NamedTuple):
-    """Sequences (N, d) from device to far end that may exist for some device and far end of their balls (N,)."""
+    """Wall sequences (N, d) that beam tracing leaves possible, with the numbers (N,) of the device's and the far end's
+    bounding ball."""
 
     device: Integers
     far: Integers
@@ -80,12 +82,13 @@ class FoundSequences(NamedTuple):
 def search_beams(
     clusters: WallClusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
 ) -> Iterator[FoundSequences]:
-    """Search by beams for sequences of 1 to `depth` walls, in blocks.
+    """Yield, in blocks, the wall sequences of 1 to `depth` bounces that beam tracing leaves possible between devices
+    and far ends.
 
     Parameters
     ----------
     device, far
-        Balls of either end; `pairs` (A, 2) says which device ball goes with which far ball.
+        Bounding balls of either end; `pairs` (A, 2) says which device ball goes with which far ball.
     barred
         (W,) walls that may not come last.
     """
@@ -106,7 +109,7 @@ def search_beams(
 def _followed(
     clusters: WallClusters, beams: Beams, device: BoundingBalls, far: BoundingBalls, pairs: Integers, more: int
 ) -> Iterator[FoundSequences]:
-    """The sequences of these beams, and of up to `more` walls put in front."""
+    """Yield the wall sequences of these beams, and of beams mirrored in up to `more` further walls."""
     yield _reaching(beams, device, pairs)
     if more == 0:
         return
@@ -120,7 +123,7 @@ def _followed(
 
 
 def _blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of beams' rows that each make `width` numbers, 256 at the least."""
+    """Slices of `count` rows of `width` numbers each that keep a temporary array within `_BLOCK`, 256 rows or more."""
     step = max(256, _BLOCK // width)
     return (slice(i, i + step) for i in range(0, count, step))
 
@@ -128,7 +131,8 @@ def _blocks(count: int, width: int) -> Iterator[slice]:
 def _facing(
     rectangles: Rectangles, beams: Beams, row: Integers, wall: Integers, radius: Floats
 ) -> tuple[Integers, Integers]:
-    """Those pairs whose new wall has part of the last wall on the side of the image: the ray comes from there."""
+    """Keep the pairs (beam, next wall) with part of the beam's last wall on that side of the next wall's plane where
+    the mirror image is: the ray comes from there."""
     last = beams.walls[row, 0]
     keep = wall != last
     row, wall, last = row[keep], wall[keep], last[keep]
@@ -144,7 +148,7 @@ def _facing(
 
 
 def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Floats) -> Beams:
-    """Reflect beams on a wall each (N,), and narrow them to its rectangle.
+    """Mirror beams in a wall each (N,), and narrow them to that wall's bounding rectangle.
 
     A ball that reaches through the plane has beams on both sides.
     """
@@ -198,7 +202,7 @@ def _half_spaces(
 
 
 def _reaching(beams: Beams, device: BoundingBalls, pairs: Integers) -> FoundSequences:
-    """The beams that a device ball of their far ball reaches into."""
+    """Wall sequences of the beams into which a device's bounding ball reaches, of those paired with the far end's."""
     order = np.argsort(pairs[:, 1], kind="stable")
     first = np.searchsorted(pairs[order, 1], beams.ball)
     last = np.searchsorted(pairs[order, 1], beams.ball, side="right")

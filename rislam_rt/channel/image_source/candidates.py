@@ -1,4 +1,4 @@
-"""Candidate pairs of a cycle and a wall sequence that are worth an exact look: all, or what mirrored beams leave."""
+"""Candidates for specular legs, as pairs of cycle and wall sequence: all sequences, or what beam tracing leaves."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -18,19 +18,20 @@ from rislam_rt.channel.image_source.facets import WallFacets
 from rislam_rt.channel.image_source.sequences import wall_sequences
 
 FEW = 2000
-"""Up to so many wall sequences all are tried, which is the proof that beams lose none; beyond, beams are faster."""
+"""Number of wall sequences up to which `auto` tries all of them; beyond it beam tracing is faster."""
 
 NEAR = 0.03
-"""Positions within this share of the room's diagonal share their beams."""
+"""Radius within which positions share their beams, as a share of the room's diagonal."""
 
 _ROWS = 200_000
 """Candidates in a block."""
 
 SEARCHES = ("auto", "exhaustive", "beams")
+"""Values of `ImageSourceChannel.search`."""
 
 
 class SequenceSearch(NamedTuple):
-    """How sequences are looked for, and in which walls."""
+    """Search for the wall sequences of legs: exhaustive or by beam tracing, and in which walls."""
 
     facets: WallFacets
     clusters: WallClusters
@@ -40,12 +41,12 @@ class SequenceSearch(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What candidates are searched, for people."""
+        """Name of the search for wall sequences, as `Paths.source` states it."""
         return "all wall sequences" if self.exhaustive else "mirrored beams"
 
 
 def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
-    """The search for candidate wall sequences, chosen by the number that W walls make, unless told."""
+    """Set up the search for wall sequences: exhaustive or by beam tracing, `auto` choosing by their number."""
     count = sum(len(facets) * max(len(facets) - 1, 0) ** (bounces - 1) for bounces in range(1, depth + 1))
     diagonal = np.linalg.norm(facets.box[1].max(axis=0) - facets.box[0].min(axis=0)) if len(facets) else 0.0
     exhaustive = how == "exhaustive" or (how == "auto" and count <= FEW)
@@ -55,14 +56,15 @@ def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
 def candidate_rows(
     search: SequenceSearch, device: Floats, far: Floats, depth: int, host: int
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Candidates: cycles (N,) and wall sequences (N, d) from device to far end, in blocks of one d each.
+    """Yield candidates for specular legs, cycles (N,) and wall sequences (N, d) from device to far end, in blocks of
+    one d each.
 
     Parameters
     ----------
     device, far
         (K, 3), and (K, 3) or (1, 3) [m].
     host
-        A wall that may not come last, nor what lies on it; -1 for none.
+        Wall behind a panel: neither it nor a wall that lies on it may come last; -1 for none.
     """
     if search.exhaustive:
         for sequences in wall_sequences(search.facets, device, far, depth, host):
@@ -81,7 +83,7 @@ def candidate_rows(
 
 
 def _rows(found: FoundSequences, groups: list[Integers]) -> Iterator[tuple[Integers, Integers]]:
-    """Candidates of every cycle of each device ball, in blocks."""
+    """Yield candidates in blocks: each wall sequence found, with every cycle of its device's bounding ball."""
     if len(found.device) == 0:
         return
     sizes = np.array([len(group) for group in groups])

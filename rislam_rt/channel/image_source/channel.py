@@ -1,4 +1,4 @@
-"""The image-source channel behind the `Channel` protocol."""
+"""Channel by the image-source method: exact specular paths of a room of planar walls, as a `Channel`."""
 
 from dataclasses import dataclass, field
 
@@ -18,7 +18,8 @@ from rislam_rt.ris import rephase
 
 @dataclass(frozen=True, eq=False)
 class ImageSourceChannel:
-    """All paths of a room of planar facets, exact: wall sequences, images, facets, occlusion.
+    """Channel of a room of planar walls by the image-source method: all paths up to `depth` bounces, with exact
+    visibility tests in float64.
 
     `search` says how sequences are found: `exhaustive` tries all that the walls' sides allow, `beams` those that
     mirrored beams leave possible, which loses none; `auto` takes the first where sequences are few. `Paths.source`
@@ -41,7 +42,7 @@ class ImageSourceChannel:
     walls: Walls = field(init=False)
     facets: WallFacets = field(init=False)
     coatings: Coatings = field(init=False)
-    looked: SequenceSearch = field(init=False)
+    sequence_search: SequenceSearch = field(init=False)
 
     def __post_init__(self) -> None:
         expect("scene", self.scene, Scene)
@@ -54,10 +55,10 @@ class ImageSourceChannel:
         object.__setattr__(self, "walls", build_walls(self.scene))
         object.__setattr__(self, "facets", build_facets(self.walls))
         object.__setattr__(self, "coatings", build_coatings(self.walls.material, self.radio.carrier))
-        object.__setattr__(self, "looked", build_search(self.facets, self.depth, self.search))
+        object.__setattr__(self, "sequence_search", build_search(self.facets, self.depth, self.search))
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle by image sources, with the panel at level 0."""
+        """Paths of every cycle of a trajectory by the image-source method, with the panel's code at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
         ends = self.antennas or self.radio.antennas
@@ -69,7 +70,7 @@ class ImageSourceChannel:
                 ("rx", (ends.of_rx, ends.of_landmark)),
             )
         }
-        direct = find_legs(self.looked, self.coatings, tx, rx, self.depth, terminals=at["direct"])
+        direct = find_legs(self.sequence_search, self.coatings, tx, rx, self.depth, terminals=at["direct"])
         landmarks = range(len(self.scene.landmarks))
         return compose_paths(
             self.scene,
@@ -79,22 +80,22 @@ class ImageSourceChannel:
             direct,
             [self._landmark_legs(tx, number, at["tx"]) for number in landmarks],
             [self._landmark_legs(rx, number, at["rx"]) for number in landmarks],
-            f"image source, {self.looked.words}",
+            f"image source, {self.sequence_search.words}",
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same image-source paths under another code."""
+        """The same paths with their gains under another panel code, without a new search."""
         return rephase(paths, code)
 
     def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
-        """Legs from device positions (K, 3) to a landmark; those to a panel arrive at its front."""
+        """Specular legs from device positions (K, 3) [m] to one landmark; those to a panel arrive at its front."""
         panel = self.scene.panel_number(number)
         point = self.scene.landmark_positions[number : number + 1]
         if panel < 0:
             return find_legs(
-                self.looked, self.coatings, device, point, self.depth, landmark=number, terminals=terminals
+                self.sequence_search, self.coatings, device, point, self.depth, landmark=number, terminals=terminals
             )
         front, host = self.scene.panels[panel].spec.normal, self.walls.hosts[panel]
         return find_legs(
-            self.looked, self.coatings, device, point, self.depth, host=host, front=front, terminals=terminals
+            self.sequence_search, self.coatings, device, point, self.depth, host=host, front=front, terminals=terminals
         )

@@ -1,4 +1,4 @@
-"""Walls in clusters, so that most of a large room is ruled out at one glance."""
+"""Clusters of walls with bounding boxes, so that beams are tested against few boxes before the walls in them."""
 
 from typing import NamedTuple
 
@@ -10,22 +10,23 @@ from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
 
 CLUSTER = 48
-"""Walls in a cluster, at most: about as many as a test of all of them costs no more than the glance that spares it."""
+"""Largest number of walls in a cluster: testing that many costs about as much as the test of the box that spares it."""
 
 
 class WallClusters(NamedTuple):
-    """Rectangles and the boxes of C clusters of them."""
+    """Bounding rectangles of all walls, and C clusters of walls with their bounding boxes."""
 
     rectangles: Rectangles
     members: list[Integers]
     """(C,) walls of each cluster."""
     center: Floats
-    """(C, 3) [m]."""
+    """(C, 3) [m] centres of the clusters' bounding boxes."""
     half: Floats
-    """(C, 3) [m]."""
+    """(C, 3) [m] half the sizes of those boxes."""
 
     def reached(self, normal: Floats, offset: Floats) -> tuple[Integers, Integers]:
-        """Pairs (beam, wall) where a wall has part in all half-spaces (N, P, 3), (N, P) of a beam."""
+        """Pairs (beam, wall), as two index arrays, where a wall's bounding rectangle reaches into each half-space
+        (N, P, 3), (N, P) of a beam."""
         beams, planes = offset.shape
         if beams == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -48,7 +49,7 @@ class WallClusters(NamedTuple):
 
 
 def build_clusters(facets: WallFacets) -> WallClusters:
-    """Rectangles of all walls, parted into clusters by halving along the longer side of what they fill."""
+    """Split walls into clusters of at most `CLUSTER` by halving along the longest extent of their centres."""
     rectangles = facets.rectangles
     members: list[Integers] = []
     waiting = [np.arange(len(facets))] if len(facets) else []

@@ -1,4 +1,4 @@
-"""Facets of walls for the image method: which part of a plane is solid, who stands on which side, who hides whom."""
+"""Facets of walls for the image-source method: where a wall's plane is solid, on which side points lie, occlusion."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
 
 _SIMPLE = 4
-"""Walls of up to so many triangles are looked at all together, the others one by one."""
+"""Largest number of triangles of walls that are tested all together; walls of more are tested one by one."""
 
 _BLOCK = 2_000_000
 """Numbers in the largest temporary array."""
@@ -26,20 +26,20 @@ FRONT, BACK = 1, 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WallFacets:
-    """W walls, their T triangles sorted by wall."""
+    """Geometry of W walls for reflection and occlusion tests, their T triangles sorted by wall."""
 
     normal: Floats
-    """(W, 3)."""
+    """(W, 3) unit normals."""
     offset: Floats
-    """(W,) [m]."""
+    """(W,) [m]: `normal . x = offset`."""
     first: Integers
     """(W + 1,) triangles of wall w are first[w] : first[w + 1]."""
     corners: Floats
-    """(T, 3, 3) [m]."""
+    """(T, 3, 3) [m] corners of the triangles."""
     edge_normal: Floats
     """(T, 3, 3) in-plane unit normals of the edges, pointing inside."""
     edge_offset: Floats
-    """(T, 3) [m]."""
+    """(T, 3) [m] offsets of the edges: `edge_normal . x >= edge_offset` inside."""
     box: Floats
     """(2, W, 3) [m] lowest and highest corner of each wall."""
     extent: Floats
@@ -47,17 +47,17 @@ class WallFacets:
     rectangles: Rectangles
     """Bounding rectangles in the walls' planes."""
     plane: Integers
-    """(W,) of `Walls.plane`."""
+    """(W,) the wall whose plane each shares (`Walls.plane`)."""
     over: tuple[Integers, ...]
-    """(W,) of `Walls.over`."""
+    """(W,) for each wall those that lie on it (`Walls.over`)."""
     occluders: Occluders
-    """What hides but is no wall."""
+    """Meshes that hide paths and reflect nothing."""
 
     def __len__(self) -> int:
         return len(self.offset)
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distances (N, W) [m] of points (N, 3) from every wall's plane, for tests against facets."""
+        """Signed distances (N, W) [m] of points (N, 3) from every wall's plane."""
         return points @ self.normal.T - self.offset
 
     def contains(self, points: Floats, wall: Integers) -> Booleans:
@@ -77,7 +77,8 @@ class WallFacets:
         return inside
 
     def _on_few(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3) lie on walls (N,) of few triangles: each triangle in turn."""
+        """Whether points (N, 3), each in the plane of its wall (N,) of at most `_SIMPLE` triangles, lie on one of
+        these."""
         inside = np.zeros(len(points), dtype=np.bool_)
         for number in range(_SIMPLE):
             rows = np.flatnonzero(~inside & (self.first[wall] + number < self.first[wall + 1]))
@@ -87,7 +88,8 @@ class WallFacets:
         return inside
 
     def reflects(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3) of the plane of a wall (N,) lie on that wall and on none that lies on it."""
+        """Whether points (N, 3), each in the plane of its wall (N,), lie on that wall and on none that covers it: where
+        it reflects."""
         own = self.contains(points, wall)
         for lower in np.unique(wall[own]) if any(map(len, self.over)) else []:
             for upper in self.over[lower]:
@@ -96,11 +98,11 @@ class WallFacets:
         return own
 
     def _planes(self, wall: Integers) -> Integers:
-        """Facets' planes (N,) of walls (N,), -1 for -1."""
+        """Numbers (N,) of the walls whose planes walls (N,) share, -1 for no wall."""
         return np.where(wall >= 0, self.plane[wall], -1) if len(self) else wall
 
     def _on_wall(self, points: Floats, wall: int) -> Booleans:
-        """Whether points (N, 3) of the plane of one wall lie on its facets."""
+        """Whether points (N, 3) in the plane of one wall lie on one of its triangles."""
         span = slice(self.first[wall], self.first[wall + 1])
         normals, offsets = self.edge_normal[span].reshape(-1, 3), self.edge_offset[span].reshape(-1)
         inside = np.zeros(len(points), dtype=np.bool_)
@@ -110,13 +112,14 @@ class WallFacets:
         return inside
 
     def possible_blockers(self, points: Floats) -> Integers:
-        """Walls whose plane has wall corners or some of the points (N, 3) on both sides; no other can hide anything."""
+        """Numbers of the walls that can occlude a leg between points (N, 3): wall corners or points lie on both sides
+        of their plane."""
         distance = self.distance(points)
         low, high = np.minimum(self.extent[0], distance.min(axis=0)), np.maximum(self.extent[1], distance.max(axis=0))
         return np.flatnonzero((low < -SURFACE_TOLERANCE) & (high > SURFACE_TOLERANCE))
 
     def hidden_by(self, start: Floats, end: Floats, walls: Integers, spared: Integers) -> Integers:
-        """One of `walls` that stands between the ends (N, 3) of each segment: (N,), -1 where none does.
+        """Number (N,) of one of `walls` that occludes each segment from `start` to `end` (N, 3), -1 where none does.
 
         A wall whose plane passes within `SURFACE_TOLERANCE` of an end is not in the way (ends are bounce points,
         devices and landmarks), nor is a segment's `spared` wall (N,) or what lies on it.
@@ -148,7 +151,7 @@ class WallFacets:
         return bits
 
     def point_sides(self, points: Floats) -> Integers:
-        """Facets' side bits (W,): on which sides of each wall any of the points (N, 3) lies."""
+        """Side bits (W,): on which sides of each wall's plane any of the points (N, 3) lies."""
         distance = self.distance(points)
         front, back = distance.max(axis=0) > SEAM, distance.min(axis=0) < -SEAM
         bits: Integers = FRONT * front + BACK * back
@@ -156,7 +159,7 @@ class WallFacets:
 
 
 def build_facets(walls: Walls) -> WallFacets:
-    """Facets of the walls: triangles sorted by wall."""
+    """Prepare walls for reflection and occlusion tests: triangles sorted by wall, their edges, bounds, rectangles."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order]
     first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
@@ -185,6 +188,6 @@ def build_facets(walls: Walls) -> WallFacets:
 
 
 def row_blocks(count: int, width: int) -> list[slice]:
-    """Slices of `count` rows of `width` numbers for tests against facets, each of about `_BLOCK` numbers."""
+    """Slices of `count` rows of `width` numbers each, so that the rows of a slice hold about `_BLOCK` numbers."""
     step = max(1, _BLOCK // max(width, 1))
     return [slice(i, min(i + step, count)) for i in range(0, count, step)]

@@ -15,7 +15,9 @@ VACUUM_PERMITTIVITY = 8.8541878128e-12
 
 
 def relative_permittivity(name: str, carrier: float) -> complex:
-    """Complex relative permittivity `a f^b - j c f^d / (omega eps0)`, f in GHz, of a material at the carrier [Hz].
+    """Complex relative permittivity of an ITU-R P.2040 material at the carrier [Hz].
+
+    `a f^b - j c f^d / (omega eps0)`, f in GHz.
 
     Raises
     ------
@@ -28,7 +30,8 @@ def relative_permittivity(name: str, carrier: float) -> complex:
 
 
 def slab_permittivity(material: Material, carrier: float) -> complex:
-    """Complex relative permittivity of a slab, ITU's or one's own, at the carrier [Hz]; 1 for a constant R.
+    """Complex relative permittivity of a wall's material at the carrier [Hz], by ITU-R P.2040 or as given; 1 for a
+    constant R.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def polarisation_basis(direction: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coatings:
-    """What W walls do to a ray at one carrier."""
+    """Reflection properties of W walls at one carrier: constant coefficients, or slabs for the Fresnel equations."""
 
     carrier: float
     """[Hz]."""
@@ -89,9 +92,9 @@ class Coatings:
     specular: Floats
     """(W,) share of the reflected field that is not scattered."""
     te: Floats
-    """(W,) constant coefficient across the plane of incidence, NaN where it follows from the angle,"""
+    """(W,) constant TE coefficient (across the plane of incidence), NaN where it follows from the angle."""
     tm: Floats
-    """(W,) ...and in it."""
+    """(W,) constant TM coefficient (in the plane of incidence), NaN where it follows from the angle."""
 
     def coefficient(self, walls: Integers, normals: Floats, direction: Floats) -> Complexes:
         """Reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
@@ -108,7 +111,8 @@ class Coatings:
         return np.asarray(constant * np.prod(self.specular[walls], axis=1))
 
     def carried(self, field: Complexes, walls: Integers, normals: Floats, incident: Floats) -> tuple[Complexes, Floats]:
-        """Field vectors (N, 3) after the bounces on `walls` (N, d), nothing scattered, and where the rays go then."""
+        """Field vectors (N, 3) after specular reflection on `walls` (N, d), scattering loss left out, and the last
+        rays' directions (N, 3)."""
         for wall, normal in zip(walls.T, normals.swapaxes(0, 1), strict=True):
             reflected = mirror_direction(incident, normal)
             field = self._reflect(field, incident, reflected, normal, wall)
@@ -137,7 +141,7 @@ class Coatings:
 
 
 def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
-    """Coatings for Fresnel reflection: the walls' materials looked up at the carrier [Hz].
+    """Look up the reflection properties of the walls' materials at the carrier [Hz].
 
     Raises
     ------
@@ -167,6 +171,7 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
-    """Fresnel-reflected field part `coefficient (onto . field) out`."""
+    """Reflected part `coefficient (onto . field) out` of a field (N, 3): its component along `onto`, turned to
+    `out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

@@ -1,4 +1,4 @@
-"""Legs from wall sequences by images: mirror the far end, walk back from the device, test facets and occlusion."""
+"""Specular legs by mirror images: mirror the far end in the walls, find the bounce points, test walls and occlusion."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,8 @@ from rislam_rt.geometry.planes import mirror, mirror_direction
 
 
 class ImageRays(NamedTuple):
-    """N legs found, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and the far end's image (N, 3)."""
+    """N specular legs, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and far end's image (N, 3)
+    [m]."""
 
     cycle: Integers
     walls: Integers
@@ -24,7 +25,7 @@ class ImageRays(NamedTuple):
     image: Floats
 
     def only(self, keep: Booleans) -> "ImageRays":
-        """Image-source rays of the rows where `keep` (N,) holds."""
+        """Select the legs where `keep` (N,) holds."""
         return ImageRays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
 
 
@@ -49,7 +50,7 @@ def find_legs(
     front
         (3,) normal of the panel at the far end, which only sees what lies before it.
     landmark
-        Number of the landmark at the far end, which its own shade does not hide; -1 for none.
+        Number of the landmark at the far end, which its own occluding mesh does not hide; -1 for none.
     terminals
         Antennas at both ends; None for isotropic and vertical ones.
     """
@@ -64,19 +65,19 @@ def find_legs(
 
 
 def _joined(parts: list[ImageRays]) -> ImageRays:
-    """All rays of image sources of one number of bounces."""
+    """Concatenate blocks of legs that have the same number of bounces."""
     return ImageRays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def _direct_rays(device: Floats, far: Floats) -> ImageRays:
-    """Rays of image sources without a bounce."""
+    """Straight legs without a bounce, one a cycle, before any visibility test."""
     cycles = len(device)
     nothing = np.zeros((cycles, 0), dtype=np.int64)
     return ImageRays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
 def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> ImageRays:
-    """Image-source rays of cycles (N,) over walls (N, d) whose every bounce lies on its wall; nothing hides yet."""
+    """Legs of cycles (N,) over walls (N, d) whose bounce points all lie on their walls; occlusion is not tested."""
     images = [far[cycle if len(far) > 1 else np.zeros_like(cycle)]]
     for wall in walls.T[::-1]:
         images.insert(0, mirror(images[0], facets.normal[wall], facets.offset[wall]))
@@ -96,8 +97,8 @@ def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device
 def _plane_crossing(
     start: Floats, end: Floats, normal: Floats, offset: Floats, tolerance: tuple[float, float]
 ) -> tuple[Booleans, Floats]:
-    """Which segments (N, 3) from an image cross their wall's plane, both ends farther off than the tolerance [m],
-    where."""
+    """Which segments (N, 3) cross their wall's plane, both ends farther off it than the tolerances [m], and the points
+    (n, 3) where they do."""
     a = np.einsum("ni,ni->n", start, normal) - offset
     b = np.einsum("ni,ni->n", end, normal) - offset
     crosses = (a * b < 0.0) & (np.abs(a) > tolerance[0]) & (np.abs(b) > tolerance[1])
@@ -115,7 +116,7 @@ def _visible(
     front: Floats | None,
     landmark: int,
 ) -> ImageRays:
-    """Image-source rays that nothing hides and that reach a panel at the far end from its front."""
+    """Legs that no wall or occluder hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
     points = np.concatenate([device[rays.cycle][:, None], rays.bounces, target[:, None]], axis=1)
@@ -141,7 +142,7 @@ def _legs(
     depth: int,
     terminals: LegEnds | None,
 ) -> SpecularLegs:
-    """Image-source rays as dense legs, one column a sequence that some cycle has."""
+    """Arrange legs by cycle and wall sequence (K, S), one column for each sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []
     parts: list[tuple[Integers, Integers, ImageRays]] = []
@@ -173,7 +174,7 @@ def _legs(
 
 
 def _followed(direction: Floats, normals: Floats) -> Floats:
-    """Directions (N, 3) of image-source rays after the bounces on walls with normals (N, d, 3)."""
+    """Directions (N, 3) of rays after specular reflection on walls with normals (N, d, 3) in turn."""
     for normal in normals.swapaxes(0, 1):
         direction = mirror_direction(direction, normal)
     return direction

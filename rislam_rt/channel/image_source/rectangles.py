@@ -8,18 +8,18 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SURFACE_TOLERANCE
 
 SAME = 1e-9
-"""Areas that agree to this share, and distances that do to this many metres, are the same (float64 rounding)."""
+"""Relative difference of areas, and difference of distances [m], below which they are equal (float64 rounding)."""
 
 
 class Rectangles(NamedTuple):
-    """A bounding rectangle of each of W walls, in its plane."""
+    """Bounding rectangles of W walls, each in its wall's plane."""
 
     normal: Floats
-    """(W, 3)."""
+    """(W, 3) unit normals of the walls."""
     offset: Floats
-    """(W,) [m]."""
+    """(W,) [m] of the walls: `normal . x = offset`."""
     center: Floats
-    """(W, 3) [m]."""
+    """(W, 3) [m] centres."""
     directions: tuple[Floats, Floats]
     """(W, 3) unit vectors along its sides."""
     sizes: tuple[Floats, Floats]
@@ -39,7 +39,7 @@ class Rectangles(NamedTuple):
 
 
 def bounding_rectangles(corners: Floats, first: Integers, normal: Floats, offset: Floats) -> Rectangles:
-    """The smallest rectangles along an edge of each wall's first triangle.
+    """Smallest bounding rectangle of each wall, of the three along the edges of the wall's first triangle.
 
     Triangles (T, 3, 3) are sorted by wall, those of wall w being first[w] : first[w + 1].
     """
@@ -78,7 +78,7 @@ def _span(points: Floats, owner: Integers, starts: Integers, direction: Floats) 
 
 
 def _filled(rectangles: Rectangles, corners: Floats, wall: Integers) -> Booleans:
-    """(W,) whether triangles (T, 3, 3) of walls (T,) cover the rectangles.
+    """Whether (W,) the triangles (T, 3, 3) of walls (T,) fill their wall's bounding rectangle.
 
     They do where their areas add up to the rectangle's, and every edge that one triangle has alone lies on its border.
     """

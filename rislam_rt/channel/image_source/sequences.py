@@ -1,4 +1,4 @@
-"""Which walls a ray can meet one after the other: sequences by recursion from the far end, pruned by sides."""
+"""Wall sequences that a specular leg can have, all of them: built from the far end and pruned by sides of planes."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from rislam_rt.channel.image_source.facets import WallFacets, row_blocks
 
 
 def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, host: int = -1) -> Iterator[Integers]:
-    """Candidate sequences in blocks (S, d), in the order from device to far end, for d = 1 .. depth.
+    """Yield candidate wall sequences in blocks (S, d), in the order from device to far end, for d = 1 .. depth.
 
     No wall comes twice in a row. At every bounce what comes before and what comes after (a wall, or the ends) must
     have a part on the same side of the wall in between; no possible path is lost by this.
@@ -36,7 +36,8 @@ def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, 
 
 
 def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integers, Integers]:
-    """Put every possible wall in front of sequences (S, d); `before` (S,) is where the ray goes on their first wall.
+    """Put every possible wall in front of wall sequences (S, d); `before` (S,) are the side bits of their first wall on
+    which the ray goes on.
 
     `sides[i, j]` tells on which sides of wall i wall j has a part.
     """
@@ -54,6 +55,6 @@ def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integ
 
 
 def _in_blocks(sequences: Integers, cycles: int) -> Iterator[Integers]:
-    """Sequences in blocks that bound the memory of what is computed for every cycle."""
+    """Yield wall sequences in blocks, small enough for arrays over all cycles."""
     for rows in row_blocks(len(sequences), 16 * cycles):
         yield sequences[rows]

@@ -1,4 +1,4 @@
-"""Ray-traced paths: Sionna RT and Mitsuba on the room's meshes. The only folder that imports them, and late.
+"""Ray-traced channel: Sionna RT and Mitsuba on the room's meshes. The only folder that imports them, and late.
 
 How a trajectory of K cycles becomes few solves:
 
@@ -14,18 +14,9 @@ How a trajectory of K cycles becomes few solves:
 """
 
 from rislam_rt.channel.traced.channel import TracedChannel
-from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffuseKind, DiffusePaths
+from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, DiffuseKind
 from rislam_rt.channel.traced.float32_limits import shortest_segment
-from rislam_rt.channel.traced.self_test import SelfTest, trace_small_box
+from rislam_rt.channel.traced.self_test import trace_small_box
 from rislam_rt.model import Antennas
 
-__all__ = [
-    "Antennas",
-    "DiffuseConfig",
-    "DiffuseKind",
-    "DiffusePaths",
-    "SelfTest",
-    "TracedChannel",
-    "shortest_segment",
-    "trace_small_box",
-]
+__all__ = ["Antennas", "DiffuseConfig", "DiffuseKind", "TracedChannel", "shortest_segment", "trace_small_box"]

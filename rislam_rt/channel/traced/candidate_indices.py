@@ -1,4 +1,4 @@
-"""Candidates as rows of a table: which far end, which device, which wall sequence."""
+"""Candidates for legs as indices: which far end, which device, which wall sequence."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -16,12 +16,12 @@ class CandidateIndices(NamedTuple):
     sequence: Integers
 
     def only(self, keep: Integers | slice) -> "CandidateIndices":
-        """Candidate indices of the rows chosen."""
+        """Select candidates by row."""
         return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
 
 
 def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
-    """Candidate indices in blocks of `size`, the last one shorter."""
+    """Yield candidates regrouped into blocks of `size` rows, the last one shorter."""
     waiting: list[CandidateIndices] = []
     for part in parts:
         waiting.append(part)
@@ -34,5 +34,5 @@ def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[Candidat
 
 
 def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
-    """Candidate indices of several parts, one after the other."""
+    """Concatenate candidates of several parts."""
     return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -67,43 +67,46 @@ class TracedChannel:
         self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), occluders)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Every path of every cycle, traced, with the panel at level 0."""
+        """Ray-traced paths of every cycle of a trajectory, with the panel's code at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
-        problems = [LegQuery(tx, rx, heading, to_rx=True)]
+        queries = [LegQuery(tx, rx, heading, to_rx=True)]
         for number, point in enumerate(self.scene.landmark_positions):
             panel, behind, front = self.scene.panel_number(number), -1, None
             if panel >= 0:
                 behind, front = self.walls.hosts[panel], self.scene.panels[panel].spec.normal
             spared = number if number in self.tracer_scene.occluders else -1
             for from_rx, device in ((False, tx), (True, rx)):
-                problems.append(LegQuery(device, point[None], heading, from_rx, False, behind, front, spared))
-        (direct, *legs), complete = self._trace(problems)
+                queries.append(LegQuery(device, point[None], heading, from_rx, False, behind, front, spared))
+        (direct, *legs), complete = self._trace(queries)
         tx_legs, rx_legs = legs[0::2], legs[1::2]
         searched = "all wall sequences" if complete else "wall sequences in cones"
         source = f"traced, refined, {searched}" if self.refine else f"traced, {searched}"
         return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths under another code, without tracing again."""
+        """The same paths with their gains under another panel code, without tracing again."""
         return rephase(paths, code)
 
-    def _trace(self, problems: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
-        """Solve problems of one view of the room together, block by block; also whether all sequences were asked."""
+    def _trace(self, queries: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
+        """Trace the specular legs of several queries; also whether all possible wall sequences were tried.
+
+        Queries that leave the same occluder out are solved together, block by block.
+        """
         legs: dict[int, SpecularLegs] = {}
         complete = True
-        for spared in dict.fromkeys(problem.spared for problem in problems):
-            chosen = [number for number, problem in enumerate(problems) if problem.spared == spared]
+        for spared in dict.fromkeys(query.spared for query in queries):
+            chosen = [number for number, query in enumerate(queries) if query.spared == spared]
             depth = self.depth if len(self.walls) else 0
-            batch = build_batch([problems[number] for number in chosen], self.tracer_scene, self._sides, depth)
+            batch = build_batch([queries[number] for number in chosen], self.tracer_scene, self._sides, depth)
             complete &= batch.complete
             blocks = in_blocks(batch.candidates(self.tracer_scene), BLOCK_ROWS)
             found = join_found([self._solve(batch, rows, spared) for rows in blocks])
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
-        return [legs[number] for number in range(len(problems))], complete
+        return [legs[number] for number in range(len(queries))], complete
 
     def _solve(self, batch: QueryBatch, candidates: CandidateIndices, spared: int) -> FoundLegs:
-        """Ask the tracer which candidates exist, and what their walls do to the signal."""
+        """Legs that the tracer confirms among candidates, with their geometry and field coefficients."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 

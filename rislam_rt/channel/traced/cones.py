@@ -1,7 +1,7 @@
-"""Cones that rule out wall sequences by where both ends are: for rooms with too many walls to ask about all.
+"""Cones that rule out wall sequences by where a leg's ends are, for rooms with too many sequences to trace them all.
 
 Seen from the far end's image, whatever comes after a bounce lies in the cone over a ball about the wall. A next wall,
-or a device, outside all these cones is never met. Positions come in balls, so that one look serves all near each other;
+or a device, outside all these cones is never met. Positions come in balls, so that one test serves all near each other;
 walls are balls too. It errs towards keeping: nothing that exists is ruled out.
 """
 
@@ -12,24 +12,24 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.traced.buffer import as_indices
+from rislam_rt.channel.traced.path_buffer import as_indices
 
 if TYPE_CHECKING:
     from rislam_rt.channel.traced.tracer_scene import TracerScene
 
 NEAR = 0.02
-"""Side of the cells that positions are gathered in, as a share of the room's longest side."""
+"""Side of the cells by which positions are grouped into balls, as a share of the room's longest side."""
 
 
 class PositionBall(NamedTuple):
-    """A ball of positions in the tracer's frame."""
+    """Bounding ball of some positions, centre and radius [m] in the tracer's frame."""
 
     center: tuple[float, float, float]
     radius: float
 
 
 class Cones(NamedTuple):
-    """Where the ends of the sequences are, in the walls of a tracer scene."""
+    """Test of wall sequences by the cones from their far ends' balls over balls about the walls (a `Narrowing`)."""
 
     tracer_scene: "TracerScene"
     far: list[PositionBall]
@@ -37,7 +37,8 @@ class Cones(NamedTuple):
     """Each device ball with its far ball."""
 
     def lead_on(self, walls: Integers) -> Booleans:
-        """Whether for any far ball the first of walls (N, d) reaches into the cones over the others."""
+        """Which wall sequences (N, d) a far end leaves possible: their first wall reaches into the cones over the
+        others."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
         target, size = _wall_ball(self.tracer_scene, columns[0])
@@ -46,7 +47,8 @@ class Cones(NamedTuple):
         return keep
 
     def reach(self, walls: Integers) -> Booleans:
-        """Whether any device ball reaches into the cones of its far ball over walls (N, d)."""
+        """Which wall sequences (N, d) both ends leave possible: a device ball reaches into the cones of its far
+        ball."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
         for device, ball in self.device:
@@ -75,7 +77,8 @@ class Cones(NamedTuple):
 
 
 def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Cones:
-    """Cones of positions (N, 3) gathered in balls with their far ends (N, 3), or the single one (1, 3)."""
+    """Group devices (N, 3) [m] and their far ends (N, 3), or the single one (1, 3), into the balls that cones start
+    from."""
     device, far = device - tracer_scene.origin, far - tracer_scene.origin
     cell = (
         NEAR * 2.0 * (tracer_scene.wall_boxes.margin * 1e3 - 1.0)
@@ -92,27 +95,27 @@ def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Con
 
 
 def _ball(points: Floats) -> PositionBall:
-    """Ball about the middle of some points (N, 3), an end of a cone."""
+    """Bounding ball of some points (N, 3) [m] about the middle of their bounds."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     x, y, z = middle.tolist()
     return PositionBall((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
 
 
 def _columns(walls: Integers) -> list[Any]:
-    """Wall numbers for the tracer, column by column."""
+    """Convert wall sequences (N, d) to index arrays of the tracer's backend, one a column."""
     columns = [as_indices(wall) for wall in walls.T]
     dr.eval(columns)
     return columns
 
 
 def _wall_ball(tracer_scene: "TracerScene", wall: Any) -> tuple[Any, Any]:
-    """Centre and radius of a ball about walls (N,) that a cone may meet."""
+    """Centres and radii [m] of the bounding balls of walls (N,)."""
     half = dr.gather(mi.Vector3f, tracer_scene.wall_boxes.half, wall)
     return dr.gather(mi.Point3f, tracer_scene.wall_boxes.center, wall), dr.norm(half)
 
 
 def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
-    """Cones' balls mirrored in planes."""
+    """Mirror points in planes, on the tracer's backend."""
     return point - 2.0 * (dr.dot(normal, point) - offset) * normal
 
 

@@ -1,7 +1,7 @@
-"""Culling of candidates: worth a ray are those whose bounces on the unbounded planes come near their walls.
+"""Culling of candidates before they are traced: kept are those whose bounces on the walls' planes come near the walls.
 
-A lossless test in front of the tracer. In a furnished room one candidate in a hundred survives it, and asking the
-tracer costs twenty times as much as sifting.
+A lossless test in front of the tracer. In a furnished room one candidate in a hundred survives it, and tracing costs
+twenty times as much as culling.
 """
 
 from collections.abc import Iterator
@@ -12,20 +12,21 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.buffer import as_indices
+from rislam_rt.channel.traced.path_buffer import as_indices
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 _NO_WALL = NO_WALL % 2**32
 
 BLOCK = 4_000_000
-"""Candidates sifted at once: bounds the memory."""
+"""Candidates tested at once: bounds the memory."""
 
 
 def cull_candidates(
     tracer_scene: TracerScene, sequences: Integers, device: Floats, far: Floats
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Candidate pairs (device, sequence) that survive culling, in blocks, of all devices (N, 3) and sequences (S, D).
+    """Yield, in blocks, the candidate pairs (device, wall sequence) that survive culling, of all devices (N, 3) [m] and
+    sequences (S, D).
 
     Far ends (N, 3) go with their devices, a single one (1, 3) with all.
     """
@@ -48,7 +49,7 @@ def cull_candidates(
 
 
 def _near_walls(tracer_scene: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
-    """Whether a pair survives culling: the mirror path over `walls` could bounce on every one of them.
+    """Whether each candidate survives culling: its mirror path over `walls` bounces on or near every one of them.
 
     The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a bounce
     are that near the plane the bounce may be anywhere along, and stays.

@@ -1,4 +1,4 @@
-"""Diffuse scattering and diffraction: Sionna's own paths beside the specular ones. They have no analytic twin.
+"""Diffuse paths: those that Sionna finds by scattering and diffraction, beside the specular ones of the channel.
 
 Such paths have no identity that lasts from cycle to cycle and no wall sequence of their own, so they do not enter
 `Paths`: one flat list over the cycles holds them. They are what Sionna's `PathSolver` finds, position by position.
@@ -20,7 +20,7 @@ from rislam_rt.model import RadioConfig, Scene, Trajectory
 
 
 class DiffuseKind(IntEnum):
-    """What a path without an analytic twin went through."""
+    """Whether a diffuse path was scattered by a rough wall or diffracted by an edge."""
 
     DIFFUSE = 0
     DIFFRACTED = 1
@@ -28,7 +28,7 @@ class DiffuseKind(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class DiffuseConfig:
-    """Switches of the tracer, all off at first."""
+    """Settings of diffuse scattering and diffraction in the tracer, all off by default."""
 
     scattering: float = 0.0
     """S in [0, 1]: share of the reflected field that walls scatter (Lambertian) whose material says nothing of it; 0 is
@@ -41,6 +41,7 @@ class DiffuseConfig:
     samples: int = 10_000
     """Rays shot from every Tx position; each may end in a scattered path."""
     seed: int = 1
+    """Seed of the rays' directions."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.scattering <= 1.0:
@@ -52,22 +53,22 @@ class DiffuseConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DiffusePaths:
-    """N paths of all cycles."""
+    """N scattered or diffracted paths of all cycles, in one flat list."""
 
     cycle: Integers
-    """(N,)."""
+    """(N,) number of the cycle."""
     kind: Integers
     """(N,) values of `DiffuseKind`; a path that was both scattered and diffracted counts as diffracted."""
     tau: Floats
-    """(N,) [s]."""
+    """(N,) [s] delay."""
     departure: Floats
     """(N, 3) unit vector away from the Tx."""
     arrival: Floats
     """(N, 3) unit vector from the Rx towards the arriving ray."""
     gain: Complexes
-    """(N,), carrier phase included; the phases of scattered paths are random by nature."""
+    """(N,) complex gain, carrier phase included; the phases of scattered paths are random by nature."""
     vertices: Floats
-    """(N, D, 3) [m], zero beyond the last."""
+    """(N, D, 3) [m] interaction points, zero beyond the last."""
     source: str = "traced, no analytic twin"
 
     def __post_init__(self) -> None:
@@ -88,7 +89,7 @@ class DiffusePaths:
 
 
 class SolvedPaths(NamedTuple):
-    """One position's paths, as `DiffusePaths` without the cycle."""
+    """Scattered and diffracted paths at one position of the agent: `DiffusePaths` without the cycle."""
 
     kind: Integers
     tau: Floats
@@ -124,7 +125,7 @@ def trace_diffuse_paths(
 
 
 def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
-    """The room with scattering walls; corners of one material are joined, so that their edges are known."""
+    """Sionna scene of the room with scattering walls; corners of one material are joined, so that edges diffract."""
     import sionna.rt as rt
 
     from rislam_rt.channel.traced.scattering_materials import rough_material
@@ -156,7 +157,8 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
 def _solve(
     tracer_scene: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
 ) -> SolvedPaths:
-    """Sionna's paths between positions about the origin, the purely specular ones left out."""
+    """Scattered and diffracted paths that Sionna finds between a Tx and an Rx position (3,) [m] relative to
+    `origin`."""
     import sionna.rt as rt
 
     tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
@@ -190,6 +192,6 @@ def _solve(
 
 
 def _nothing(depth: int) -> SolvedPaths:
-    """No paths."""
+    """An empty set of diffuse paths."""
     none, points = np.zeros(0), np.zeros((0, 3))
     return SolvedPaths(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))

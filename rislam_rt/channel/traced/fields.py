@@ -1,4 +1,4 @@
-"""What walls and antennas do to the signal along given geometries: Sionna's materials and patterns, fields in float64.
+"""Fields of traced legs: reflections and antenna patterns by Sionna's materials and patterns, carried in float64.
 
 Sionna carries a field in the (theta, phi) basis of the ray's direction, in float32. That basis turns over at the pole:
 within 1e-3 rad of the vertical Sionna takes another one, in which a bounce off floor or ceiling is a mirror image, and
@@ -25,8 +25,8 @@ from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 
 POLE = 1e-12
-"""Sine of the zenith angle below which a direction is vertical: rounding of float64 a thousand times over. Its azimuth
-is then 0, for all segments of a leg alike."""
+"""Sine of the zenith angle below which a direction counts as vertical (a thousand float64 roundings): its azimuth is
+then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
@@ -37,7 +37,8 @@ def leg_coefficients(
     geometry: PathGeometry,
     antennas: Antennas,
 ) -> Complexes:
-    """Field (N,) of legs over `sequences` (N, D), without spreading loss and carrier phase.
+    """Field coefficient (N,) of legs over wall sequences (N, D), from reflections and antenna patterns, without
+    spreading loss and carrier phase.
 
     Between isotropic antennas of one polarisation what is left is the reflection: exactly the
     product of R for walls of constant R, and the part of the Fresnel-reflected field in that polarisation for slabs.
@@ -60,8 +61,8 @@ def leg_coefficients(
 
 
 def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -> Complexes:
-    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of fields between the (theta, phi) bases of rays (N, 3) before
-    and after.
+    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of a reflection between the (theta, phi) bases of rays (N, 3)
+    before and after.
 
     A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
     """
@@ -78,7 +79,8 @@ def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -
 
 
 def incidence_jones(material: Any, cosine: Floats) -> Complexes:
-    """Jones matrices (N, 2, 2) of the field at a radio material, at cosines (N,) of incidence, across and in plane.
+    """Jones matrices (N, 2, 2) of reflection by a radio material at cosines (N,) of incidence, in the basis across and
+    in the plane of incidence.
 
     The first component of a field is along a unit vector s across the plane, the second along `k x s`, k being the
     ray's direction. Sionna's material is evaluated with the wall's normal along x and the rays level, where its own
@@ -100,7 +102,7 @@ def incidence_jones(material: Any, cosine: Floats) -> Complexes:
 
 
 def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
-    """Basis of fields theta_hat and phi_hat (N, 3) of directions (N, 3)."""
+    """Unit vectors theta_hat and phi_hat (N, 3) of directions (N, 3), of azimuth 0 along the vertical."""
     cosine, azimuth = direction[:, 2], _azimuth(direction)
     c, s = np.cos(azimuth), np.sin(azimuth)
     sine = np.hypot(direction[:, 0], direction[:, 1])
@@ -108,7 +110,7 @@ def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
 
 
 def _azimuth(direction: Floats) -> Floats:
-    """(N,) [rad] azimuth of field directions (N, 3), 0 along the vertical."""
+    """Azimuth (N,) [rad] of directions (N, 3), 0 along the vertical."""
     x, y = direction[:, 0], direction[:, 1]
     return np.where(np.hypot(x, y) > POLE, np.arctan2(y, x), 0.0)
 
@@ -123,7 +125,8 @@ def _turn(basis: tuple[Floats, Floats], across: Floats) -> Floats:
 def _radiated(
     antennas: Antennas, direction: Floats, heading: Floats, is_rx: Booleans, otherwise: tuple[str, str]
 ) -> Complexes:
-    """Field (N, 2) along theta_hat and phi_hat that antennas radiate in `direction` (N, 3): the Rx's or another."""
+    """Field (N, 2) along theta_hat and phi_hat that antennas radiate in `direction` (N, 3): the Rx's where `is_rx` (N,)
+    holds, else that of pattern and polarisation `otherwise`."""
     field = np.empty((len(direction), 2), dtype=np.complex128)
     for mine, (name, polarization) in ((is_rx, antennas.of_rx), (~is_rx, otherwise)):
         rows = np.flatnonzero(mine)

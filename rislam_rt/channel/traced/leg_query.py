@@ -1,4 +1,5 @@
-"""What is asked of the tracer, and what becomes of its answers: legs between many devices and their far ends."""
+"""Queries for specular legs between many devices and their far ends, batched for the tracer, and its answers as
+legs."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class LegQuery(NamedTuple):
-    """Legs sought: devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
+    """Query for the specular legs from devices (N, 3) each to its far end (N, 3), or all to one (1, 3) [m]."""
 
     device: Floats
     far: Floats
@@ -35,7 +36,8 @@ class LegQuery(NamedTuple):
     front: Floats | None = None
     """(3,) normal of that panel, which sees only what lies before it."""
     spared: int = -1
-    """Number of the scatterer at the far end, if it has a shade: that does not hide its own centre."""
+    """Number of the scatterer at the far end, if it has an occluding mesh, which does not hide its own centre; -1 for
+    none."""
 
     @property
     def paired(self) -> bool:
@@ -44,7 +46,7 @@ class LegQuery(NamedTuple):
 
 
 class LegEndpoints(NamedTuple):
-    """What the two ends of N legs are."""
+    """Positions of the two ends of N legs, the agent's heading, and which ends are the Rx."""
 
     device: Floats
     """(N, 3) [m]."""
@@ -53,104 +55,104 @@ class LegEndpoints(NamedTuple):
     heading: Floats
     """(N,) [rad]."""
     from_rx: Booleans
-    """(N,)."""
+    """(N,) whether the device is the Rx (else the Tx)."""
     to_rx: Booleans
-    """(N,)."""
+    """(N,) whether the far end is the Rx (else a landmark)."""
 
 
 class FoundLegs(NamedTuple):
-    """N legs that the tracer confirmed."""
+    """N specular legs that the tracer confirmed: candidate, geometry and field coefficient of each."""
 
     rows: CandidateIndices
     geometry: PathGeometry
     coefficient: Complexes
-    """(N,) field without spreading loss and carrier phase: the product of the reflections."""
+    """(N,) field without spreading loss and carrier phase: reflections and antenna patterns."""
 
     def only(self, keep: Integers) -> "FoundLegs":
-        """The legs chosen."""
+        """Select legs by row."""
         return FoundLegs(
             self.rows.only(keep), PathGeometry(*(part[keep] for part in self.geometry)), self.coefficient[keep]
         )
 
 
 class QueryBatch(NamedTuple):
-    """Several problems in one set of tables, so that one solve serves them all."""
+    """Several queries for legs in one set of tables, so that one solve of the tracer serves them all."""
 
-    problems: Sequence[LegQuery]
+    queries: Sequence[LegQuery]
     sequences: list[Integers]
-    """For each problem (S, D)."""
+    """Possible wall sequences (S, D) of each query."""
     device: Floats
-    """(N, 3) [m] of all problems."""
+    """(N, 3) [m] devices of all queries."""
     far: Floats
-    """(F, 3) [m] of all problems, for the tracer: lifted off host walls."""
+    """(F, 3) [m] far ends of all queries, for the tracer: lifted off host walls."""
     complete: bool
     """Whether the sequences are all that the walls' sides allow; else cones have ruled out some."""
 
     @property
     def all_sequences(self) -> Integers:
-        """(S, D) wall sequences of all queries."""
+        """Possible wall sequences (S, D) of all queries for legs, one query after the other."""
         return np.concatenate(self.sequences)
 
     def candidates(self, tracer_scene: "TracerScene") -> Iterator[CandidateIndices]:
-        """All rows worth tracing."""
+        """Yield the candidates of all queries that survive culling."""
         from rislam_rt.channel.traced.culling import cull_candidates
 
         first_device = first_far = first_sequence = 0
-        for problem, sequences in zip(self.problems, self.sequences, strict=True):
-            for device, sequence in cull_candidates(tracer_scene, sequences, problem.device, problem.far):
-                far = device if problem.paired else np.zeros_like(device)
+        for query, sequences in zip(self.queries, self.sequences, strict=True):
+            for device, sequence in cull_candidates(tracer_scene, sequences, query.device, query.far):
+                far = device if query.paired else np.zeros_like(device)
                 yield CandidateIndices(far + first_far, device + first_device, sequence + first_sequence)
-            first_device += len(problem.device)
-            first_far += len(problem.far)
+            first_device += len(query.device)
+            first_far += len(query.far)
             first_sequence += len(sequences)
 
     def ends(self, rows: CandidateIndices) -> LegEndpoints:
-        """The two ends of each queried leg, row by row."""
-        sizes = [len(problem.device) for problem in self.problems]
-        far = np.concatenate([problem.far for problem in self.problems])
-        heading = np.concatenate([problem.heading for problem in self.problems])
+        """Positions and antennas at the two ends of each candidate in `rows`."""
+        sizes = [len(query.device) for query in self.queries]
+        far = np.concatenate([query.far for query in self.queries])
+        heading = np.concatenate([query.heading for query in self.queries])
         from_rx, to_rx = (np.repeat(np.array(flag, dtype=np.bool_), sizes) for flag in self._flags())
         device = rows.device
         return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
 
     def _flags(self) -> tuple[list[bool], list[bool]]:
-        """Which queries start, and which end, at the Rx."""
-        return [problem.from_rx for problem in self.problems], [problem.to_rx for problem in self.problems]
+        """Which queries start at the Rx, and which end there."""
+        return [query.from_rx for query in self.queries], [query.to_rx for query in self.queries]
 
     def legs(self, found: FoundLegs) -> list[SpecularLegs]:
-        """The tracer's answers, problem by problem."""
+        """Split the legs that the tracer found by query."""
         result = []
         first_device = first_sequence = 0
-        for problem, sequences in zip(self.problems, self.sequences, strict=True):
+        for query, sequences in zip(self.queries, self.sequences, strict=True):
             here = found.rows.sequence - first_sequence
             answer = found.only(np.flatnonzero((here >= 0) & (here < len(sequences))))
             rows = answer.rows
             result.append(
-                _as_legs(problem, sequences, rows.device - first_device, rows.sequence - first_sequence, answer)
+                _as_legs(query, sequences, rows.device - first_device, rows.sequence - first_sequence, answer)
             )
-            first_device += len(problem.device)
+            first_device += len(query.device)
             first_sequence += len(sequences)
         return result
 
 
-def build_batch(problems: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
-    """Queries for legs: the wall sequences of every problem up to `depth` bounces."""
+def build_batch(queries: Sequence[LegQuery], tracer_scene: "TracerScene", sides: Integers, depth: int) -> QueryBatch:
+    """Combine queries for legs into one batch, each with its possible wall sequences of up to `depth` bounces."""
     from rislam_rt.channel.traced.cones import build_cones
 
     walls, sequences, complete = tracer_scene.walls, [], True
-    for problem in problems:
-        device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (problem.device, problem.far))
-        cones = partial(build_cones, tracer_scene, problem.device, problem.far)
-        table, all_of_them = possible_sequences(sides, device_side, far_side, depth, walls.beside(problem.host), cones)
+    for query in queries:
+        device_side, far_side = (np.bitwise_or.reduce(point_sides(walls, p)) for p in (query.device, query.far))
+        cones = partial(build_cones, tracer_scene, query.device, query.far)
+        table, all_of_them = possible_sequences(sides, device_side, far_side, depth, walls.beside(query.host), cones)
         sequences.append(table)
         complete &= all_of_them
-    device = np.concatenate([problem.device for problem in problems])
-    far = np.concatenate([_lifted(problem, walls) for problem in problems])
-    return QueryBatch(problems, sequences, device, far, complete)
+    device = np.concatenate([query.device for query in queries])
+    far = np.concatenate([_lifted(query, walls) for query in queries])
+    return QueryBatch(queries, sequences, device, far, complete)
 
 
 def join_found(parts: list[FoundLegs]) -> FoundLegs:
-    """All legs, one part after the other."""
+    """Concatenate the legs found in several parts."""
     geometries = zip(*(part.geometry for part in parts), strict=True)
     return FoundLegs(
         join_indices([part.rows for part in parts]),
@@ -159,25 +161,25 @@ def join_found(parts: list[FoundLegs]) -> FoundLegs:
     )
 
 
-def _lifted(problem: LegQuery, walls: Walls) -> Floats:
-    """Far ends (F, 3) of queried legs, a panel's at least `LIFT` in front of its host wall."""
-    if problem.host < 0 or problem.front is None:
-        return problem.far
-    outward = np.copysign(1.0, walls.normal[problem.host] @ problem.front)
-    height = outward * (problem.far @ walls.normal[problem.host] - walls.offset[problem.host])
-    return problem.far + np.maximum(LIFT - height, 0.0)[:, None] * problem.front
+def _lifted(query: LegQuery, walls: Walls) -> Floats:
+    """Far ends (F, 3) [m] of a query, a panel's moved to at least `LIFT` in front of its host wall."""
+    if query.host < 0 or query.front is None:
+        return query.far
+    outward = np.copysign(1.0, walls.normal[query.host] @ query.front)
+    height = outward * (query.far @ walls.normal[query.host] - walls.offset[query.host])
+    return query.far + np.maximum(LIFT - height, 0.0)[:, None] * query.front
 
 
 def _as_legs(
-    problem: LegQuery, sequences: Integers, device: Integers, column: Integers, found: FoundLegs
+    query: LegQuery, sequences: Integers, device: Integers, column: Integers, found: FoundLegs
 ) -> SpecularLegs:
-    """Scatter found legs into dense arrays, one column a sequence that some device has."""
+    """Arrange the found legs of a query by device and wall sequence, one column for each that some device has."""
     geometry = found.geometry
     keep = np.ones(len(device), dtype=np.bool_)
-    if problem.front is not None:
-        keep = geometry.at_far_end @ problem.front > SURFACE_TOLERANCE
+    if query.front is not None:
+        keep = geometry.at_far_end @ query.front > SURFACE_TOLERANCE
     columns, place = np.unique(column[keep], return_inverse=True)
-    shape = len(problem.device), len(columns)
+    shape = len(query.device), len(columns)
 
     def dense(part: Any) -> Any:
         values = np.zeros(shape + part.shape[1:], dtype=part.dtype)

@@ -9,7 +9,7 @@ from sionna.rt.utils.jones import implicit_basis_vector, jones_matrix_rotator
 
 
 def kept_components(reflection: mi.Float, incident: mi.Vector3f, reflected: mi.Vector3f) -> mi.Matrix4f:
-    """Jones matrix between Sionna's bases for rays along `incident` and `reflected`: theta and phi parts times R.
+    """Jones matrix, in Sionna's bases, of a reflection that keeps the field's theta and phi parts and scales both by R.
 
     Sionna's basis is theta_hat, except within 1e-3 rad of the vertical, where it is a fixed direction in both rays: R
     times the identity there would mirror the field and multiply a matched signal by `-cos(2 phi)`.
@@ -23,7 +23,8 @@ def kept_components(reflection: mi.Float, incident: mi.Vector3f, reflected: mi.V
 
 
 class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
-    """Mirror with coefficient R in (0, 1] whatever the angle and the polarisation; nothing passes, nothing scatters.
+    """Sionna radio material of a wall with coefficient R in (0, 1] at every angle and polarisation; nothing passes or
+    scatters.
 
     The Jones matrix is R times the identity between the (theta, phi) bases of the incident and the reflected ray: a
     bounce keeps the vertical and the horizontal part of the field and scales both.
@@ -44,7 +45,7 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         sample2: mi.Point2f,
         active: bool | mi.Bool = True,
     ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
-        """Direction of the ray mirrored at a material of constant R; always a specular reflection."""
+        """Reflected ray at a material of constant R: always the specular direction."""
         count = dr.width(si.wi)
         result = mi.BSDFSample3f()
         result.sampled_component = dr.full(mi.UInt32, InteractionType.SPECULAR, count)
@@ -57,7 +58,7 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
     def eval(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, wo: mi.Vector3f, active: bool | mi.Bool = True
     ) -> mi.Spectrum:
-        """Jones matrix as a real 4 x 4 matrix; zero for anything but a specular reflection."""
+        """Jones matrix of a wall of constant R as a real 4 x 4 matrix; zero for anything but specular reflection."""
         event = dr.reinterpret_array(mi.UInt, si.dp_du.z)
         return mi.Spectrum(dr.select(event == InteractionType.SPECULAR, self._jones(si, wo), mi.Matrix4f(0.0)))
 
@@ -68,14 +69,15 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         return dr.full(mi.Float, 1.0, dr.width(si.wi))
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
-        """Name R of the material for Mitsuba's differentiable parameters."""
+        """Register R of the material with Mitsuba's differentiable parameters."""
         callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
 
     def to_string(self) -> str:
-        """The material as text for people."""
+        """Description of a wall's material of constant R in words."""
         return f"ConstantReflection R={self._reflection[0]:.3f}"
 
     def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:
+        """Jones matrix of a reflection at a wall of constant R, as a real 4 x 4 matrix in Sionna's bases."""
         return kept_components(self._reflection, si.to_world(si.wi), wo)
 
 

@@ -1,4 +1,4 @@
-"""Geometry of found paths, leg by leg: as the tracer left them, or refined in float64.
+"""Geometry of traced paths, leg by leg: as the tracer left it in float32, or refined in float64.
 
 Refinement keeps the tracer's word on which walls are met and seen; the images on the walls' planes say where.
 """
@@ -15,7 +15,7 @@ from rislam_rt.geometry.planes import mirror, mirror_direction, signed_distance
 
 
 class PathGeometry(NamedTuple):
-    """N legs."""
+    """Geometry of N traced legs: bounce points, length, and directions at both ends."""
 
     vertices: Floats
     """(N, D, 3) [m] bounce points from device to far end, zero beyond the last."""
@@ -28,7 +28,8 @@ class PathGeometry(NamedTuple):
 
 
 def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Floats) -> PathGeometry:
-    """Legs between devices and far ends (N, 3) [m] over `sequences` (N, D), exact on the walls' planes.
+    """Geometry of legs between devices and far ends (N, 3) [m] over wall sequences (N, D), in float64 on the walls'
+    planes.
 
     The far end is mirrored in the walls from its own end on; the straight line from the device to the last image meets
     the first wall, the one from there to the image before meets the second, and so on.
@@ -54,7 +55,8 @@ def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Flo
 
 
 def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> Floats:
-    """Unit vectors (N, D + 1, 3) along which legs that leave along `at_device` (N, 3) travel, the last one repeated."""
+    """Unit vectors (N, D + 1, 3) of travel along each segment of legs that leave along `at_device` (N, 3), the last
+    repeated."""
     travel = [at_device]
     for wall in sequences.T:
         travel.append(
@@ -64,7 +66,7 @@ def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> 
 
 
 def traced_geometry(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> PathGeometry:
-    """Legs over the bounce points (N, D, 3) that the tracer left."""
+    """Geometry of legs over the bounce points (N, D, 3) [m] that the tracer found."""
     points = polyline(sequences, device, far, vertices)
     bounces = (sequences != NO_WALL).sum(axis=1)
     length = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1)
@@ -73,6 +75,6 @@ def traced_geometry(sequences: Integers, device: Floats, far: Floats, vertices: 
 
 
 def polyline(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Floats:
-    """Device, bounce points and far end (N, D + 2, 3) [m]; the far end repeats where a leg has fewer bounces."""
+    """Vertices (N, D + 2, 3) [m] of legs: device, bounce points and far end, which repeats where bounces are fewer."""
     inner = np.where((sequences != NO_WALL)[..., None], vertices, far[:, None])
     return np.concatenate([device[:, None], inner, far[:, None]], axis=1)

@@ -1,4 +1,4 @@
-"""Scattered and diffracted paths as the receive array meets them: what falls into one cell is one wave.
+"""Resolution cells of the receive array: scattered and diffracted paths within half a cell are summed to one path.
 
 A rough wall sends thousands of rays, each far too weak to be heard alone. Their sum is what counts, and within half a
 resolution cell of delay and both cosines nothing tells them from one wave with the sum of their gains.
@@ -12,12 +12,13 @@ from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 CELLS = 2.0
-"""Cells to a resolution cell, along each axis."""
+"""Summing cells to a resolution cell, along delay and along each direction cosine."""
 
 
 def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> Paths:
-    """The cells of all cycles that hold something, as paths without an identity: a column means nothing from one cycle
-    to the next.
+    """Sum scattered and diffracted paths within half a resolution cell into one path each, cycle by cycle.
+
+    These paths have no identity: a column means nothing from one cycle to the next.
 
     Gains add up, carrier phases included; delay and directions are the mean by power. The kind is `VT`, for want of
     another: they came over walls alone.
@@ -59,7 +60,8 @@ def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -
 
 
 def _cells(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> tuple[Integers, Integers]:
-    """Number of each ray's cell (N,), and each cell's cycle (C,), ascending."""
+    """Number (N,) of the delay and angle cell into which each diffuse path falls, and each cell's cycle (C,),
+    ascending."""
     array = radio.array
     body = np.einsum("ni,nij->nj", extras.arrival, rotation_z(trajectory.heading[extras.cycle]))
     widths = CELLS * np.array([radio.bandwidth, array.rows * array.spacing, array.cols * array.spacing])

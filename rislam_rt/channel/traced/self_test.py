@@ -15,16 +15,18 @@ _BODY = Body(np.array([-0.04, -0.02, 0.01]), np.array([0.05, 0.03, -0.02]))
 
 @dataclass(frozen=True, slots=True)
 class SelfTest:
-    """Outcome of `trace_small_box`."""
+    """Outcome of the ray tracer's self-test in a small box: number of paths, errors of their gains, time."""
 
     num_paths: int
+    """Paths that the tracer found."""
     expected_paths: int
     """25: the mirror lattice of a box up to two bounces, 1 + 6 + 18."""
     los_error_db: float
-    """Gain of the direct path against lambda / (4 pi d)."""
+    """Error [dB] of the direct path's gain against lambda / (4 pi d)."""
     wall_error_db: float
-    """Largest gain error of the single bounces against R lambda / (4 pi d), d from the six mirror images."""
+    """Largest error [dB] of the single bounces' gains against R lambda / (4 pi d), d from the six mirror images."""
     seconds: float
+    """Time [s] that the test took."""
 
     @property
     def ok(self) -> bool:

@@ -1,4 +1,4 @@
-"""Which wall sequences the tracer is asked about: all that the walls' places in the room leave possible.
+"""Wall sequences that the tracer tries: all that the positions of walls and ends leave possible.
 
 A reflection needs both its neighbours (a wall, or an end of the leg) on the same side of its plane. What that rules
 out is not asked; everything else is, for every position, so no path depends on where rays happen to be shot. Where
@@ -19,23 +19,23 @@ FRONT, BACK = 1, 2
 """Sides of a plane, as bits: a wall may have parts on both."""
 
 NO_WALL = -1
-"""Padding of sequences."""
+"""Padding of wall sequences."""
 
 MANY = 100_000
-"""Up to so many wall sequences of one bounce count all are asked about at every position."""
+"""Number of wall sequences of one bounce count up to which all are tried at every position, without cones."""
 
 MOST_LOOKS = 2_000_000_000
-"""Largest number of wall sequences of one bounce count that are looked at: some minutes."""
+"""Largest number of wall sequences of one bounce count that may be tested: some minutes."""
 
 MOST_SEQUENCES = 10_000_000
-"""Largest number of wall sequences that may be left."""
+"""Largest number of wall sequences that may be left for tracing."""
 
 _BLOCK = 4_000_000
 """Largest number of entries of a temporary table."""
 
 
 def wall_sides(walls: Walls) -> Integers:
-    """(W, W) side bits that rule wall sequences out: on which sides of wall i's plane wall j has parts."""
+    """Side bits (W, W): on which sides of wall i's plane wall j has parts, 0 in the plane."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order].reshape(-1, 3)
     first = 3 * np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls)))
@@ -48,20 +48,20 @@ def wall_sides(walls: Walls) -> Integers:
 
 
 def point_sides(walls: Walls, points: Floats) -> Integers:
-    """(N, W) side that rules wall sequences out: on which side of wall j's plane point i lies; 0 in the plane."""
+    """Side bits (N, W): on which side of wall j's plane point i lies, 0 in the plane."""
     height = points @ walls.normal.T - walls.offset
     return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
 
 
 class Narrowing(Protocol):
-    """What rules out sequences by where their ends are."""
+    """Protocol of a test that rules out wall sequences by where their ends are, as `Cones` do."""
 
     def lead_on(self, walls: Integers) -> Booleans:
-        """Which sequences (N, d) the far ends leave possible."""
+        """Which wall sequences (N, d), complete or to be extended, the far ends leave possible."""
         ...
 
     def reach(self, walls: Integers) -> Booleans:
-        """Which sequences (N, d) both ends leave possible."""
+        """Which complete wall sequences (N, d) both ends leave possible."""
         ...
 
 
@@ -121,13 +121,13 @@ def possible_sequences(
 
 
 def _growth(level: Integers, onward: Integers, sides: Integers) -> int:
-    """How many sequences one more wall makes of these."""
+    """Number of wall sequences that putting one more wall in front of sequences (S, d) makes."""
     walls, rows = np.unique(np.stack([level[:, 0], onward], axis=1), axis=0, return_counts=True)
     return sum(int(n) * int(((sides[wall] & side) > 0).sum()) for (wall, side), n in zip(walls, rows, strict=True))
 
 
 def _check(count: int, most: int, sides: Integers, depth: int, verb: str) -> None:
-    """Refuse sequences that would not end in an hour or fit the memory, before they are built."""
+    """Raise `ConfigError` for more wall sequences than can be tested in an hour or held in memory."""
     if count > most:
         raise ConfigError(
             f"depth: {depth} received; {len(sides)} walls {verb} {count} sequences, more than {most}: "
@@ -136,15 +136,15 @@ def _check(count: int, most: int, sides: Integers, depth: int, verb: str) -> Non
 
 
 def turned_round(sequences: Integers) -> Integers:
-    """Sequences (S, D) in the opposite order, padding kept at the end."""
+    """Reverse wall sequences (S, D), the padding kept at the end."""
     index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
     return np.where(index >= 0, np.take_along_axis(sequences, np.maximum(index, 0), axis=1), NO_WALL)
 
 
 def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> Iterator[tuple[Integers, Integers]]:
-    """Put every possible wall in front of sequences (S, d), block by block.
+    """Put every possible wall in front of wall sequences (S, d), block by block.
 
-    `onward` (S,) is where they go on their first wall; the longer ones come with theirs.
+    `onward` (S,) are the side bits of their first wall on which the ray goes on; the longer ones come with theirs.
     """
     for rows in _blocks(len(level), len(sides)):
         first = level[rows, 0]

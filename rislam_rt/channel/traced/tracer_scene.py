@@ -1,4 +1,4 @@
-"""The tracer's scene, as Sionna RT sees the room: one mesh a material, so that every hit names its wall."""
+"""The room as a scene of the tracer (Sionna RT): one mesh a material, so that every ray's hit names its wall."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ import sionna.rt as rt
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_of_ones_own
+from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_material
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -20,16 +20,16 @@ from rislam_rt.geometry.triangles import inside_any
 from rislam_rt.model import Material
 
 NO_OCCLUDER = -1
-"""Key of the view with everything in it."""
+"""Key of `TracerScene.views` for the room with all its occluders."""
 
 
 class WallBoxes(NamedTuple):
-    """Planes and boxes of the walls, on the tracer's side."""
+    """Planes and bounding boxes of the walls in the tracer's float32 arrays, about its origin."""
 
     normal: mi.Vector3f
-    """(W,)."""
+    """(W,) unit normals."""
     offset: mi.Float
-    """(W,) [m]."""
+    """(W,) [m]: `normal . x = offset`."""
     center: mi.Point3f
     """(W,) [m] middle of each wall's bounds."""
     half: mi.Vector3f
@@ -47,26 +47,26 @@ class TracerScene:
     origin: Floats
     """(3,) [m] point of the room that is the tracer's zero."""
     shape: Integers
-    """(W,) shape of one triangle of each wall, its largest."""
+    """(W,) number of the shape (mesh) that holds each wall's largest triangle."""
     primitive: Integers
-    """(W,) its number in that shape."""
+    """(W,) that triangle's number in its shape."""
     corner: Floats
-    """(W, 3) [m] one of its corners, from `origin`."""
+    """(W, 3) [m] one of that triangle's corners, from `origin`."""
     shapes: Integers
-    """(M,) all shapes, ascending."""
+    """(M,) numbers of all shapes, ascending."""
     first: Integers
     """(M,) where each shape's triangles begin in `wall_of_primitive`."""
     wall_of_primitive: Integers
-    """(T,) walls, shape by shape."""
+    """(T,) wall of each triangle, shape by shape."""
     materials: tuple[rt.RadioMaterialBase, ...]
     """All radio materials of walls."""
     material_of_wall: Integers
     """(W,) index into `materials`."""
     wall_boxes: WallBoxes
     views: dict[int, mi.Scene]
-    """Everything (`NO_SHADE`), and for each scatterer with a shade everything but that shade."""
+    """The whole room (`NO_OCCLUDER`), and by number of each scatterer with an occluding mesh the room without that."""
     occluders: dict[int, mi.Scene]
-    """The shade of each scatterer that has one, alone."""
+    """The occluding mesh of each scatterer that has one, alone; those of no scatterer together (`ALONE`)."""
 
     @property
     def wavelength(self) -> float:
@@ -74,23 +74,24 @@ class TracerScene:
         return float(self.scene.wavelength[0])
 
     def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
-        """Walls (...,) of the tracer's hits, `NO_WALL` where nothing was hit."""
+        """Walls (...,) that the tracer's rays hit, by shape and primitive (...,); `NO_WALL` where no wall was hit."""
         place = np.searchsorted(self.shapes, shape)
         known = (place < len(self.shapes)) & np.isin(shape, self.shapes)
         index = np.where(known, self.first[np.where(known, place, 0)] + primitive, 0)
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
 
     def is_stacked(self, wall: Integers) -> Booleans:
-        """Whether walls (...,) lie on others or others on them."""
+        """Whether each of walls (...,) overlaps another wall in its plane."""
         sharing = np.bincount(self.walls.plane, minlength=len(self.walls)) > 1
         return (wall != NO_WALL) & sharing[self.walls.plane[wall]] if len(self.walls) else wall != NO_WALL
 
     def share_plane(self, a: Integers, b: Integers) -> Booleans:
-        """Whether walls (...,) are in one plane by lying on each other."""
+        """Whether walls `a` and `b` (...,) are in one plane by lying on each other."""
         return (a != NO_WALL) & (b != NO_WALL) & (self.walls.plane[a] == self.walls.plane[b])
 
     def on_top(self, wall: Integers, points: Floats) -> Booleans:
-        """Whether walls (N, D) are there at points (N, D, 3) [m] and nothing lies on them; true for `NO_WALL`."""
+        """Whether overlapping walls (N, D) are what reflects at points (N, D, 3) [m]: solid there and not covered; true
+        for all other walls."""
         top = np.ones(wall.shape, dtype=np.bool_)
         for number in np.unique(wall[self.is_stacked(wall)]):
             here = wall == number
@@ -105,7 +106,7 @@ class TracerScene:
 
 
 def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: Mapping[int, Floats]) -> TracerScene:
-    """Put walls and occluders into a scene of the tracer at the carrier [Hz]: meshes about `origin`, faces in order.
+    """Build the tracer's scene of walls and occluders at the carrier [Hz]: meshes about `origin`, faces in order.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: 
 
 
 def _part(objects: list[rt.SceneObject]) -> mi.Scene:
-    """A Mitsuba scene of some of the meshes."""
+    """Mitsuba scene of some of the tracer's meshes."""
     return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
 
 
@@ -159,7 +160,7 @@ def _numbered(
     views: dict[int, mi.Scene],
     occluders: dict[int, mi.Scene],
 ) -> TracerScene:
-    """Triangles of all shapes (M,) of the tracer's scene numbered, and each wall's largest."""
+    """Assemble the tracer's scene: number the triangles of all shapes (M,) by wall, and find each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
     sizes = [len(members[m]) for m in order]
@@ -189,7 +190,7 @@ def _numbered(
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
-    """Planes and bounds of the walls of the tracer's scene, about the origin."""
+    """Planes and bounding boxes of the walls about `origin`, for the tracer."""
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
@@ -205,12 +206,12 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
 
 
 def as_points(points: Floats) -> mi.Point3f:
-    """Positions (N, 3) for the tracer, in float32."""
+    """Convert positions (N, 3) [m] to float32 points of the tracer's backend."""
     return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
-    """Mesh for the tracer's scene of separate triangles (T, 3, 3), in their order."""
+    """Mitsuba mesh of separate triangles (T, 3, 3) [m], in their order."""
     mesh = mi.Mesh(
         name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,
         has_vertex_texcoords=False,
@@ -223,13 +224,13 @@ def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
 
 
 def _material(material: Material, number: int) -> rt.RadioMaterialBase:
-    """Radio material of a wall in the tracer's scene: a constant R of ours, or Sionna's own slab."""
+    """Sionna radio material of a specular wall: constant R, constant TE and TM, or a slab by permittivity or ITU."""
     if material.reflection is not None:
         return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
     if material.reflection_te is not None:
         return PolarisedReflection(f"polarised-{number}", material, material.scattering)
     if material.permittivity is not None:
-        return slab_of_ones_own(f"slab-{number}", material, material.scattering)
+        return slab_material(f"slab-{number}", material, material.scattering)
     try:
         return rt.ITURadioMaterial(
             f"itu-{number}", material.itu, material.thickness, scattering_coefficient=material.scattering

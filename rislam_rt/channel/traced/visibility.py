@@ -1,4 +1,4 @@
-"""Visibility by Sionna's image method: which candidates the meshes really admit, and where they bounce.
+"""Visibility test by Sionna's image method: which candidates for legs exist in the meshes, and where they bounce.
 
 `PathSolver` finds its candidates by shooting rays, for all pairs of sources and targets. Here the candidates are
 given (`sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory is
@@ -19,15 +19,15 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.buffer import fill_buffer, read_vertices, turned_vertices
 from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
+from rislam_rt.channel.traced.path_buffer import fill_buffer, read_vertices, turned_vertices
 from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_points
 
 
 class SingleRays:
-    """The tracer's scene with every ray cast by itself.
+    """Proxy of a Mitsuba scene that casts every ray by itself, not in packets.
 
     The image method declares its rays coherent, and Embree then casts them in packets in which a ray that grazes the
     edge between two triangles hits or misses depending on its neighbours: a path came and went with its row's number.
@@ -40,7 +40,7 @@ class SingleRays:
         return getattr(self._scene, name)
 
     def ray_intersect(self, *args: Any, **options: Any) -> Any:
-        """`mi.Scene.ray_intersect` without packets."""
+        """Intersect rays with the scene like `mi.Scene.ray_intersect`, each ray by itself."""
         return self._scene.ray_intersect(*args, **{**options, "coherent": False})
 
 
@@ -52,7 +52,7 @@ def visible_rows(
     rows: CandidateIndices,
     spared: int = NO_OCCLUDER,
 ) -> tuple[CandidateIndices, Floats]:
-    """The candidates that are visible, and their bounce points (N, D, 3) [m] from device to far end.
+    """Candidates for legs that the tracer finds visible, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def visible_rows(
     far, device
         Positions (F, 3) and (N, 3) [m]. Rays run from the device back to the far end, which may lie on a face.
     spared
-        Number of the scatterer at the far ends, if it has a shade: that shade does not hide its own centre from the
-        last bounce, but does hide the bounces from each other.
+        Number of the scatterer at the far ends, if it has an occluding mesh: that does not hide its own centre from
+        the last bounce, but does hide the bounces from each other.
     """
     if len(rows.far) == 0:
         return rows, np.zeros((0, sequences.shape[1], 3))
@@ -82,7 +82,8 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Visible legs whose segments up to the last bounce miss a scatterer's shade."""
+    """Rows of the visible legs whose segments up to the last bounce miss the occluding mesh of the scatterer at their
+    end."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
@@ -102,7 +103,7 @@ def _trace(
     method: ImageMethod,
     spared: int,
 ) -> PathsBuffer:
-    """Visible candidates (N, D) by the tracer's image method, a shade taken out of the room."""
+    """Run the tracer's image method on candidate wall sequences (N, D), in the room without the occluder `spared`."""
     with _short_segments():
         return method(
             scene=SingleRays(tracer_scene.views[spared]),
@@ -115,7 +116,7 @@ def _trace(
 
 
 def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
-    """Candidates that the tracer found visible with every bounce on the wall asked for.
+    """Rows of the candidates that the tracer found visible with every bounce on the wall asked for.
 
     The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
     lie on each other the ray meets any of them, and the one on top reflects.
@@ -136,7 +137,7 @@ def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuff
 
 @contextmanager
 def _short_segments() -> Iterator[None]:
-    """Let the tracer's visibility test keep short segments while this lasts."""
+    """Lower Sionna's limit on the length of segments to `SEGMENT_LIMIT` for the duration of a `with` block."""
     own = image_method.MIN_SEGMENT_LENGTH
     image_method.MIN_SEGMENT_LENGTH = SEGMENT_LIMIT
     try:

@@ -1,1 +1,1 @@
-"""Components from samples: found one by one over a dictionary of delays and angles, then refined together."""
+"""Estimation of paths from received samples: detected one by one by matched filter, then refined together."""

@@ -1,4 +1,4 @@
-"""Detection of new paths in a residual: peaks of the matched filter on a grid, interpolated, taken off one by one."""
+"""Detection of paths in a residual signal: matched-filter peaks on a grid, interpolated, subtracted one by one."""
 
 from typing import NamedTuple
 
@@ -12,16 +12,17 @@ OVERSAMPLING = 2
 ANGLE_POINTS = 3
 """Grid points per beam width of a cosine."""
 GRID_LOSS = 0.6
-"""A peak between grid points shows at least this share of its power on the grid."""
+"""Least share of a peak's power that shows on the grid when the peak lies between its points."""
 CLIMB_STEPS = 2
+"""Number of Newton steps from a grid point to the peak of the matched filter."""
 CLIMB_LIMIT = np.array([0.3, 0.12, 0.12])
-"""Most that one step of the climb changes (B tau, u, v)."""
+"""Largest change of (B tau, u, v) by one Newton step to a peak."""
 BATCH_RANGE = 10.0**-1.2
-"""Peaks down to this share of the strongest are taken from the same residual; sidelobes of what is taken lie below."""
+"""Power relative to the strongest peak down to which peaks are picked from the same residual; sidelobes lie below."""
 
 
 class MatchedFilterGrid(NamedTuple):
-    """Directions and delays at which the matched filter is evaluated."""
+    """Grid of directions and delays on which the matched filter is evaluated."""
 
     cosines: Floats
     """(G, 2) within the unit disc."""
@@ -30,14 +31,15 @@ class MatchedFilterGrid(NamedTuple):
     delays: Integers
     """(T,) indices of delays within the window, in steps of 1 / `OVERSAMPLING` cells."""
     tones: int
+    """Length of the Fourier transform over tones: `OVERSAMPLING` times their number."""
     places: tuple[Floats, Floats, Floats]
     """Tones, rows and columns times 2 pi; the tones' sign is turned."""
     powers: tuple[Complexes, Complexes, Complexes]
-    """(3, n) of each: what `a^H y` is weighed with for its value and its first two derivatives."""
+    """(3, n) over tones, rows and columns: weights of `a^H y` for its value and its first two derivatives."""
 
 
 def build_grid(sounding: Sounding, window: tuple[float, float]) -> MatchedFilterGrid:
-    """Grid on which paths are detected: over the sky and a window of delays, given in resolution cells."""
+    """Build the matched filter's grid over all directions and a window of delays, given in resolution cells."""
     u, v = np.meshgrid(_axis(sounding.row), _axis(sounding.col), indexing="ij")
     step = np.hypot(1.0 / len(_axis(sounding.row)), 1.0 / len(_axis(sounding.col)))
     inside = np.hypot(u, v) <= 1.0 + step
@@ -54,11 +56,12 @@ def build_grid(sounding: Sounding, window: tuple[float, float]) -> MatchedFilter
 
 
 def spectrum(grid: MatchedFilterGrid, residual: Complexes) -> Complexes:
-    """Spectrum in which paths are detected: matched filter's output (G, T), up to a phase, for samples (L, M)."""
+    """Output (G, T) of the matched filter on its grid, up to a phase, for samples (L, M)."""
     return np.asarray(grid.antennas @ _delay_spectrum(grid, residual.astype(np.complex64)))
 
 
 def _delay_spectrum(grid: MatchedFilterGrid, beams: Complexes) -> Complexes:
+    """Fourier transform of tones (G, M) to the grid's delays (G, T)."""
     return np.fft.ifft(beams, n=grid.tones, axis=1, norm="forward")[:, grid.delays]
 
 
@@ -70,9 +73,9 @@ def pick_peaks(
     window: tuple[float, float],
     most: int,
 ) -> Floats:
-    """Detected paths (P, 3): peaks of the residual's spectrum whose measured SNR exceeds a linear threshold.
+    """Detect paths (P, 3) as peaks of the matched filter on a residual, of a measured SNR above a linear threshold.
 
-    The strongest first; each is interpolated and taken off before the next is looked for.
+    The strongest first; each is interpolated and subtracted before the next is looked for.
     """
     picked: list[Floats] = []
     output = spectrum(grid, residual)
@@ -100,7 +103,7 @@ def pick_peaks(
 def _climb(
     grid: MatchedFilterGrid, start: Floats, residual: Complexes, window: tuple[float, float]
 ) -> tuple[Floats, complex, Complexes, Complexes]:
-    """From a grid point to the detected peak of the matched filter next to it, by Newton steps along each parameter.
+    """Interpolate a peak of the matched filter from its grid point (3,), by Newton steps along each parameter.
 
     Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
     """
@@ -114,12 +117,12 @@ def _climb(
 
 
 def _signals(grid: MatchedFilterGrid, point: Floats) -> list[Complexes]:
-    """A detected path's signal as factors over tones, rows and columns."""
+    """Signal of a path at a point (3,), as factors over tones, rows and columns."""
     return [phasor(value * place) for place, value in zip(grid.places, point, strict=True)]
 
 
 def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complexes) -> Complexes:
-    """Matched filter near a detected peak: (3, 3) `a^H y` and its first two derivatives by each of (B tau, u, v)."""
+    """Matched filter's output `a^H y` near a peak with its first two derivatives by each of (B tau, u, v): (3, 3)."""
     tones, row, col = (weight * factor.conj() for weight, factor in zip(grid.powers, signal, strict=True))
     field = residual @ tones.T
     beam = field[:, 0].reshape(row.shape[1], col.shape[1])
@@ -127,7 +130,7 @@ def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complex
 
 
 def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
-    """Newton steps (3,) to a detected peak of |a^H y|^2, each parameter alone; uphill where it curves the wrong way."""
+    """Newton steps (3,) to a peak of |a^H y|^2, each parameter alone; uphill also where the curvature is positive."""
     value, first, second = moments.T
     power = value.real**2 + value.imag**2
     gradient = value.real * first.real + value.imag * first.imag
@@ -137,14 +140,14 @@ def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
 
 
 def into_range(parameters: Floats, window: tuple[float, float]) -> Floats:
-    """Detected parameters (..., 3) with the delay brought into the window and the cosines into the unit disc."""
+    """Clip path parameters (..., 3): the delay to the window, the direction cosines to the unit disc."""
     delay = np.clip(parameters[..., :1], *window)
     cosines = parameters[..., 1:]
     return np.concatenate([delay, cosines / np.maximum(np.linalg.norm(cosines, axis=-1, keepdims=True), 1.0)], axis=-1)
 
 
 def _axis(positions: Floats) -> Floats:
-    """Cosines of the detection grid along one axis of the array; 0 alone where it has no aperture."""
+    """Direction cosines of the matched filter's grid along one axis of the array; 0 alone where it has no aperture."""
     if len(positions) < 2:
         return np.zeros(1)
     beam = 1.0 / (len(positions) * (positions[1] - positions[0]))

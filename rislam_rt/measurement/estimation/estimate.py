@@ -29,29 +29,32 @@ from rislam_rt.measurement.estimation.refine import (
 from rislam_rt.measurement.estimation.sounding import Sounding
 
 BATCH = 16
-"""Most paths that are added between two refinements."""
+"""Largest number of paths that are added between two refinements."""
 ROUNDS = 40
-"""Most rounds of search; each but the last adds a path."""
+"""Largest number of search rounds; each but the last adds a path."""
 SEARCH_STEPS = 2
-"""Refinements a round: enough for the residual of the next one."""
+"""Refinement steps in a search round: enough for the residual of the next one."""
 KNOWN_STEPS = 3
-"""Most refinements of paths that were known beforehand: a cycle moves them by less than a tenth of a cell."""
+"""Largest number of refinement steps of paths known from the last cycle, which move by less than a tenth of a cell."""
 FINAL_STEPS = 12
+"""Largest number of refinement steps at the end of the search."""
 FINAL_TOLERANCE = 0.03
 """Noise energy that the last step may leave in each path: a quarter of a standard deviation of one parameter."""
 TRIAL_STEPS = 6
-"""Most refinements of the other paths after one was taken out, before the costs are compared."""
+"""Largest number of refinement steps of the other paths after one was left out, before the costs are compared."""
 TOUCHED = 1.0
 """Energy over N0 that a new path takes from an old one's signal, from which on the old one is refined with it."""
 COUPLED = 0.1
-"""Correlation of two signals from which on one can stand in for the other's loss."""
+"""Correlation of two signals from which on one can make up for leaving out the other."""
 SLACK = 0.1
-"""How far (B tau, u, v) may leave the window and the sky during the search, so that paths on the edge do not stick."""
+"""Distance by which (B tau, u, v) may leave the window and the unit disc during the search, so that paths on the edge
+do not stick."""
 NOTHING = np.zeros((0, 3))
+"""Parameters of no paths."""
 
 
 class Estimate(NamedTuple):
-    """P paths found in one sounding, with the noise normalised to one."""
+    """Estimate of P paths from one sounding, with the noise normalised to one: fit and standard deviations."""
 
     fit: LeastSquaresFit
     accuracy: Accuracy
@@ -66,7 +69,7 @@ def estimate_paths(
     most: int,
     known: Floats = NOTHING,
 ) -> Estimate:
-    """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, again.
+    """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, and repeat.
 
     Parameters
     ----------
@@ -77,8 +80,8 @@ def estimate_paths(
     most
         Largest number of paths.
     known
-        (Q, 3) where paths are likely to be, such as those of the last sounding: the search begins with them. Each has
-        to prove itself like any other.
+        Parameters (Q, 3) of likely paths, such as those of the last sounding: the search begins with them. Each is
+        tested like any other.
     """
     fit = fit_amplitudes(sounding, known[:most], samples)
     if len(known):
@@ -103,7 +106,7 @@ def estimate_paths(
 def _finish(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> Estimate:
-    """The estimate refined to the end, without the paths that others can stand in for."""
+    """Final estimate of the search: refined to convergence, without paths that their neighbours can explain."""
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
@@ -111,8 +114,7 @@ def _finish(
 
 
 def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
-    """(P,) which estimated paths are refined again: the last few, and those that would lose more than noise
-    otherwise."""
+    """Which paths (P,) to refine: the last `fresh` ones, and those from whose signal these take more than noise."""
     energy = np.abs(fit.amplitude[-fresh:]) ** 2 / num_samples
     touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
     touched[-fresh:] = True
@@ -120,7 +122,7 @@ def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
 
 
 def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, chosen: Booleans) -> LeastSquaresFit:
-    """The estimate with some paths (P,) refined for the next search, the others held."""
+    """Refine the chosen paths (P,) of a fit for the next search round, the others held."""
     if chosen.all():
         return refine(sounding, fit, samples, steps=SEARCH_STEPS)
     return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
@@ -129,7 +131,8 @@ def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, c
 def drop(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> LeastSquaresFit:
-    """The estimate without paths that left the window or the sky, or whose loss costs less than the threshold."""
+    """Drop paths of a fit that left the delay window or the unit disc, or without which the cost grows by less than the
+    threshold."""
     keep = np.all(np.abs(fit.parameters - into_range(fit.parameters, window)) <= SLACK, axis=-1)
     if not keep.all():
         fit = subset_fit(sounding, fit, keep, samples)
@@ -138,7 +141,7 @@ def drop(
 
 
 def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float) -> LeastSquaresFit:
-    """The estimate without paths that their refined neighbours can stand in for.
+    """Drop paths of a fit that their neighbours, once refined, can explain as well.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
     Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
@@ -162,7 +165,8 @@ def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshol
 def _neighbours_instead(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
 ) -> Floats | None:
-    """Estimated parameters (P - 1, 3) without a path, its neighbours refined, if the cost stays below `enough`."""
+    """Parameters (P - 1, 3) of a fit without one path, its neighbours refined; None if the cost is not below
+    `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
     whole, local = residual_fit(sounding, fit, near, samples)
     others = near != row
@@ -176,6 +180,6 @@ def _neighbours_instead(
 
 
 def _among(parameters: Floats, marked: Floats) -> Booleans:
-    """Which of the estimated parameters (P, 3) are marked (Q, 3), or have moved little since."""
+    """Which paths (P, 3) lie within `SLACK` of one of the paths `marked` (Q, 3)."""
     apart = np.abs(parameters[:, None] - marked)
     return np.any(np.all(apart < SLACK, axis=-1), axis=1)

@@ -1,4 +1,4 @@
-"""Signals of many paths, products over tones, rows and columns, and their inner products, which are all real.
+"""Inner products of the signals of many paths and of their derivatives, as products over tones, rows and columns.
 
 Every inner product of signals or of their derivatives is a product of three small ones, so that the P x P matrices of P
 paths cost little. Tones and elements lie evenly about their middles: an inner product over one axis is a sum of
@@ -14,28 +14,29 @@ from rislam_rt.measurement.estimation.sounding import Sounding, tone_response
 
 
 class PathSignals(NamedTuple):
-    """Signals of P paths, products over tones, rows and columns."""
+    """Plane-wave signals of P paths of unit amplitude, as factors over tones, rows and columns."""
 
     parameters: Floats
     """(P, 3) of (B tau, u, v)."""
     delay: Complexes
-    """(M, P)."""
+    """(M, P) factors over the tones."""
     row: Complexes
-    """(R, P)."""
+    """(R, P) factors over the array's rows."""
     col: Complexes
-    """(C, P)."""
+    """(C, P) factors over the array's columns."""
 
     def take(self, rows: Booleans | Integers) -> "PathSignals":
-        """Signals of some of the paths."""
+        """Select the signals of some paths."""
         return PathSignals(self.parameters[rows], self.delay[:, rows], self.row[:, rows], self.col[:, rows])
 
     @property
     def antennas(self) -> Complexes:
-        """(L, P)."""
+        """Antenna vectors (L, P) of the paths."""
         return (self.row[:, None] * self.col).reshape(len(self.row) * len(self.col), -1)
 
     def correlate(self, sounding: Sounding, samples: Complexes) -> Complexes:
-        """(4, P) `a^H y` and `d^H y`, d the derivatives by the three parameters, of samples (L, M)."""
+        """Correlate signals and their derivatives d by the three parameters with samples (L, M): `a^H y`, `d^H y` (4,
+        P)."""
         count = len(samples)
         beams = np.concatenate([samples, samples * sounding.frequency]) @ self.delay.conj()
         antennas = self.antennas.conj()
@@ -52,7 +53,7 @@ class PathSignals(NamedTuple):
 
 
 class InnerProducts(NamedTuple):
-    """Inner products of P signals `a` and their derivatives `d`."""
+    """Inner products of the signals `a` of P paths and their derivatives `d` by (B tau, u, v); all are real."""
 
     signal: Floats
     """(P, P) `a_i^H a_j`."""
@@ -62,19 +63,19 @@ class InnerProducts(NamedTuple):
     """(3, P, 3, P) `d_i^H d_j`."""
 
     def take(self, keep: Booleans | Integers) -> "InnerProducts":
-        """Inner products of some of the paths."""
+        """Select the inner products of some paths."""
         return InnerProducts(self.signal[keep][:, keep], self.mixed[keep][..., keep], self.slope[:, keep][..., keep])
 
 
 def waves_at(sounding: Sounding, parameters: Floats) -> PathSignals:
-    """Signals for inner products of paths at parameters (P, 3)."""
+    """Plane-wave signals of paths at parameters (P, 3), as factors over tones, rows and columns."""
     delay, u, v = parameters.T
     row, col = (phasor(2.0 * np.pi * np.multiply.outer(x, c)) for x, c in ((sounding.row, u), (sounding.col, v)))
     return PathSignals(parameters, tone_response(sounding.frequency, delay), row, col)
 
 
 def inner_of(sounding: Sounding, waves: PathSignals) -> InnerProducts:
-    """All inner products, parameter by parameter."""
+    """Inner products of the paths' signals and of their derivatives by delay and both cosines."""
     (f0, f1, f2), (x0, x1, x2), (y0, y1, y2) = (
         _axis_products(wave, place)
         for wave, place in ((waves.delay, -sounding.frequency), (waves.row, sounding.row), (waves.col, sounding.col))

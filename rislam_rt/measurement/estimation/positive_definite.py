@@ -1,4 +1,4 @@
-"""Symmetric positive matrices that may be close to singular: solved and inverted at unit diagonal, with a ridge."""
+"""Solve and invert symmetric positive definite matrices that may be close to singular: unit diagonal, and a ridge."""
 
 import numpy as np
 import scipy
@@ -10,7 +10,7 @@ RIDGE = 1e-9
 
 
 def inverse(matrix: Floats) -> Floats:
-    """Inverse (n, n) of a positive definite matrix."""
+    """Inverse (n, n) of a positive definite matrix that may be close to singular."""
     if not len(matrix):
         return matrix
     scale, factor = _factor(matrix)
@@ -31,7 +31,7 @@ def solve(matrix: Floats, right: Floats) -> Floats:
 
 
 def whitened(matrix: Floats, right: Floats) -> Floats:
-    """`W right` (n, k), the inverse of a positive definite matrix being `W^T W`."""
+    """Product `W right` (n, k), W being a whitening matrix of a positive definite one: its inverse is `W^T W`."""
     if not len(matrix):
         return right
     scale, factor = _factor(matrix)
@@ -39,7 +39,8 @@ def whitened(matrix: Floats, right: Floats) -> Floats:
 
 
 def _factor(matrix: Floats) -> tuple[Floats, Floats]:
-    """Scale (n,) and Cholesky factor, zero above, of the scaled matrix; the ridge grows until it is positive."""
+    """Scale (n,) to unit diagonal and lower Cholesky factor of the scaled matrix, with a ridge that grows until it
+    exists."""
     scale, ridge = 1.0 / np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(np.float64).tiny)), RIDGE
     while True:
         scaled = matrix * scale

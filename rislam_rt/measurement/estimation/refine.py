@@ -1,4 +1,4 @@
-"""Joint refinement of all paths: least squares by Gauss-Newton with the amplitudes eliminated.
+"""Refine all path parameters jointly: least squares by Gauss-Newton steps with the amplitudes eliminated.
 
 Separable least squares (Golub and Pereyra 1973, in Kaufman's form): the amplitudes follow from the parameters, so the
 steps are in the 3 P real parameters alone. The matrix of a step is the Fisher information with the amplitudes as
@@ -20,61 +20,61 @@ PRIOR = np.array([0.0, 2.0, 2.0])
 """Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an
 axis on which the array has no aperture."""
 LARGEST_STEP = np.array([0.3, 0.15, 0.15])
-"""Most that one step may change (B tau, u, v): about a third of a cell, within which the error is nearly quadratic."""
+"""Largest change of (B tau, u, v) by one step: about a third of a cell, within which the error is nearly quadratic."""
 SEARCH_TOLERANCE = 0.3
 """Noise energy that refinement may leave in each path while paths are still looked for."""
 OVERLAP = 0.3
 """Correlation of two signals from which on one is refined along with the other."""
 WORTHWHILE = 0.4
-"""Share of the paths up to which it saves time to refine them alone,"""
+"""Share of moving paths up to which it saves time to refine them alone."""
 FEW = 16
-"""...of more than so many."""
+"""Number of paths above which moving ones are refined alone."""
 HOPE = 2.0
-"""Times what a step promises that is gained in the end, at most: of 411 trials in random rooms 4 gained more than one
-and a half times as much, and none two and a half times."""
+"""Largest ratio of the cost that refinement gains in the end to what one step promises: of 411 trials in random rooms 4
+gained more than 1.5 times as much, and none 2.5 times."""
 DAMPING, LEAST_DAMPING = 1e-3, 1e-6
 """Share of its diagonal that is added to a step's matrix: at first, and at least."""
 
 
 class LeastSquaresFit(NamedTuple):
-    """P paths fitted to samples whose noise has unit variance."""
+    """Least-squares fit of P paths to samples of unit noise variance: parameters, amplitudes, residual energy."""
 
     waves: PathSignals
-    """Their signals."""
+    """Plane-wave signals of the paths."""
     inner: InnerProducts
-    """Inner products of those."""
+    """Inner products of these signals."""
     exact: Complexes | None
-    """(L M, P) their signals without approximations, where the sounding asks for it."""
+    """(L M, P) exact spherical-wave signals of the paths, where the sounding asks for them."""
     seen: Complexes
     """(4, P) `a^H y` and `d^H y` of the samples; where the signals are exact, of the residual."""
     covariance: Floats
-    """(P, P) of the complex amplitudes at known parameters."""
+    """(P, P) covariance of the complex amplitudes at known parameters."""
     amplitude: Complexes
-    """(P,)."""
+    """(P,) complex amplitudes."""
     slopes: Complexes
-    """`d^H r` (3, P) of the residual."""
+    """(3, P) `d^H r` of the residual."""
     energy: float
-    """Of the samples."""
+    """Energy of the samples."""
     cost: float
     """Energy of the residual."""
 
     @property
     def parameters(self) -> Floats:
-        """(P, 3) of (B tau, u, v)."""
+        """Parameters (P, 3) of the fitted paths, (B tau, u, v)."""
         return self.waves.parameters
 
 
 class Accuracy(NamedTuple):
-    """Joint bound at a fit."""
+    """Standard deviations of P fitted paths by their joint Cramér-Rao bound."""
 
     parameters: Floats
-    """(P, 3) standard deviations."""
+    """(P, 3) standard deviations of (B tau, u, v)."""
     amplitude: Floats
     """(P,) standard deviation of the complex amplitude, the other paths' parameters unknown as well."""
 
 
 def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -> LeastSquaresFit:
-    """Amplitudes that fit samples (L, M) best with these path parameters (P, 3): where refinement starts and ends."""
+    """Least-squares fit of the amplitudes of paths with given parameters (P, 3) to samples (L, M)."""
     waves = waves_at(sounding, parameters)
     inner, energy = inner_of(sounding, waves), float(np.vdot(samples, samples).real)
     if sounding.squint:
@@ -83,7 +83,7 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
 
 
 def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: float) -> LeastSquaresFit:
-    """Least-squares fit of amplitudes from the products (4, P) of signals and derivatives with samples of this
+    """Least-squares fit of amplitudes from the correlations (4, P) of signals and derivatives with samples of this
     energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
@@ -94,7 +94,7 @@ def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: floa
 
 
 def _times(matrix: Floats, vector: Complexes) -> Complexes:
-    """A real matrix (n, m) times amplitudes (m,), which need not make the matrix complex for that."""
+    """Product of a real matrix (n, m) and complex amplitudes (m,), without making the matrix complex."""
     parts = np.ascontiguousarray(vector).view(np.float64).reshape(-1, 2)
     return np.asarray((matrix @ parts).view(np.complex128)[:, 0])
 
@@ -102,7 +102,7 @@ def _times(matrix: Floats, vector: Complexes) -> Complexes:
 def _exact_fit(
     sounding: Sounding, waves: PathSignals, inner: InnerProducts, samples: Complexes, energy: float
 ) -> LeastSquaresFit:
-    """Least-squares fit of amplitudes with the exact spherical signals of `waves.wave_signals`."""
+    """Least-squares fit of amplitudes to samples (L, M) with the paths' exact spherical-wave signals."""
     exact = wave_signals(sounding, waves.parameters)
     products = exact.conj().T @ exact + RIDGE * sounding.num_samples * np.eye(exact.shape[1])
     amplitude = np.asarray(np.linalg.solve(products, exact.conj().T @ samples.ravel()), dtype=np.complex128)
@@ -113,7 +113,7 @@ def _exact_fit(
 
 
 def subset_fit(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples: Complexes) -> LeastSquaresFit:
-    """The fit of some of the refined paths alone."""
+    """Least-squares fit of some of a fit's paths alone."""
     if fit.exact is not None:
         return fit_amplitudes(sounding, fit.parameters[keep], samples)
     return _fit(fit.waves.take(keep), fit.inner.take(keep), fit.seen[:, keep], fit.energy)
@@ -122,7 +122,7 @@ def subset_fit(sounding: Sounding, fit: LeastSquaresFit, keep: Booleans, samples
 def residual_fit(
     sounding: Sounding, fit: LeastSquaresFit, rows: Integers, samples: Complexes
 ) -> tuple[LeastSquaresFit, Complexes]:
-    """The fit of some paths to the samples less all the others, for refining them alone; and those (L, M)."""
+    """Fit of some paths to the samples less all other paths, for refining them alone; and those samples (L, M)."""
     others = np.ones(len(fit.amplitude), dtype=bool)
     others[rows] = False
     local = samples - contribution(fit, others, samples)
@@ -138,12 +138,12 @@ def residual_fit(
 
 
 def residual(fit: LeastSquaresFit, samples: Complexes) -> Complexes:
-    """Samples (L, M) less the fitted paths, in which more are detected."""
+    """Residual (L, M) of the samples after subtracting all fitted paths."""
     return samples - contribution(fit, np.arange(len(fit.amplitude)), samples)
 
 
 def contribution(fit: LeastSquaresFit, rows: Integers | Booleans, samples: Complexes) -> Complexes:
-    """What some of the fitted paths add to the samples (L, M)."""
+    """Signal (L, M) of some of the fitted paths."""
     if fit.exact is not None:
         return np.asarray((fit.exact[:, rows] @ fit.amplitude[rows]).reshape(samples.shape))
     return fit.waves.take(rows).sum(fit.amplitude[rows])
@@ -158,7 +158,7 @@ def refine(
     tolerance: float = SEARCH_TOLERANCE,
     enough: float = 0.0,
 ) -> LeastSquaresFit:
-    """Refine path parameters by up to so many damped Gauss-Newton steps.
+    """Refine path parameters by up to `steps` damped Gauss-Newton steps.
 
     They end when one promises less than `tolerance` of noise energy from every path; with `enough`, also when the cost
     has come below it, or will not: if every step left gained as much as the last, or twice what the next promises.
@@ -203,7 +203,7 @@ def refine_some(
     steps: int,
     tolerance: float = SEARCH_TOLERANCE,
 ) -> LeastSquaresFit:
-    """Refine some paths, the others held."""
+    """Refine the parameters of some paths by Gauss-Newton steps, the other paths held."""
     begun, local = residual_fit(sounding, fit, rows, samples)
     some = refine(sounding, begun, local, steps=steps, tolerance=tolerance)
     parameters = fit.parameters.copy()
@@ -212,22 +212,21 @@ def refine_some(
 
 
 def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Integers:
-    """Rows of the paths that overlap with chosen ones (P,) and are refined along with them."""
+    """Rows of the paths whose signals overlap with those of chosen ones (P,), these included."""
     return np.flatnonzero((np.abs(fit.inner.signal[:, chosen]) > OVERLAP * sounding.num_samples).any(axis=1))
 
 
 def accuracy(fit: LeastSquaresFit) -> Accuracy:
-    """Accuracy of refined paths: joint bound of parameters and amplitudes; enormous where paths cannot be told
-    apart."""
+    """Standard deviations of a fit's parameters and amplitudes by their joint bound; enormous where paths cannot be
+    resolved."""
     information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
     deviations = np.sqrt((whitened(information, np.eye(len(information))) ** 2).sum(axis=0)).reshape(3, -1).T
     return Accuracy(deviations, np.sqrt(amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)))
 
 
 def joint_bound(inner: InnerProducts, amplitude: Complexes) -> tuple[Floats, Floats]:
-    """Covariance (3P, 3P) of the parameters, parameter by parameter, and variance (P,) of the complex amplitudes.
-
-    At unit noise, everything unknown.
+    """Joint Cramér-Rao bound of P paths at unit noise: covariance (3P, 3P) of the parameters, parameter by parameter,
+    and variance (P,) of the complex amplitudes.
     """
     known = inverse(inner.signal)
     information = 2.0 * information_matrix(inner, known, amplitude)
@@ -235,9 +234,9 @@ def joint_bound(inner: InnerProducts, amplitude: Complexes) -> tuple[Floats, Flo
 
 
 def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes, information: Floats) -> Floats:
-    """Variance (P,) of refined complex amplitudes: what is `known` (P, P) of them at given parameters, and by those.
+    """Variance (P,) of complex amplitudes when the parameters are unknown as well, of Fisher information (3P, 3P).
 
-    That information is the full one (3P, 3P); of the parameters' covariance no more is worked out than is asked for.
+    `known` (P, P) is the amplitudes' covariance at given parameters.
     """
     count = len(amplitude)
     follow = (known @ inner.mixed.reshape(count, 3 * count)).reshape(count, 3, count)
@@ -246,7 +245,8 @@ def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes
 
 
 def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
-    """(P,) which paths are left when those go, the most idle first, without which the cost grows by less than that.
+    """Which paths (P,) to keep when those are dropped, one by one, without which the cost grows by less than the
+    threshold.
 
     The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
     """
@@ -280,5 +280,5 @@ def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Comp
 
 
 def _limited(step: Floats) -> Floats:
-    """A refining step (3P,) as (P, 3), no path moving further than the model holds."""
+    """Clip a Gauss-Newton step (3P,) to `LARGEST_STEP` for each path (P, 3)."""
     return np.clip(step.reshape(3, -1).T, -LARGEST_STEP, LARGEST_STEP)

@@ -1,7 +1,7 @@
-"""Soundings as the estimator sees them, and the response of a band to delays.
+"""Sounding: frequencies of the tones and positions of the antennas that the estimator knows, and the tones' response.
 
 A path's parameters are `(B tau, u, v)`: delay in resolution cells and the two direction cosines. Its signal of unit
-amplitude is `a = a_f(B tau) x a_x(u) x a_y(v)`, a product over tones, rows and columns (`inner`).
+amplitude is `a = a_f(B tau) x a_x(u) x a_y(v)`, a product over tones, rows and columns (`inner_products`).
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from rislam_rt.waveform import subcarrier_frequencies
 
 
 class Sounding(NamedTuple):
-    """What the estimator knows of the samples that it works on."""
+    """Sounding as the estimator knows it: frequencies of the tones and positions of the array's elements."""
 
     frequency: Floats
     """(M,) tones over the bandwidth, in [-1/2, 1/2]."""
@@ -23,24 +23,23 @@ class Sounding(NamedTuple):
     col: Floats
     """(C,) element positions along body y [wavelengths]."""
     squint: float
-    """Bandwidth over carrier where every element has its own delay (`waves`), else 0."""
+    """Bandwidth over carrier where every element has its own delay (`spherical_waves`), else 0."""
 
     @property
     def num_samples(self) -> int:
-        """L M: energy of a path's signal of unit amplitude."""
+        """Number of samples L M, which is the energy of a path's signal of unit amplitude."""
         return len(self.frequency) * len(self.row) * len(self.col)
 
 
 def build_sounding(num_tones: int, radio: RadioConfig, *, element_exact: bool = False) -> Sounding:
-    """The sounding of a radio: tones, and element positions of its array."""
+    """Sounding of a radio: frequencies of `num_tones` tones, and element positions of its array."""
     x = radio.array.positions(1.0).reshape(radio.array.rows, radio.array.cols, 3)
     squint = radio.bandwidth / radio.carrier if element_exact else 0.0
     return Sounding(subcarrier_frequencies(num_tones, 1.0), x[:, 0, 0], x[0, :, 1], squint)
 
 
 def tone_response(frequency: Floats, delay: Floats) -> Complexes:
-    """Response of a sounding's tones to delays, `exp(-j 2 pi f tau)` (M, P); by coarse and fine factors if evenly
-    spaced."""
+    """Response (M, P) of evenly spaced tones to delays, `exp(-j 2 pi f tau)`, by coarse and fine factors."""
     count = len(frequency)
     fine = next(size for size in range(int(np.sqrt(count)), 0, -1) if count % size == 0)
     coarse = phasor(-2.0 * np.pi * frequency[::fine, None] * delay)

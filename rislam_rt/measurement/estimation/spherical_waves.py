@@ -1,7 +1,7 @@
-"""Signals of single paths without the plane-wave and narrow-band approximations, for wide bands and near walls.
+"""Spherical-wave signals of paths without the plane-wave and narrow-band approximations, for wide bands and near walls.
 
 At 1 GHz around 10 GHz the phase across four elements changes by a few tenths of a radian from one end of the band to
-the other, and a wall a metre away bends the wave front by as much: the products of `atoms` then leave a hundredth of a
+the other, and a wall a metre away bends the wave front by as much: `inner_products` then leave a hundredth of a
 wall's energy behind, which is 40 dB above a panel's. Here every element has its own delay. The wave front's radius is
 taken as the whole path, true of leakage and wall returns, the only ones strong enough to matter.
 """
@@ -12,11 +12,11 @@ from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.measurement.estimation.sounding import Sounding, tone_response
 
 SHORTEST_RADIUS = 0.5
-"""Radius of the wave front [wavelengths] below which it is not followed."""
+"""Smallest radius of a wave front [wavelengths]; smaller ones are taken for this."""
 
 
 def wave_signals(sounding: Sounding, parameters: Floats) -> Complexes:
-    """Signals (L M, P) of P paths (P, 3), antenna by antenna, of unit amplitude at the array's centre."""
+    """Spherical-wave signals (L M, P) of paths (P, 3), antenna by antenna, of unit amplitude at the array's centre."""
     excess = _excess(sounding, parameters)
     delay = parameters[:, 0] + sounding.squint * excess
     tones = tone_response(sounding.frequency, delay.ravel()).reshape(len(sounding.frequency), *excess.shape)
@@ -25,7 +25,7 @@ def wave_signals(sounding: Sounding, parameters: Floats) -> Complexes:
 
 
 def correlate_waves(sounding: Sounding, waves: Complexes, samples: Complexes) -> tuple[Complexes, Complexes]:
-    """Spherical waves correlated with samples (L, M): `a^H y` (P,) and `d^H y` (3, P)."""
+    """Correlate spherical-wave signals and their derivatives with samples (L, M): `a^H y` (P,) and `d^H y` (3, P)."""
     product = waves.conj() * samples.reshape(-1, 1)
     x, y = (part.ravel() for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
     stretch = 1.0 + sounding.squint * sounding.frequency
@@ -35,7 +35,7 @@ def correlate_waves(sounding: Sounding, waves: Complexes, samples: Complexes) ->
 
 
 def _excess(sounding: Sounding, parameters: Floats) -> Floats:
-    """How much longer (L, P) [wavelengths] the path to each element is than that to the array's centre."""
+    """Excess length (L, P) [wavelengths] of each path to each element over that to the array's centre."""
     x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
     radius = np.maximum(parameters[:, 0] / sounding.squint, SHORTEST_RADIUS)
     along = x * parameters[:, 1] + y * parameters[:, 2]

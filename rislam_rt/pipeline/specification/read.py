@@ -15,6 +15,7 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
+from rislam_rt.wanted import wanted
 
 MAX_BYTES = 1_000_000
 """Largest size [bytes] of a pipeline file; anything larger is another file by mistake."""
@@ -122,12 +123,7 @@ def build_spec(table: Table, model: type[Spec], check: Callable[[Spec], object])
         items = error.errors(include_url=False, include_context=False)
         items = [item for item in items if item["loc"] == ("kind",)] or items  # a file of another kind has other keys
         items = [item for item in items if item["type"] == "missing" or _is_said(content, item["loc"])] or items
-        raise ConfigError(
-            *(
-                f"{_source(path, _place(item), changed, item['type'] == 'extra_forbidden')}: {_remark(item, model)}"
-                for item in items
-            )
-        ) from None
+        raise ConfigError(*(_line(path, item, changed, model) for item in items)) from None
     try:
         check(spec)
     except ConfigError as error:
@@ -193,7 +189,13 @@ def _place(item: Any) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")[:100]
 
 
-def _remark(item: Any, model: type[BaseModel]) -> str:
+def _line(path: Path, item: Any, changed: Sequence[str], model: type[BaseModel]) -> str:
+    """Line for one validation error: the file, or the command line that set the key, and the message."""
+    source = _source(path, _place(item), changed, item["type"] == "extra_forbidden")
+    return f"{source}: {_remark(item, model, source == '--set')}"
+
+
+def _remark(item: Any, model: type[BaseModel], typed: bool) -> str:
     """Message for one validation error of a pipeline's settings: key, value received, how to mend it."""
     place = _place(item)
     if item["type"] == "missing":
@@ -201,10 +203,10 @@ def _remark(item: Any, model: type[BaseModel]) -> str:
     if item["type"] == "extra_forbidden":
         near = _near_key([str(part) for part in item["loc"]], model)
         return f"{place}: unknown key; {did_you_mean(near) or 'remove it or mend its name'}"
-    message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     if isinstance(item["input"], dict):
+        message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
         return f"{place}: {message}" if place else message
-    return f"{place}: {str(item['input'])[:60]!r} received; {message[:1].lower()}{message[1:]}"
+    return f"{place}: {str(item['input'])[:60]!r} received; {wanted(item, typed)}"
 
 
 def _is_said(content: Any, place: tuple[Any, ...]) -> bool:

@@ -18,22 +18,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.specification.section import Choices
 from rislam_rt.pipeline.specification.spec import RECORDS
 from rislam_rt.spelling import did_you_mean, nearest
-
-UNITS = {
-    "_m_s2": "m/s^2",
-    "_m_s": "m/s",
-    "_bits_s": "bit/s",
-    "_ns_s": "ns/s",
-    "_ghz": "GHz",
-    "_db": "dB",
-    "_deg": "degrees",
-    "_ns": "ns",
-    "_s": "s",
-    "_m": "m",
-    "_j": "J",
-    "_wavelengths": "wavelengths",
-}
-"""Units of settings by suffix of the name; the first that fits. Without a suffix the meaning states the unit."""
+from rislam_rt.wanted import unit_of
 
 LARGEST = 2.0**40
 """Largest number tried for the end of a setting's range; a range that includes it counts as unlimited."""
@@ -89,6 +74,10 @@ def explain(settings: list[Setting], key: str) -> Setting:
 
 def _near(key: str, keys: list[str]) -> str:
     """Hint at settings with a key like an unknown one."""
+    inside = [one for one in keys if key and key in one]
+    if inside:
+        more = f" and {len(inside) - 6} more" if len(inside) > 6 else ""
+        return f"there are {', '.join(inside[:6])}{more}"
     ends = [one for one in keys if nearest(key.rpartition(".")[2], [one.rpartition(".")[2]])]
     return did_you_mean(nearest(key, keys, 3) or ends[:3]) or "`rislam-rt config` lists them all"
 
@@ -97,10 +86,11 @@ def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -
     """Default, range, unit and meaning of one field of a typed model."""
     owner, record = _owner(model, name)
     meaning = _meanings(record or owner).get(name, "")
-    unit = next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     allowed = _of_constraints(field) or (_of_record(record, name) if record else "")
-    return Setting(f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit, meaning)
+    return Setting(
+        f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit_of(name), meaning
+    )
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:

@@ -217,7 +217,7 @@ class PipelineSpec(Section):
     description: str = ""
     """Text for readers alone."""
     scene: str | None = None
-    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 7
     """Seed of every random draw; the same seed gives the same result."""
     cycles: Count | None = None

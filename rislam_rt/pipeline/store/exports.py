@@ -11,6 +11,8 @@ from rislam_rt.storage.files import json_file
 from rislam_rt.toml import toml_bytes
 
 SUMMARY_FILE = "summary.json"
+ROOM = "scene"
+"""Folder of an exported room; the exported configuration names it, so that the run can be repeated from its folder."""
 
 
 def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
@@ -25,8 +27,9 @@ def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, by
 def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
     """Exported files of a run by name that do not grow with its cycles: maps, configuration, scores and scene."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
-    files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(_without_none({**result.config}))}
-    files |= {f"scene/{name}": content for name, content in scene_files(scene).items()}
+    settings = _without_none({**result.config, "scene": ROOM})
+    files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(settings)}
+    files |= {f"{ROOM}/{name}": content for name, content in scene_files(scene).items()}
     return files | {SUMMARY_FILE: json_file(summary, indent=2)}
 
 

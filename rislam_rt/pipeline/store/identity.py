@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene.file_names import safe_name
-from rislam_rt.storage.seal import SCHEMA, checksum
+from rislam_rt.storage.seal import SCHEMA, checksum, flatten
 
 SHORT = 8
 """Number of the hash's digits in a run folder's name; the marker file inside has all of them."""
@@ -46,7 +46,7 @@ class RunIdentity(NamedTuple):
 
     def difference(self, other: Mapping[str, Any]) -> str:
         """Describe the first setting in which another run differs, as `key is A there and B here`."""
-        here, there = dict(_flat(self.content)), dict(_flat(other))
+        here, there = dict(flatten(self.content)), dict(flatten(other))
         for key in sorted(here):
             if here[key] != there.get(key):
                 return f"{key} is {str(there.get(key))[:40]} there and {str(here[key])[:40]} here"
@@ -84,12 +84,3 @@ def code_digest(root: Path = Path(__file__).parents[2]) -> str:
             digest.update(f"{'/'.join(parts)}\0{len(data)}\0".encode())
             digest.update(data)
     return digest.hexdigest()
-
-
-def _flat(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Entries of nested tables with dotted keys."""
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value

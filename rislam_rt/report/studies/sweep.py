@@ -8,7 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.report.style import save_figure, scheme_colour, styled
+from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.pipeline_sweep import SchemeScore
+from rislam_rt.wanted import unit_of
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LINES = ("-", "--", ":", "-.")
@@ -51,7 +53,9 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
         if not numeric:
             axis.set_xticks(range(len(ticks)), ticks)
         axis.set_yscale("log")
-        axis.set_xlabel(along or "scheme")
+        mark_metres(axis.yaxis)
+        unit = unit_of(along)
+        axis.set_xlabel((f"{along} [{unit}]" if unit else along) or "scheme")
         axis.set_ylabel("RMSE of the agent's position [m]")
         runs = sorted({len(score.rmse) for score in scores})
         axis.set_title(

@@ -1,4 +1,4 @@
-"""The scene check: what the tracer would accept in silence and answer with nonsense."""
+"""The scene check: errors and warnings of rooms that the tracer would accept in silence and answer with nonsense."""
 
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
@@ -14,7 +14,7 @@ __all__ = ["find_errors", "find_warnings", "material_errors"]
 
 
 def find_errors(scene: Scene, file: str) -> list[Finding]:
-    """What makes a scene unusable. Damaged meshes hide the rest, which could not be computed."""
+    """Find what makes a scene unusable. Damaged meshes hide the rest, which could not be computed."""
     room = build_triangle_array(scene, file)
     return [*name_errors(room), *face_errors(room), *occluder_face_errors(room)] or [
         *scatterer_errors(room),
@@ -25,7 +25,7 @@ def find_errors(scene: Scene, file: str) -> list[Finding]:
 
 
 def find_warnings(scene: Scene, file: str, radio: RadioConfig) -> list[Finding]:
-    """What may be meant but seldom is, and what is worth knowing, of a scene whose meshes are not damaged."""
+    """Find what may be meant but seldom is, and what is worth knowing, of a scene whose meshes are not damaged."""
     room = build_triangle_array(scene, file)
     return [
         *mesh_warnings(room),

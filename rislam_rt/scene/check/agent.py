@@ -1,4 +1,4 @@
-"""Scene check, the agent's part: where it starts, what it runs into, what it could never hear."""
+"""Scene check of the agent: where it starts, what it runs into, what it could never receive."""
 
 from collections.abc import Iterator
 
@@ -12,14 +12,15 @@ from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NUM_PROBES = 400
-"""Rays cast from the start to look for holes: one of 0.03 sr, 30 cm wide at 2 m, is found."""
+"""Rays cast from the agent's start to look for holes of the room: one of 0.03 sr, 30 cm wide at 2 m, is found."""
 
 MAX_SPEED = 10.0
-"""[m/s] Indoors, more is a wrong unit."""
+"""Largest speed [m/s] of an agent indoors; more is a wrong unit."""
 
 
 def agent_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Start or path outside the meshes' bounds, on a surface, inside an object, or through a wall."""
+    """Scene check: errors of an agent whose start or path lies outside the meshes' bounds, on a surface, inside an
+    object, or through a wall."""
     motion = room.scene.agent
     places = {"agent": motion.position, "Tx": motion.tx, "Rx": motion.rx}
     for part, points in places.items():
@@ -34,7 +35,8 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """An open room, a speed in wrong units, scatterers inside objects or below an array that looks up."""
+    """Scene check: warnings of an open room, of a speed in wrong units, of scatterers inside objects or below an array
+    that looks up."""
     motion = room.scene.agent
     directions = sphere_directions(NUM_PROBES)
     lost = ray_hits(motion.position[0], directions, room.triangles) < 0
@@ -58,6 +60,7 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
 
 
 def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Finding]:
+    """Scene check: error of an agent, Tx or Rx that lies on a surface."""
     for part, points in places.items():
         cycles, near = touching(points, room.triangles, MIN_CLEARANCE)
         if len(cycles):
@@ -67,6 +70,7 @@ def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Find
 
 
 def _through_wall(room: TriangleArray) -> Iterator[Finding]:
+    """Scene check: error of an agent whose path goes through a surface, or that has one between Tx and Rx."""
     motion = room.scene.agent
     cycles, walls = crossings(motion.position[:-1], motion.position[1:], room.triangles)
     if len(cycles):
@@ -80,7 +84,8 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _inside_object(room: TriangleArray) -> Iterator[Finding]:
-    """Whether the agent's start is inside an object: the path crosses no surface, or that was found before."""
+    """Scene check: error of an agent whose start is inside an object; the path crosses no surface, or that was found
+    before."""
     start = room.scene.agent.position[0]
     name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:
@@ -88,7 +93,7 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Name of an object around the agent's start, if any.
+    """Name of the reflector of an object around a point (3,); empty if there is none.
 
     An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger
     building is none, has none of the points `holding` (H, 3) in it.
@@ -110,9 +115,10 @@ def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
 
 
 def _where(part: str, cycle: int, points: Floats) -> str:
+    """Position of a part of the agent at a cycle, in words for a finding of the scene check."""
     return f"{part} at {np.round(points[cycle], 4).tolist()} (cycle {cycle})"
 
 
 def _field(cycle: int) -> str:
-    """The key that says where the agent is at a cycle; how it moves on, several can say."""
+    """Key of the scene file that says where the agent is at a cycle; how it moves on, several can say."""
     return "agent.start" if cycle == 0 else "agent"

@@ -1,4 +1,4 @@
-"""Scene check, the materials' part: specified at the radio's carrier."""
+"""Scene check of materials: whether they are specified at the radio's carrier."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from rislam_rt.scene.findings import Finding
 
 
 def material_errors(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Finding]:
-    """ITU-R P.2040 materials that say nothing at the carrier."""
+    """Scene check: errors of reflectors whose ITU-R P.2040 material is not specified at the carrier."""
     ghz = radio.carrier / 1e9
     for number, reflector in enumerate(scene.reflectors):
         name = reflector.material.itu

@@ -1,4 +1,5 @@
-"""Queries to a mesh's triangle array: what is near, what is crossed, what does a ray hit, what encloses a point."""
+"""Geometric queries to a mesh's triangle array: which triangles are near a point, which a segment crosses, which a ray
+hits, and whether a surface encloses a point."""
 
 from collections.abc import Iterator
 
@@ -8,7 +9,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.triangles import edge_planes, triangle_planes
 
 _CHUNK = 2_000_000
-"""Point-triangle pairs looked at in one go: 16 MB an array."""
+"""Point-triangle pairs that a query works out in one go: 16 MB an array."""
 
 
 def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
@@ -24,7 +25,8 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
 
 
 def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
-    """Pairs (segment, triangle) where a segment (K, 3) to (K, 3) passes through a triangle (T, 3, 3)."""
+    """Pairs (segment, triangle) where a segment from `start` (K, 3) to `end` (K, 3) passes through a triangle (T, 3,
+    3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -39,7 +41,8 @@ def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, 
 
 
 def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float = 1e-6) -> Integers:
-    """The nearest triangle (D,) that rays from one point (3,) along unit vectors (D, 3) hit, -1 for none.
+    """Index (D,) of the nearest triangle (T, 3, 3) that each ray from one point (3,) along unit vectors (D, 3) hits, -1
+    for none.
 
     `slack` [m] widens every triangle, so that no ray slips through the seam between two.
     """
@@ -61,7 +64,7 @@ def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float
 
 
 def winding(point: Floats, triangles: Floats) -> float:
-    """How often a surface (T, 3, 3) winds around a point (3,): 1 or -1 inside a closed one, 0 outside.
+    """Winding number of a surface of triangles (T, 3, 3) around a point (3,): 1 or -1 inside a closed one, 0 outside.
 
     Sum of solid angles (van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 1983); an object that lacks its bottom
     still gives more than one half inside.
@@ -75,7 +78,7 @@ def winding(point: Floats, triangles: Floats) -> float:
 
 
 def sphere_directions(count: int) -> Floats:
-    """Unit vectors (count, 3) for mesh queries all round, spread evenly (Fibonacci lattice)."""
+    """Unit vectors (count, 3) of rays in all directions, spread evenly over the sphere (Fibonacci lattice)."""
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     phi = k * np.pi * (3.0 - np.sqrt(5.0))
@@ -84,16 +87,20 @@ def sphere_directions(count: int) -> Floats:
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
-    """Distance (S,) [m] of mesh points (S, 3) from the nearest edge line of their own triangle: positive inside."""
+    """Distance (S,) [m] of points (S, 3) from the nearest edge line of the triangle that each is tested against:
+    positive inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
 
 
 def _blocks(rows: int, columns: int) -> Iterator[slice]:
+    """Slices of the rows of a point-triangle table that are worked out in one go, each of no more than `_CHUNK`
+    pairs."""
     step = max(1, _CHUNK // max(columns, 1))
     return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
 
 def _joined(found: list[tuple[Integers, Integers]]) -> tuple[Integers, Integers]:
+    """Index pairs found in all blocks of a query, as two arrays."""
     none = np.zeros(0, dtype=np.int64)
     return np.concatenate([none, *(k for k, _ in found)]), np.concatenate([none, *(t for _, t in found)])

@@ -1,4 +1,4 @@
-"""Scene check, the part of meshes and point scatterers: names, degenerate and doubled faces, size, place."""
+"""Scene check of meshes and point scatterers: names, degenerate and doubled faces, size, place."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from rislam_rt.scene.findings import Finding
 
 
 def name_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Check meshes for two parts of one name."""
+    """Scene check: errors of reflectors, occluders or landmarks that have one name."""
     names = [r.name for r in room.scene.reflectors] + list(room.scene.landmarks)
     names += [shade.name for shade in room.scene.occluders]
     for name, count in Counter(names).items():
@@ -20,13 +20,13 @@ def name_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Check meshes for faces without area."""
+    """Scene check: errors of reflectors with faces without area."""
     for number, reflector in enumerate(room.scene.reflectors):
         yield from room.degenerate(f"reflector[{number}].mesh ({reflector.name})", reflector.triangles)
 
 
 def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Outside the meshes' bounds, on a surface, or larger than the room."""
+    """Scene check: errors of point scatterers outside the meshes' bounds, on a surface, or larger than the room."""
     diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     for number, scatterer in enumerate(room.scene.scatterers):
         field, at = f"scatterer[{number}].position ({scatterer.name})", scatterer.position
@@ -44,12 +44,13 @@ def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
-    """Check meshes for a size in wrong units and for doubled faces."""
+    """Scene check: warnings of meshes with a size in wrong units, and of doubled faces."""
     yield from _size(room)
     yield from _coincident(room)
 
 
 def _size(room: TriangleArray) -> Iterator[Finding]:
+    """Scene check: warning of a room so large or so small that it is in wrong units."""
     diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
         guess = "millimetres" if diagonal > 200.0 else "kilometres"
@@ -59,7 +60,7 @@ def _size(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _coincident(room: TriangleArray) -> Iterator[Finding]:
-    """Doubled faces of one mesh; those of two meshes are for the check of walls."""
+    """Scene check: warning of doubled faces of one mesh; those of two meshes are for the check of walls."""
     corners = np.round(room.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)

@@ -1,4 +1,5 @@
-"""Scene check of occluders, scatterers that hide things: sound meshes, nothing inside but their own centre."""
+"""Scene check of occluders: sound meshes, no landmark inside but the centre of their own scatterer, and not the
+agent."""
 
 from collections.abc import Iterator
 
@@ -12,13 +13,14 @@ from rislam_rt.scene.findings import Finding
 
 
 def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Check occluders for faces without area."""
+    """Scene check: errors of occluders with faces without area."""
     for field, _, shade in _occluders(room):
         yield from room.degenerate(field, shade.triangles)
 
 
 def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
-    """A mesh that is not about its own scatterer, that encloses another landmark, or that the agent runs into."""
+    """Scene check: errors of an occluder that is not about its own scatterer, that encloses another landmark, or that
+    the agent runs into."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
     for field, number, shade in _occluders(room):
         inside = _inside(marks, shade)
@@ -39,7 +41,8 @@ def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """A cylinder whose far field the agent is not in: its cross-section is one for plane waves."""
+    """Scene check: warnings of a cylinder whose far field the agent is not in, as its cross-section is one for plane
+    waves."""
     motion = room.scene.agent
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.law != "cylinder" or scatterer.height is None:
@@ -54,7 +57,8 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
 
 
 def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
-    """Field and shade of every scatterer that has one, with its number, and of those that stand alone."""
+    """Field of the scene file, number of the scatterer (None for those that stand alone), and mesh of every
+    occluder."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade
@@ -63,12 +67,13 @@ def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]
 
 
 def _inside(points: Floats, shade: Occluder) -> Booleans:
-    """Which points (N, 3) an occluder encloses."""
+    """Whether (N,) points (N, 3) lie inside an occluder."""
     return np.array([abs(winding(point, shade.triangles)) > 0.5 for point in points], dtype=np.bool_)
 
 
 def _enters(points: Floats, shade: Occluder) -> int | None:
-    """First cycle of a track (K, 3) that begins inside an occluder, or after which it crosses its mesh."""
+    """First cycle of the agent's track (K, 3) that begins inside an occluder, or after which it crosses its mesh; None
+    if it never does."""
     if _inside(points[:1], shade)[0]:
         return 0
     cycles, _ = crossings(points[:-1], points[1:], shade.triangles)

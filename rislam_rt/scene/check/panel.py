@@ -1,4 +1,4 @@
-"""Scene check, the panels' part: on their hosts, facing the room, clear of each other, plausible for the radio."""
+"""Scene check of RIS panels: on their hosts, facing the room, clear of each other, plausible for the radio."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -13,11 +13,12 @@ from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding, panel_key
 
 MAX_TURN = 1e-2
-"""[rad] Largest angle between panel and host."""
+"""Largest angle [rad] between the normals of a RIS panel and of its host."""
 
 
 def panel_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Outside the bounds, off its host, facing out of the room, or over another panel."""
+    """Scene check: errors of a RIS panel outside the bounds, off its host, facing out of the room, or over another
+    panel."""
     for panel, key in _keyed(room):
         at = panel.center
         tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
@@ -36,7 +37,8 @@ def panel_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """Never seen from the front; reflecting more than a plate; ambiguous; delay spread above 1 / B."""
+    """Scene check: warnings of a RIS panel that the agent is never in front of, that reflects more than a plate, whose
+    beams are ambiguous, or with a delay spread above 1 / B."""
     for panel, key in _keyed(room):
         spec, motion = panel.spec, room.scene.agent
         if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
@@ -44,20 +46,22 @@ def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
                 f"{key}.normal", "the agent is never in front of the panel", "turn the panel or the path"
             )
         yield from _implausible(room, panel, key, radio)
+        yield from _beyond_room(room, panel, key)
         spread = _delay_spread(room, panel)
         if spread * radio.bandwidth > 1.0:
-            message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than 1/B"
+            limit = f"1 / B = {1e9 / radio.bandwidth:g} ns"
+            message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than {limit}"
             yield room.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
 
 
 def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:
-    """The panels, each with its key in the scene file."""
+    """All RIS panels of a room, each with its key in the scene file."""
     panels = room.scene.panels
     return [(panel, panel_key(number, len(panels))) for number, panel in enumerate(panels)]
 
 
 def _overlap(one: RisPanel, other: RisPanel) -> bool:
-    """Whether two panels look the same way from one plane and share a part of it: no axis of either separates them."""
+    """Whether two RIS panels overlap: they look the same way from one plane, and no axis of either separates them."""
     gap = other.center - one.center
     if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > MIN_CLEARANCE:
         return False
@@ -70,7 +74,8 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
 
 
 def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
-    """Check a panel for reflecting more than a plate, and for elements so far apart that beams are ambiguous."""
+    """Scene check: warnings of a RIS panel that reflects more than a perfect plate, or whose elements are so far apart
+    that beams are ambiguous."""
     spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
@@ -86,8 +91,20 @@ def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioCon
         yield room.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
+def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
+    """Scene check: warning of a RIS panel that reaches beyond the bounds of the room."""
+    spec = panel.spec
+    sides = spec.spacing * [spec.cols, spec.rows]
+    half = 0.5 * (sides[0] * np.abs(spec.right) + sides[1] * np.abs(spec.up))
+    low, high = room.bounds
+    over = float(np.maximum(low - (panel.center - half), panel.center + half - high).max())
+    if over > MIN_CLEARANCE:
+        message = f"the panel of {sides[0]:.3g} m x {sides[1]:.3g} m reaches {over:.3g} m beyond the room"
+        yield room.warning(f"{key}.rows", message, "take fewer elements, put them closer, or move its center")
+
+
 def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """Whether a panel lies on the wall that is named as its host, and flat on it."""
+    """Scene check: errors of a RIS panel that does not lie flat on the wall that is named as its host."""
     names = [r.name for r in room.scene.reflectors]
     _, near = touching(panel.center[None], room.triangles, MIN_CLEARANCE)
     behind = sorted({room.name(int(t)) for t in near})
@@ -117,14 +134,16 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
 
 
 def _gap(room: TriangleArray, panel: RisPanel) -> float:
-    """Distance [m] of a panel from the nearest plane of its host."""
+    """Distance [m] of a RIS panel from the nearest plane of its host."""
     host = [r.name for r in room.scene.reflectors].index(panel.host or "")
     normal, offset = triangle_planes(room.triangles[room.owner == host])
     return float(np.abs(normal @ panel.center - offset).min())
 
 
 def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
+    """Scene check: error of a RIS panel that faces out of the room.
+
+    The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
     agent is before it, in a room that is open there (a street).
     """
     ahead, behind = (
@@ -138,7 +157,7 @@ def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]
 
 
 def _delay_spread(room: TriangleArray, panel: RisPanel) -> float:
-    """Delay spread over a panel [s]: largest difference over elements of Tx, element, Rx, at 50 cycles."""
+    """Delay spread over a RIS panel [s]: largest difference over elements of Tx, element, Rx, at 50 cycles."""
     motion = room.scene.agent
     cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))
     corners = panel.spec.offsets()[:: max(panel.spec.rows - 1, 1), :: max(panel.spec.cols - 1, 1)].reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""All triangles of a scene as one array, and the limits that every part of the check shares."""
+"""All triangles of a scene as one array, from which every part of the scene check works."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,62 +11,63 @@ from rislam_rt.model import Scene
 from rislam_rt.scene.findings import Finding
 
 MIN_CLEARANCE = 1e-3
-"""[m] A device or scatterer nearer to a surface loses that surface's reflection."""
+"""Least distance [m] of a device or scatterer from a surface: a nearer one loses that surface's reflection."""
 
 
 MIN_ALTITUDE = 1e-6
-"""[m] A triangle with a smaller height has no usable normal."""
+"""Least height [m] of a triangle: one with a smaller height has no usable normal."""
 
 
 class TriangleArray(NamedTuple):
-    """All triangles of a scene, and whose they are."""
+    """All triangles of a scene's reflectors, the reflector that each belongs to, and their bounds."""
 
     file: str
+    """Path of the scene file, for findings."""
     scene: Scene
     triangles: Floats
     """(T, 3, 3) [m]."""
     owner: Integers
-    """(T,) reflector of each triangle."""
+    """(T,) number of the reflector of each triangle."""
     bounds: Floats
-    """(2, 3) [m]."""
+    """(2, 3) [m] lowest and highest corner."""
 
     def name(self, triangle: int) -> str:
-        """Name of the reflector a triangle belongs to."""
+        """Name of the reflector that a triangle of the scene belongs to."""
         return self.scene.reflectors[self.owner[triangle]].name
 
     def outside(self, points: Floats) -> Integers:
-        """Indices of those points (K, 3) that lie outside the triangles' bounds."""
+        """Indices of those points (K, 3) that lie outside the bounds of a scene's triangles."""
         low, high = self.bounds
         return np.flatnonzero(((points < low) | (points > high)).any(axis=-1))
 
     @property
     def box(self) -> str:
-        """The triangles' bounds in words."""
+        """Bounds of a scene's triangles in words."""
         low, high = np.round(self.bounds, 3).tolist()
         return f"{low} to {high}"
 
     def degenerate(self, field: str, triangles: Floats) -> Iterator[Finding]:
-        """An error at a mesh, triangles (T, 3, 3), that has faces without area."""
+        """Scene check: error of a mesh, triangles (T, 3, 3), that has faces without area."""
         bad = without_area(triangles)
         if bad.any():
             message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
             yield self.error(field, message, "remove degenerate faces from the mesh")
 
     def error(self, field: str, message: str, mend: str) -> Finding:
-        """An error at a key of the scene file."""
+        """Make an error of the scene check at a key of the scene file."""
         return Finding("error", self.file, field, message, mend)
 
     def warning(self, field: str, message: str, mend: str) -> Finding:
-        """A warning at a key of the scene file."""
+        """Make a warning of the scene check at a key of the scene file."""
         return Finding("warning", self.file, field, message, mend)
 
     def note(self, field: str, message: str, mend: str) -> Finding:
-        """Something worth knowing at a key of the scene file."""
+        """Make a note of the scene check, on something worth knowing, at a key of the scene file."""
         return Finding("note", self.file, field, message, mend)
 
 
 def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
-    """The triangles of a scene that was read from `file`."""
+    """Collect the triangles of a scene that was read from `file` in one array for the scene check."""
     triangles = np.concatenate([r.triangles for r in scene.reflectors])
     owner = np.repeat(np.arange(len(scene.reflectors)), [len(r.faces) for r in scene.reflectors])
     corners = triangles.reshape(-1, 3)
@@ -74,5 +75,5 @@ def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
 
 
 def without_area(triangles: Floats) -> Booleans:
-    """Which triangles (T, 3, 3) are no more than a line."""
+    """Whether (T,) triangles (T, 3, 3) are no more than a line."""
     return triangle_heights(triangles) <= MIN_ALTITUDE

@@ -1,4 +1,4 @@
-"""Scene check, the units' part: numbers too large by the factor between two units, said whatever else is wrong.
+"""Scene check of units: numbers too large by the factor between two units, found whatever else is wrong.
 
 It looks at the scene file as a plain table and at whatever meshes could be read, so that a missing key or a start
 outside the room does not hide that the room was drawn in millimetres.
@@ -14,13 +14,14 @@ from rislam_rt.scene.findings import Finding
 from rislam_rt.scene.mesh_placement import UNITS
 
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
-"""Units that rooms are drawn in, and their names in a scene file."""
+"""Units other than metres that rooms are drawn in, and their names in a scene file."""
 LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
-"""[m] Longest side of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
+"""Longest side [m] of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
 USUAL_ROOM = (2.0, 100.0)
-"""[m] Range of the longest side of rooms, to tell which unit was meant."""
+"""Range [m] of the longest side of rooms, to tell which unit was meant."""
 FAR = 3.0
-"""A point this many times the room's size away from it was given in another unit, or is a mistake of another kind."""
+"""Distance of a point from the room, in sizes of the room, above which it was given in another unit, or is a mistake of
+another kind."""
 LIMITS = (
     (("ris", "spacing_m"), 0.5, "m", "millimetres", 1e-3),
     (("reflector", "material", "thickness_m"), 3.0, "m", "millimetres", 1e-3),
@@ -30,14 +31,15 @@ LIMITS = (
     (("agent", "tx_offset_m"), 2.0, "m", "millimetres", 1e-3),
     (("agent", "rx_offset_m"), 2.0, "m", "millimetres", 1e-3),
 )
-"""Key, the largest value that is meant indoors, its unit, and what the number would be a usual one in."""
+"""Keys of the scene file, the largest value of each that is meant indoors, its unit, and the unit in which the number
+would be a usual one, with the factor."""
 
 SPEED_FIELD = "agent.velocity"
-"""What the check of the motion itself looks at too, of a scene that has no errors."""
+"""Key of the scene file that the check of the motion itself looks at too, in a scene that has no errors."""
 
 
 def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) -> Iterator[Finding]:
-    """Every number of a scene file that looks as if it were in another unit.
+    """Scene check: warnings of every number of a scene file that looks as if it were in another unit.
 
     Parameters
     ----------
@@ -57,13 +59,13 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
     if room is not None:
         yield Finding("warning", file, "meshes.units", *room)
         return  # points in metres lie outside a room in millimetres, or in its corner
-    for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position")):
+    for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position"), ("agent", "waypoints")):
         for field, point in _points(table, path):
             yield from _far_point(file, field, point, bounds)
 
 
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
-    """What is odd about the unit of the room's size, and the mend."""
+    """Message that the room's size looks as if in a wrong unit, and how to mend it; None if it does not."""
     size = bounds[1] - bounds[0]
     longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
     if longest > LARGEST_ROOM:
@@ -80,6 +82,7 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
 
 
 def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator[Finding]:
+    """Scene check: warning of a point far outside the room that would lie inside it in another unit."""
     size = float(np.max(bounds[1] - bounds[0]))
     away = np.maximum(np.maximum(bounds[0] - point, point - bounds[1]), 0.0).max()
     if away <= FAR * size:
@@ -94,7 +97,8 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Lengths in a scene file: dotted field and largest value wherever a path of keys leads; lists of tables: each."""
+    """Numbers in a scene file's table, for the check of units: dotted field and largest value wherever a path of keys
+    leads; in lists of tables, of each."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):
@@ -102,12 +106,18 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
+    """Points (3,) in a scene file's table, for the check of units: dotted field and value wherever a path of keys
+    leads; of a list of points, each."""
     for field, value in _places(table, path, ""):
-        if isinstance(value, list) and len(value) == 3 and all(_is_number(number) for number in value):
-            yield field, np.array(value, dtype=np.float64)
+        listed = isinstance(value, list) and value and isinstance(value[0], list)
+        for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:
+            if isinstance(point, list) and len(point) == 3 and all(_is_number(number) for number in point):
+                yield place, np.array(point, dtype=np.float64)
 
 
 def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:
+    """Values in a scene file's table: dotted field and value wherever a path of keys leads; in lists of tables, of
+    each."""
     if isinstance(part, list) and path:
         for number, item in enumerate(part):
             yield from _places(item, path, f"{field}[{number}]")
@@ -118,4 +128,5 @@ def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, A
 
 
 def _is_number(value: Any) -> bool:
+    """Whether a value of a scene file's table is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

@@ -1,4 +1,4 @@
-"""Scene check, the part of walls: which meshes lie on each other, and which part into several walls."""
+"""Scene check of walls: which meshes lie on each other, and which part into several walls."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -15,25 +15,27 @@ from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
-"""[rad] Neighbours in one mesh that meet at less than this: half a degree looks flat to whoever made it."""
+"""Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat to whoever
+made it."""
 
 
 class WallParts(NamedTuple):
-    """The walls of a scene, reflector by reflector."""
+    """The walls (planar regions) of a scene's meshes, reflector by reflector."""
 
     flat: list[PlanarRegions]
+    """Planar regions of each reflector."""
     first: Integers
     """(R + 1,) walls of reflector r are first[r] : first[r + 1]."""
     owner: Integers
     """(T,) wall of each triangle."""
 
     def reflector(self, wall: int) -> int:
-        """The reflector that a wall belongs to."""
+        """Number of the reflector that a wall belongs to."""
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
 def build_parts(room: TriangleArray) -> WallParts:
-    """Part every mesh into walls, as the channels do."""
+    """Part every reflector's mesh into walls (planar regions), as the channels do."""
     flat = [planar_regions(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
@@ -41,7 +43,8 @@ def build_parts(room: TriangleArray) -> WallParts:
 
 
 def wall_findings(room: TriangleArray) -> Iterator[Finding]:
-    """Meshes that lie on each other, meshes that are nearly flat, and how many walls a mesh has."""
+    """Scene check: findings on meshes that lie on each other, on meshes that are nearly flat, and on how many walls a
+    mesh has."""
     parts = build_parts(room)
     yield from _stacked(room, parts)
     for number, part in enumerate(parts.flat):
@@ -59,7 +62,8 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
-    """One finding for each pair of meshes, with the largest gap of their walls; a note where nobody sees it."""
+    """Scene check: a finding for each pair of meshes with walls in one plane that overlap, with the largest gap; a note
+    where nobody sees it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
     limit = tracer_gap(room.bounds)
@@ -71,13 +75,16 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
             worst[key] = pair
     for (upper, lower, seen), pair in worst.items():
         names = room.scene.reflectors[upper].name, room.scene.reflectors[lower].name
-        message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap:.1e} m apart"
-        mend = f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit:.1e} m"
+        message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap * 1e3:.3g} mm apart"
+        mend = (
+            f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit * 1e3:.2g} mm"
+        )
         yield (room.warning if seen else room.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
 
 
 def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
-    """Whether a wall (T, 3, 3) has a side in the room; the foot of a crate has its inside above and nothing below."""
+    """Whether a wall of triangles (T, 3, 3) has a side in the room; the foot of a crate has its inside above and
+    nothing below."""
     normal, _ = triangle_planes(wall)
     middle = wall.mean(axis=1)
     sides = np.concatenate([middle + MIN_CLEARANCE * normal, middle - MIN_CLEARANCE * normal])
@@ -87,7 +94,7 @@ def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
 
 
 def _flattest(triangles: Floats, part: PlanarRegions) -> float:
-    """Smallest angle [rad] at which two walls of a mesh meet in an edge, infinite where none do."""
+    """Smallest angle [rad] at which two walls of one mesh meet in an edge, infinite where none do."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3), 6) + 0.0, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)
     ends = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)

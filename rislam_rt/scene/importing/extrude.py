@@ -1,4 +1,4 @@
-"""A floor plan extruded to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
+"""Extrusion of a floor plan to walls, floor and ceiling: doors and windows are cut out, and closed where they are."""
 
 from itertools import pairwise
 from typing import Any
@@ -16,18 +16,21 @@ from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_li
 from rislam_rt.scene.meshes import Mesh, as_mesh
 from rislam_rt.scene.polygons import inside_loop, triangulate
 from rislam_rt.scene.shapes import joined, quad
+from rislam_rt.spelling import counted
 
 THICKEST = 0.6
-"""[m] An opening goes through all walls this near it that run along it: both faces of a thick wall."""
+"""Thickest wall [m]: an opening goes through all walls this near it that run along it, as both faces of a thick wall
+do."""
 ALONG = np.radians(5.0)
+"""Largest angle [rad] between an opening of a floor plan and the wall that it goes through."""
 _SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 
 Entry = tuple[str, Mesh, dict[str, Any] | None]
-"""Name, mesh and own material."""
+"""Name, mesh and own material of a reflector that was extruded."""
 
 
 def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft:
-    """Extrude a plan to a room.
+    """Extrude a floor plan to a room of a given height [m].
 
     Raises
     ------
@@ -47,7 +50,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
         if opening.material is not None:
             line = min((lines[n] for n in cut), key=lambda k: float(np.abs(k.distance(opening.ends)).mean()))
             low, high = _reach(opening, line)
-            entries.append((opening.name, _panel(line, low, high, opening.bottom, opening.top), opening.material))
+            entries.append((opening.name, _rectangle(line, low, high, opening.bottom, opening.top), opening.material))
     walls: list[Entry] = []
     for number, line in enumerate(lines):
         holes = [o for o, cut in zip(plan.openings, cuts, strict=True) if number in cut]
@@ -62,6 +65,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
 
 
 def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> RoomDraft:
+    """Draft of a room from extruded meshes, each with a name of its own and a material."""
     palette = MaterialAssignment(options.materials, options.rest)
     names = numbered([plain_name(name) or "wall" for name, _, _ in entries])
     reflectors = {}
@@ -71,14 +75,14 @@ def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> Roo
     palette.check_used(names)
     closed = sum(o.material is not None for o in plan.openings)
     remarks = [
-        f"floor plan of {len(plan.rooms)} rooms: {len(names)} reflectors, {len(plan.openings) - closed} openings, "
-        f"{closed} closed doors and windows"
+        f"floor plan of {counted(len(plan.rooms), 'room')}: {counted(len(names), 'reflector')}, "
+        f"{counted(len(plan.openings) - closed, 'opening')}, {closed} closed doors and windows"
     ]
     return RoomDraft(reflectors, {}, remarks + palette.remarks())
 
 
 def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
-    """Lines of walls to extrude that an opening goes through."""
+    """Numbers of the wall lines of a floor plan that an opening goes through."""
     along = (opening.ends[1] - opening.ends[0]) / np.linalg.norm(opening.ends[1] - opening.ends[0])
     near = []
     for number, line in enumerate(lines):
@@ -96,12 +100,13 @@ def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
 
 
 def _reach(opening: Opening, line: Line) -> tuple[float, float]:
+    """Interval [m] along a wall's line that a door or window of the floor plan takes."""
     low, high = sorted(float(x) for x in (opening.ends - line.start) @ line.along)
     return low, high
 
 
 def _cells(line: Line, holes: list[tuple[float, float, float, float]], height: float) -> list[Mesh]:
-    """Rectangles of an extruded line of walls about its openings (from, to, bottom, top)."""
+    """Rectangles of an extruded wall about its openings (from, to, bottom, top) [m]."""
     found = []
     for low, high in line.spans:
         cuts = sorted({low, high, *(min(max(x, low), high) for hole in holes for x in hole[:2])})
@@ -112,17 +117,18 @@ def _cells(line: Line, holes: list[tuple[float, float, float, float]], height: f
             solid: Spans = [(0.0, height)]
             for hole in open_here:
                 solid = without_span(solid, hole[2], hole[3])
-            found += [_panel(line, a, b, bottom, top) for bottom, top in solid]
+            found += [_rectangle(line, a, b, bottom, top) for bottom, top in solid]
     return found
 
 
-def _panel(line: Line, low: float, high: float, bottom: float, top: float) -> Mesh:
+def _rectangle(line: Line, low: float, high: float, bottom: float, top: float) -> Mesh:
+    """Mesh of an upright rectangle of an extruded wall, between two places along its line [m] and two heights [m]."""
     return quad([line.at(low, bottom), line.at(high, bottom), line.at(high, top), line.at(low, top)])
 
 
 def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mesh]]) -> list[Mesh]:
-    """Extruded frame that joins both faces of a thick wall about an opening; at floor and ceiling it is part of
-    them."""
+    """Faces of the frame that joins both faces of a thick extruded wall about an opening; those at floor and ceiling
+    become part of them."""
     first, second = lines
     if abs(float(second.distance(first.start + _reach(opening, first)[0] * first.along))) < SAME_LINE:
         return []
@@ -138,7 +144,8 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
 
 
 def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
-    """(T, 3, 2) [m] floors to extrude of all rooms; of the rectangle about all walls where none is drawn."""
+    """Triangles (T, 3, 2) [m] of the floors of all rooms of a plan; of the rectangle about all walls where no room is
+    drawn."""
     found = []
     for room in plan.rooms:
         triangles = triangulate(room, [])
@@ -155,8 +162,8 @@ def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
 
 
 def _line_name(line: Line, plan: FloorPlan) -> str:
-    """Name of an extruded wall: `wall_north` where a room lies on one side only, `partition` between two; the drawn
-    name if there is one."""
+    """Name of an extruded wall: the drawn one if there is one, else `wall_north` where a room lies on one side only,
+    `partition` between two."""
     if line.name:
         return line.name
     low, high = line.spans[int(np.argmax([high - low for low, high in line.spans]))]

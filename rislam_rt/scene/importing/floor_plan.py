@@ -15,16 +15,20 @@ from rislam_rt.scene.importing.materials import parse_material
 from rislam_rt.scene.polygons import signed_area, triangulate
 
 KINDS = ("room", "wall", "door", "window")
+"""Kinds of shapes on a floor plan."""
 SPANS = {"door": (0.0, 2.0), "window": (0.9, 2.1)}
-"""[m] Lower and upper edge of doors and windows that say nothing else."""
+"""Lower and upper edge [m] of doors and windows of a floor plan that says nothing else."""
 CLOSED_WITH = {"door": "itu:wood", "window": "itu:glass"}
+"""Materials that close doors and windows of a floor plan that names none."""
 MAX_SHAPES = 5_000
+"""Most shapes of a floor plan."""
 
 
 class PlanShape(NamedTuple):
-    """A line or an area of a plan, with what the file says about it."""
+    """A line or an area of a floor plan, with what the file says about it."""
 
     kind: str
+    """One of `KINDS`."""
     points: Floats
     """(n, 2) in the file's units."""
     closed: bool
@@ -33,30 +37,32 @@ class PlanShape(NamedTuple):
 
 
 class Opening(NamedTuple):
-    """A door or window."""
+    """A door or window of a floor plan."""
 
     name: str
     ends: Floats
-    """(2, 2) [m]."""
+    """(2, 2) [m] of its line along the wall."""
     bottom: float
+    """Height [m] of the lower edge above the floor."""
     top: float
+    """Height [m] of the upper edge above the floor."""
     material: dict[str, Any] | None
-    """What closes it; None for a hole."""
+    """Material of what closes it; None for a hole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorPlan:
-    """A floor plan [m]."""
+    """A floor plan in metres: rooms, walls that are drawn by themselves, doors and windows."""
 
     rooms: list[Floats]
-    """(n, 2) each, counter-clockwise."""
+    """Corners (n, 2) of each room, counter-clockwise."""
     walls: list[tuple[Floats, dict[str, Any] | None, str]]
-    """Line (2, 2), material and name, of walls that are drawn by themselves."""
+    """Line (2, 2), material and name of each wall that is drawn by itself."""
     openings: list[Opening]
 
 
 def parse_corners(text: str) -> list[PlanShape]:
-    """Floor plan of one room from `0,0 4,0 4,3 0,3`.
+    """Parse a text of corners, `0,0 4,0 4,3 0,3`, into the shape of a floor plan of one room.
 
     Raises
     ------
@@ -76,7 +82,8 @@ def parse_corners(text: str) -> list[PlanShape]:
 
 
 def parse_geojson(content: bytes) -> list[PlanShape]:
-    """Floor plan from a GeoJSON file: polygons are rooms, lines are walls, unless a feature's `kind` says else.
+    """Parse a GeoJSON file into the shapes of a floor plan: polygons are rooms, lines are walls, unless a feature's
+    `kind` says else.
 
     Raises
     ------
@@ -99,6 +106,7 @@ def parse_geojson(content: bytes) -> list[PlanShape]:
 
 
 def _features(table: Any) -> Iterator[tuple[Any, Any]]:
+    """Geometry and properties of every feature of a GeoJSON table."""
     if table["type"] == "FeatureCollection":
         for feature in table["features"]:
             yield from _features(feature)
@@ -109,7 +117,7 @@ def _features(table: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def _shapes(geometry: Any, about: dict[str, Any]) -> Iterator[PlanShape]:
-    """Shapes of a floor plan from one GeoJSON geometry."""
+    """Shapes of a floor plan from one GeoJSON geometry and its properties."""
     kind, found = geometry["type"], geometry.get("coordinates")
     many = {"MultiPolygon": "Polygon", "MultiLineString": "LineString"}
     if kind in many:
@@ -127,7 +135,7 @@ def _shapes(geometry: Any, about: dict[str, Any]) -> Iterator[PlanShape]:
 
 
 def build_plan(shapes: list[PlanShape], unit: float, height: float) -> FloorPlan:
-    """A plan in metres, each shape checked.
+    """Build a floor plan in metres from shapes in a file's unit [m], each checked; `height` [m] is that of its rooms.
 
     Raises
     ------
@@ -175,7 +183,7 @@ def _add(plan: FloorPlan, shape: PlanShape, unit: float, height: float) -> None:
 
 
 def _room(points: Floats) -> Floats:
-    """Corners of a room on a floor plan, counter-clockwise, none of them twice."""
+    """Corners (n, 2) [m] of a room on a floor plan, counter-clockwise, none of them twice."""
     after = np.roll(points, -1, axis=0)
     points = points[np.linalg.norm(after - points, axis=1) > 1e-6]
     if len(points) < 3:
@@ -187,7 +195,7 @@ def _room(points: Floats) -> Floats:
 
 
 def _material(shape: PlanShape) -> dict[str, Any] | None:
-    """What a wall on a floor plan is of, or what closes an opening; doors are open unless they say otherwise."""
+    """Material of a wall on a floor plan, or of what closes an opening; doors are open unless they say otherwise."""
     text = shape.about.get("material")
     given = shape.about.get("open")
     is_open = shape.kind == "door" and text is None if given is None else str(given).lower() in ("true", "1", "yes")
@@ -199,6 +207,7 @@ def _material(shape: PlanShape) -> dict[str, Any] | None:
 
 
 def _number(shape: PlanShape, key: str, usual: float) -> float:
+    """Number that a shape of a floor plan gives for a key, or else the usual one."""
     try:
         value = float(shape.about.get(key, usual))
     except (TypeError, ValueError):
@@ -209,7 +218,7 @@ def _number(shape: PlanShape, key: str, usual: float) -> float:
 
 
 def _middle_line(points: Floats) -> Floats:
-    """(2, 2) line on the floor plan that an opening stands for: itself, or the long axis of an area."""
+    """Line (2, 2) [m] on a floor plan that a door or window stands for: the long axis of its points."""
     middle = points.mean(axis=0)
     along = np.linalg.svd(points - middle)[2][0]
     reach = (points - middle) @ along

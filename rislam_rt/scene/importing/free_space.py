@@ -1,4 +1,4 @@
-"""Where an agent can be in a room that somebody drew: inside, off all surfaces, and on a straight free way."""
+"""Free space of an imported room, where an agent can be: inside, off all surfaces, and on a straight free line."""
 
 from typing import NamedTuple
 
@@ -10,33 +10,33 @@ from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross, 
 from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
-"""[m] Heights above the floor that are tried: that of a trolley or a hand, then higher, then lower."""
+"""Heights [m] above the floor that are tried for the agent: that of a trolley or a hand, then higher, then lower."""
 CLEARANCES = (0.4, 0.25, 0.12)
-"""[m] Least distances of the way from all surfaces, the first that leaves one."""
+"""Least distances [m] of the agent's line from all surfaces, the first that leaves one."""
 LONGEST = 5.0
-"""[m] Of the way that is proposed."""
+"""Largest length [m] of the agent's line that is proposed."""
 OFF_SURFACE = 1e-5
-"""[m] From a surface to where it is looked at: nearer than any two that are drawn apart."""
+"""Distance [m] before a surface at which a line of sight to it ends: nearer than any two that are drawn apart."""
 ENOUGH = 3
-"""Lines of sight that make a surface seen: a single one may have slipped through the seam of two triangles."""
+"""Lines of sight that make a surface visible: a single one may have slipped through the seam of two triangles."""
 _GRID, _RAYS, _STATIONS = 14, 100, 40
 
 
 class FreeSpace(NamedTuple):
-    """Free places of a room."""
+    """Free space of an imported room: places where an agent can be, and a straight free line between two of them."""
 
     stations: Floats
-    """(S, 3) [m] places that chains of free straight lines join, the start of the way first."""
+    """(S, 3) [m] places that chains of free straight lines join, the start of `way` first."""
     way: Floats
-    """(2, 3) [m] start and end of a straight free way."""
+    """(2, 3) [m] start and end of a straight free line for the agent."""
     clearance: float
-    """[m] that the way keeps off all surfaces."""
+    """[m] that this line keeps off all surfaces."""
     enclosed: float
-    """Share of rays from the start that meet something."""
+    """Share of rays from the start of `way` that meet something."""
 
 
 def find_free(triangles: Floats, floor: float) -> FreeSpace | None:
-    """Places in a room (T, 3, 3) [m] above its floor [m]; None where nothing is free.
+    """Find the free space of a room of triangles (T, 3, 3) [m] above its floor [m]; None where nothing is free.
 
     Of all places of a grid those count from which the fewest rays escape: they are inside. Of these, the longest
     straight way up to `LONGEST` that keeps off all surfaces is taken.
@@ -55,7 +55,8 @@ def find_free(triangles: Floats, floor: float) -> FreeSpace | None:
 
 
 def _free_at(points: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
-    """Free space at one clearance [m]: stations that see each other, a way among them; None where there is none."""
+    """Free space of a room at one clearance [m]: of points (N, 3), those that see each other, and the longest line
+    among them; None where there is none."""
     gap = distance_to_triangles(points, triangles)
     points, gap = points[gap >= clearance], gap[gap >= clearance]
     if len(points) < 2:
@@ -74,7 +75,7 @@ def _free_at(points: Floats, triangles: Floats, clearance: float) -> FreeSpace |
 
 
 def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
-    """Which points (N, 3) a chain of free straight lines joins to the start (3,)."""
+    """Whether (N,) points (N, 3) are joined to the start (3,) by a chain of free straight lines."""
     reached, stations = np.zeros(len(points), dtype=np.bool_), [start]
     while stations and not reached.all():
         here = stations.pop()
@@ -87,7 +88,8 @@ def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
 
 
 def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Floats | None:
-    """(2, 3) longest way through free space between two stations that keeps clear, cut to `LONGEST`."""
+    """Longest straight line (2, 3) through free space between two stations that keeps clear of all surfaces, cut to
+    `LONGEST`; None if none is long enough."""
     chosen = stations[np.linspace(0, len(stations) - 1, min(len(stations), _STATIONS)).astype(int)]
     i, j = np.triu_indices(len(chosen), 1)
     length = np.linalg.norm(chosen[i] - chosen[j], axis=1)
@@ -103,7 +105,8 @@ def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Float
 
 
 def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Booleans:
-    """Which groups of triangles (T, 3, 3) anybody at the stations (S, 3) sees, behind all `triangles` (A, 3, 3).
+    """Whether each group of triangles (T, 3, 3) is visible from any station (S, 3) in the free space, past all
+    `triangles` (A, 3, 3).
 
     Looked at are points spread over each group, from some twenty stations and what is freely above and below them: a
     wall of which but a crack is seen may count as unseen.
@@ -125,7 +128,8 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
 
 
 def _eyes(stations: Floats, triangles: Floats) -> Floats:
-    """Stations (S, 3), and free places straight above and below them at a tenth, half and nine tenths of the height."""
+    """Viewpoints (E, 3) in the free space: stations (S, 3), and free places straight above and below them at a tenth,
+    half and nine tenths of the height."""
     low, high = float(triangles[..., 2].min()), float(triangles[..., 2].max())
     found = [stations]
     for share in (0.1, 0.5, 0.9):
@@ -137,7 +141,7 @@ def _eyes(stations: Floats, triangles: Floats) -> Floats:
 
 
 def _spread(triangles: Floats, count: int) -> tuple[Floats, Floats]:
-    """Points spread over triangles about the free space by their area, and the normals there."""
+    """Points spread over triangles by their area, and the normals there, to test whether they are visible."""
     edge = triangles[:, 1:] - triangles[:, :1]
     area = np.cumsum(np.linalg.norm(triangle_cross(triangles), axis=1))
     chosen: Integers = np.searchsorted(area, (np.arange(count) + 0.5) / count * area[-1])

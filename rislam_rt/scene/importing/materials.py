@@ -1,4 +1,4 @@
-"""Materials of an imported room: by hand, by the name that the file gives them, or one for all the rest."""
+"""Materials of an imported room: given by the user, by the name that the file gives them, or one for all the rest."""
 
 import re
 from collections.abc import Iterable
@@ -15,7 +15,8 @@ THICKNESS = {
     "medium_dry_ground": 1.0, "metal": 0.002, "plasterboard": 0.0125, "plywood": 0.012, "very_dry_ground": 1.0,
     "vinyl_tile": 0.003, "wet_ground": 1.0, "wood": 0.03,
 }  # fmt: skip
-"""[m] Thickness of a slab where none is given: usual sizes of trade (boards), of construction (walls)."""
+"""Thickness [m] of a slab of each material where none is given: usual sizes of trade (boards), of construction
+(walls)."""
 
 WORDS = {
     "metal": ("metal", "steel", "iron", "aluminium", "aluminum", "alu", "copper", "chrome", "metall", "stahl"),
@@ -36,7 +37,8 @@ WORDS = {
 
 
 def parse_material(text: str) -> dict[str, Any]:
-    """The table of a material written as `itu:concrete`, `itu:concrete:0.2` (thickness [m]) or `reflection:0.8`.
+    """Parse a material written as `itu:concrete`, `itu:concrete:0.2` (thickness [m]) or `reflection:0.8` into a table
+    of the scene file.
 
     Raises
     ------
@@ -61,7 +63,7 @@ def parse_material(text: str) -> dict[str, Any]:
 
 
 def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
-    """Materials by hand, `NAME=itu:concrete`: name or pattern (`wall_*`) to table.
+    """Parse the materials that a user gives to an import, `NAME=itu:concrete`: name or pattern (`wall_*`) to table.
 
     Raises
     ------
@@ -78,7 +80,7 @@ def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
 
 
 class MaterialAssignment:
-    """Answers which material a wall has, and keeps account of what it had to assume."""
+    """Assignment of materials to the walls of an imported room, which keeps account of those it had to assume."""
 
     def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any]) -> None:
         self.choices, self.rest = choices, rest
@@ -86,7 +88,8 @@ class MaterialAssignment:
         self.assumed: set[str] = set()
 
     def material(self, wall: str, node: str, material: str) -> dict[str, Any]:
-        """By hand (wall, material or node), by a word in the material's name or the node's, or that of the rest."""
+        """Material of an imported wall: the user's for wall, material or node, else by a word in the material's name or
+        the node's, else that of the rest."""
         chosen = self.by_hand(wall, material, node)
         if chosen is not None:
             return chosen
@@ -98,7 +101,7 @@ class MaterialAssignment:
         return self.rest
 
     def by_hand(self, *names: str) -> dict[str, Any] | None:
-        """Material that was given for any of the names."""
+        """Material that the user gave for any of the names; None if there is none."""
         for pattern, table in self.choices.items():
             if any(fnmatchcase(name, pattern) for name in names if name):
                 self.used.add(pattern)
@@ -106,7 +109,7 @@ class MaterialAssignment:
         return None
 
     def remarks(self) -> list[str]:
-        """What was assumed of materials, on one line, if anything."""
+        """Remark on the walls whose material was assumed, on one line; none if there are none."""
         if not self.assumed:
             return []
         names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
@@ -114,7 +117,7 @@ class MaterialAssignment:
         return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def check_used(self, names: Iterable[str]) -> None:
-        """Whether every material that was given has been used; `names`: some that could have been meant.
+        """Check that every material that the user gave has been used; `names`: some that could have been meant.
 
         Raises
         ------
@@ -128,7 +131,8 @@ class MaterialAssignment:
 
 
 def itu_by_word(name: str) -> str | None:
-    """The ITU material that a name speaks of: `Oak.003` is wood, `itu_concrete` is concrete."""
+    """ITU material that a word in the name of a material or node stands for: `Oak.003` is wood, `itu_concrete` is
+    concrete; None if there is none."""
     plain = re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
     for itu in get_args(ItuMaterial):
         if f"_{itu}_" in f"_{plain}_":

@@ -1,4 +1,4 @@
-"""A mesh of a whole room, parted into walls, things and clutter."""
+"""Import of a mesh of a whole room, parted into walls, objects and clutter."""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from rislam_rt.scene.shapes import joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
-    """The room of a mesh file.
+    """Import a mesh file as the draft of a room.
 
     Raises
     ------
@@ -49,7 +49,8 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from a mesh: walls, things and clutter, of flat regions or of the planes of a scan."""
+    """Draft of a room from a mesh, by its flat regions or the planes of a scan: reflectors with materials, and
+    occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
@@ -60,7 +61,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
         raise Fault(
             f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
         )
-    surfaces, unseen = _seen(found)
+    surfaces, unseen = _visible_surfaces(found)
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     occluders = _occluders(found, pieces, list(reflectors))
@@ -70,7 +71,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     return RoomDraft(reflectors, occluders, remarks + palette.remarks())
 
 
-def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
+def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
     """Surfaces of a mesh that an agent inside the room can see, and the area [m^2] of the others: outer skins, insides
     of boards."""
     triangles = np.concatenate([
@@ -88,7 +89,8 @@ def _seen(found: SortedSurfaces) -> tuple[list[Surface], float]:
 def _reflectors(
     surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: MaterialAssignment
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
-    """Named meshes with their materials: each wall of the shell by itself, each thing as one."""
+    """Reflectors of an imported mesh with names and materials: each wall of the room's shell by itself, each object as
+    one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
     corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
@@ -113,7 +115,7 @@ def _reflectors(
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
-    """Clutter of a mesh as occluders, by the piece that it belongs to."""
+    """Occluders of an imported mesh by name: its clutter, by the object that it belongs to."""
     by_piece: dict[int, list[Floats]] = {}
     for clutter in found.clutter:
         by_piece.setdefault(clutter.piece, []).append(clutter.triangles)

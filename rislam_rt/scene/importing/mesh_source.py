@@ -1,4 +1,5 @@
-"""Source of meshes, triangles with the names of their node and material: GLB, glTF, OBJ, PLY, STL."""
+"""Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) read as triangles with the names of their node and
+material."""
 
 import json
 import struct
@@ -11,22 +12,24 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.importing.obj import read_obj
-from rislam_rt.scene.inside_folder import read_inside
-from rislam_rt.scene.mesh_containers import check_glb
+from rislam_rt.scene.mesh_file_checks import check_glb
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, node_mesh, sound_mesh, unfold
+from rislam_rt.scene.read_inside_folder import read_inside
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
+"""Endings of the mesh files that can be imported."""
 MAX_IMPORT_FACES = 2_000_000
+"""Most triangles of an imported mesh file."""
 MAX_IMPORT_NODES = 5_000
-"""Reading takes time in proportion to their square."""
+"""Most nodes of an imported GLB or glTF file: reading takes time in proportion to their square."""
 ANY_UNIT = 1e9
-"""Coordinates of a file whose unit is not known yet: 1000 km in millimetres."""
+"""Largest coordinate of an imported file whose unit is not known yet: 1000 km in millimetres."""
 _COMPRESSED = ("draco", "meshopt", "quantization")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshPart:
-    """Triangles of one node and one material."""
+    """Triangles of one node and one material of an imported mesh file."""
 
     node: str
     material: str
@@ -35,7 +38,8 @@ class MeshPart:
 
 
 def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
-    """The parts of a mesh file, and remarks on what it names and does not hold.
+    """Read the parts of a mesh file to import, one for each node and material, and remarks on what it names and does
+    not hold.
 
     Raises
     ------
@@ -64,7 +68,7 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
 
 
 def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
-    """All of a mesh file that the user named.
+    """Read all of a file to import, up to a limit [bytes].
 
     Raises
     ------
@@ -86,13 +90,14 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
 
 
 def _sound(part: MeshPart) -> Floats:
+    """Triangles (T, 3, 3) of an imported part after a check of their coordinates."""
     corners = part.triangles.reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return sound_mesh(Mesh(corners, faces), MAX_IMPORT_FACES, ANY_UNIT).vertices[faces]
 
 
 def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
-    """Parts of a mesh in glTF, its buffers from beside it, pictures left where they are."""
+    """Read the parts of a glTF or GLB mesh, its buffers from beside it, pictures left where they are."""
     content = _plain_glb(content) if suffix == ".glb" else _joined_glb(content, folder)
     check_glb(content, MAX_IMPORT_FACES, MAX_IMPORT_NODES)
     loaded = unfold(content, "glb")
@@ -107,7 +112,7 @@ def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
 
 
 def _plain_glb(content: bytes) -> bytes:
-    """A mesh in GLB without its pictures: the same chunks, another table of contents."""
+    """Content of a GLB mesh file without its pictures: the same chunks, another table of contents."""
     try:
         magic, version, length, size, kind = struct.unpack_from("<4sIII4s", content)
     except struct.error:
@@ -123,7 +128,7 @@ def _plain_glb(content: bytes) -> bytes:
 
 
 def _joined_glb(content: bytes, folder: Path) -> bytes:
-    """A mesh in glTF and its buffers as one GLB file."""
+    """Join a glTF mesh file and its buffers into the content of one GLB file."""
     document = _without_pictures(content)
     data, starts = b"", []
     for number, buffer in enumerate(_rows(document, "buffers")):
@@ -148,6 +153,7 @@ def _joined_glb(content: bytes, folder: Path) -> bytes:
 
 
 def _embedded(uri: str) -> bytes:
+    """Decode a buffer that stands inside a glTF mesh file in base64."""
     import base64
 
     try:
@@ -157,13 +163,14 @@ def _embedded(uri: str) -> bytes:
 
 
 def _glb(document: dict[str, Any], rest: bytes) -> bytes:
+    """Content of a GLB mesh file with this table of contents and the rest of its chunks."""
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest
 
 
 def _without_pictures(text: bytes) -> dict[str, Any]:
-    """Table of contents of a glTF mesh without pictures; materials keep their names alone."""
+    """Table of contents of a glTF mesh file without pictures; materials keep their names alone."""
     try:
         document = json.loads(text)
         if not isinstance(document, dict):
@@ -184,6 +191,7 @@ def _without_pictures(text: bytes) -> dict[str, Any]:
 
 
 def _rows(document: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    """List of tables under a key in the table of contents of a glTF mesh file."""
     rows = document.get(key, [])
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise Fault(f"'{key}' is no list of tables", "export it again")

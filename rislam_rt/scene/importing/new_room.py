@@ -1,4 +1,4 @@
-"""A new room from a file: a scene folder, checked before it appears."""
+"""A new room from a file to import, mesh or floor plan: a scene folder, checked before it appears."""
 
 import tempfile
 from pathlib import Path
@@ -23,15 +23,17 @@ from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_files
 
 PLANS = (".svg", ".geojson", ".json")
+"""Endings of the files that are imported as floor plans."""
 MAX_PLAN_BYTES = 10_000_000
+"""Most bytes of a floor plan's file."""
 IMMEASURABLE = 1e12
-"""Coordinates beyond this have no size worth a word."""
+"""Largest coordinate of a floor plan whose size is looked at."""
 
 
 def import_room(
     file: Path, folder: Path, options: ImportOptions, *, height: float = 2.7, overwrite: bool = False
 ) -> list[str]:
-    """Make a scene folder of a mesh file or a floor plan; returns remarks on what became of it.
+    """Import a mesh file or a floor plan as a scene folder; returns remarks on what became of it.
 
     The folder appears whole, and only if its check finds no error. `height` [m] is that of a floor plan's rooms.
 
@@ -52,7 +54,7 @@ def import_room(
 def import_corners(
     corners: str, folder: Path, options: ImportOptions, *, height: float = 2.7, overwrite: bool = False
 ) -> list[str]:
-    """Make a scene folder of one room from its corners `0,0 4,0 4,3 0,3` [m]; returns remarks.
+    """Import one room given by its corners `0,0 4,0 4,3 0,3` [m] as a scene folder; returns remarks.
 
     Raises
     ------
@@ -72,6 +74,7 @@ def import_corners(
 
 
 def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:
+    """Import a floor plan (SVG or GeoJSON) as the draft of a room of a given height [m]."""
     content = read_content(file, MAX_PLAN_BYTES)
     shapes = parse_svg(content) if file.suffix.lower() == ".svg" else parse_geojson(content)
     points = np.concatenate([shape.points for shape in shapes] or [np.zeros((1, 2))])
@@ -86,7 +89,7 @@ def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:
 def write_room(
     draft: RoomDraft, folder: Path, origin: str, options: ImportOptions, *, overwrite: bool = False
 ) -> list[str]:
-    """Write a draft as a scene folder if its check finds no error; returns its remarks.
+    """Write the draft of an imported room as a scene folder if its check finds no error; returns its remarks.
 
     Raises
     ------

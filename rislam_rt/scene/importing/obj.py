@@ -1,4 +1,4 @@
-"""OBJ files: corners, polygons, groups and the names of materials."""
+"""Reading of OBJ mesh files: corners, polygons, groups and the names of materials."""
 
 import numpy as np
 
@@ -11,7 +11,8 @@ Polygons = dict[tuple[str, str], list[list[int]]]
 
 
 def read_obj(content: bytes) -> tuple[list[tuple[str, str, Floats]], str]:
-    """(group, material, triangles (T, 3, 3)) of an OBJ file, and the library of materials that it names.
+    """Read an OBJ mesh file: (group, material, triangles (T, 3, 3)) of each part, and the library of materials that it
+    names.
 
     Raises
     ------
@@ -29,7 +30,7 @@ def read_obj(content: bytes) -> tuple[list[tuple[str, str, Floats]], str]:
 
 
 def _read_lines(text: str) -> tuple[Floats, Polygons, str]:
-    """Points (V, 3), polygons and library of an OBJ file."""
+    """Points (V, 3), polygons and library of materials of an OBJ mesh file."""
     points: list[list[float]] = []
     faces: Polygons = {}
     group = material = library = ""
@@ -54,7 +55,7 @@ def _read_lines(text: str) -> tuple[Floats, Polygons, str]:
 
 
 def _corners(text: str, count: int) -> list[int]:
-    """Corners of an OBJ file's polygon from 0; a negative number counts from the last corner so far."""
+    """Corner numbers of a polygon in an OBJ mesh file, from 0; a negative number counts from the last corner so far."""
     numbers = [int(word.partition("/")[0]) for word in text.split()]
     if len(numbers) < 3:
         raise ValueError(f"a face of {len(numbers)} corners")
@@ -65,7 +66,7 @@ def _corners(text: str, count: int) -> list[int]:
 
 
 def _split(corners: Floats) -> Floats:
-    """An OBJ file's polygon (n, 3) as triangles (n - 2, 3, 3)."""
+    """Triangulate a polygon (n, 3) of an OBJ mesh file: (n - 2, 3, 3)."""
     middle = corners.mean(axis=0)
     normal = np.linalg.svd(corners - middle)[2] if np.isfinite(corners).all() else np.eye(3)
     flat = (corners - middle) @ normal[:2].T

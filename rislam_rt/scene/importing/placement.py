@@ -1,4 +1,4 @@
-"""Placing a file in the room: units, axis, origin, and whether what comes out has the size of a room."""
+"""Placement of an imported file in the room: units, axis, origin, and whether what comes out has the size of a room."""
 
 import numpy as np
 
@@ -10,13 +10,13 @@ from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.mesh_placement import UNITS, place_points
 
 SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
-"""[m] Diagonals outside are taken for a wrong unit, unless the user gave one."""
+"""Diagonals [m] outside of which an imported room is taken to be in a wrong unit, unless the user gave one."""
 USUAL = (2.0, 60.0)
-"""[m] Diagonals of the rooms that a wrong unit is mended to."""
+"""Diagonals [m] of the rooms for which another unit is proposed."""
 
 
 def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> tuple[list[Floats], list[str]]:
-    """Place imported parts: triangles (T, 3, 3) [m], z up, and remarks.
+    """Place the parts of an imported mesh in the room: triangles (T, 3, 3) [m] of each, z up, and remarks.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
 
 
 def check_size(diagonal: float, units: str | None) -> None:
-    """Refuse to place what has no room's size [m across], and say which unit would mend it.
+    """Refuse an imported room that has no room's size [m across], and say which unit would mend it.
 
     Raises
     ------

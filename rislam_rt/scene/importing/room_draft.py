@@ -1,4 +1,4 @@
-"""A room in the making: what reflects, what shades, and what is worth saying; then agent, panel and files."""
+"""Draft of an imported room: what reflects, what hides, and remarks; then agent, RIS panel and files."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,27 +17,28 @@ from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, refle
 from rislam_rt.scene.write import mesh_file
 
 FROM_EDGE = 0.1
-"""[m] The panel measures 9 cm: so far it keeps off the edges of its host."""
+"""Distance [m] of a proposed RIS panel's centre from the edges of its host: the panel measures 9 cm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomDraft:
-    """Meshes of a room by name, and remarks on how they came about."""
+    """Draft of an imported room: reflectors and occluders by name, and remarks on how they came about."""
 
     reflectors: dict[str, tuple[Mesh, dict[str, Any]]]
-    """Mesh and table of the material."""
+    """Mesh and table of the material of each reflector."""
     occluders: dict[str, Mesh] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @property
     def triangles(self) -> Floats:
-        """(T, 3, 3) [m] of all that stands in the room."""
+        """Triangles (T, 3, 3) [m] of all reflectors and occluders of a room's draft."""
         meshes = [mesh for mesh, _ in self.reflectors.values()] + list(self.occluders.values())
         return np.concatenate([mesh.triangles for mesh in meshes])
 
 
 def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, list[str]]:
-    """The room with an agent on a free way and a panel above it, and all remarks on it.
+    """Finish the draft of an imported room, with an agent on a free line and a RIS panel above it: its files, and all
+    remarks.
 
     Raises
     ------
@@ -71,7 +72,8 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
 
 
 def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
-    """A panel like the paper's on what is above the middle of the way, or else beside it."""
+    """Propose a RIS panel like the paper's on what is above the middle of the agent's line, or else beside it: its
+    table (None if nothing fits), and a remark."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.triangles for mesh, _ in draft.reflectors.values()])
     middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])
@@ -92,7 +94,7 @@ def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | N
 
 
 def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace) -> bool:
-    """Whether the corners of a panel look out from the same host, seen from the middle of the way."""
+    """Whether the corners of a proposed RIS panel lie on one host and are seen from the middle of the agent's line."""
     mesh, _ = draft.reflectors[host]
     down = np.cross(normal, right)
     corners = center + FROM_EDGE * np.array([right + down, right - down, -right + down, -right - down])

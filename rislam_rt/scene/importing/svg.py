@@ -32,7 +32,7 @@ _DEEPEST = 200
 
 
 def parse_svg(content: bytes) -> list[PlanShape]:
-    """Shapes of an SVG drawing, y turned up, its lower left corner at zero.
+    """Parse an SVG drawing into the shapes of a floor plan, y turned up, its lower left corner at zero.
 
     A shape is a room, wall, door or window by the words in its `class`, `id`, label or `data-kind`, or those of the
     groups around it; without any, closed shapes are rooms and open ones walls. `data-material`, `data-open`,
@@ -61,7 +61,8 @@ def parse_svg(content: bytes) -> list[PlanShape]:
 
 
 def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> Iterator[PlanShape]:
-    """Shapes of an SVG element and of those in it, by the transforms and kinds of the groups around them."""
+    """Shapes of a floor plan in an SVG element and in those within it, by the transforms and kinds of the groups around
+    them."""
     if depth > _DEEPEST:
         raise Fault(f"groups {_DEEPEST} deep", "save it as plain SVG")
     tag = str(element.tag).rpartition("}")[2]
@@ -83,7 +84,7 @@ def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> 
 
 
 def _kind(element: Tree.Element) -> str:
-    """First word for a kind in an SVG element's own names."""
+    """Kind of a floor plan's shape, by the first word for one in an SVG element's own names; empty if there is none."""
     own = " ".join(
         value
         for key, value in element.attrib.items()
@@ -94,7 +95,7 @@ def _kind(element: Tree.Element) -> str:
 
 
 def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
-    """Points of an SVG shape, and whether it is closed."""
+    """Points (n, 2) of an SVG shape of a floor plan, and whether it is closed."""
     if tag == "path":
         yield from _path(element.get("d", ""))
         return
@@ -116,6 +117,7 @@ def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
 
 
 def _length(element: Tree.Element, key: str) -> float:
+    """Number in an attribute of an SVG element."""
     text = element.get(key, "0")
     found = _NUMBER.fullmatch(text.strip().removesuffix("px"))
     if found is None:
@@ -124,7 +126,7 @@ def _length(element: Tree.Element, key: str) -> float:
 
 
 def _path(text: str) -> Iterator[tuple[Floats, bool]]:
-    """Straight parts of an SVG path: (points, closed)."""
+    """Straight parts of an SVG path of a floor plan: (points (n, 2), closed)."""
     here = np.zeros(2)
     points: list[Floats] = []
     for letter, rest in _STEP.findall(text):
@@ -155,7 +157,7 @@ def _path(text: str) -> Iterator[tuple[Floats, bool]]:
 
 
 def _matrix(text: str) -> Floats:
-    """(3, 3) of an SVG `transform` attribute."""
+    """Matrix (3, 3) of an SVG element's `transform` attribute."""
     total = np.eye(3)
     for name, rest in _TRANSFORM.findall(text):
         n = [float(word) for word in _NUMBER.findall(rest)]

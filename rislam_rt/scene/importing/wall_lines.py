@@ -1,4 +1,4 @@
-"""The straight lines of a floor plan's walls: walls on one line joined, ends that nearly meet a wall brought to it."""
+"""Lines of the walls of a floor plan: walls on one straight line joined, ends that nearly meet a wall brought to it."""
 
 from typing import Any, NamedTuple
 
@@ -8,47 +8,49 @@ from rislam_rt.arrays import Floats
 from rislam_rt.scene.importing.floor_plan import FloorPlan
 
 SAME_LINE = 5e-3
-"""[m] Walls whose lines are nearer than this are one."""
+"""Distance [m] of two walls' lines below which they are one."""
 
 
 PARALLEL = np.radians(0.2)
+"""Angle [rad] of two walls below which they are parallel."""
 
 
 SNAP = 0.05
-"""[m] An end of a wall this near another wall reaches it."""
+"""Distance [m] of a wall's end from another wall up to which it is brought to it."""
 
 
 Spans = list[tuple[float, float]]
 
 
 class Line(NamedTuple):
-    """A straight line of walls."""
+    """A straight line of walls on a floor plan."""
 
     start: Floats
-    """(2,) [m]."""
+    """(2,) [m] point of the line from which `spans` count."""
     along: Floats
-    """(2,) unit vector."""
+    """(2,) unit vector along the line."""
     spans: Spans
-    """[m] From where to where along the line there is wall."""
+    """From where to where [m] along the line there is wall."""
     material: dict[str, Any] | None
     name: str
 
     @property
     def across(self) -> Floats:
-        """(2,) unit vector to the left of a wall's line."""
+        """Unit vector (2,) to the left of a line of walls."""
         return np.array([-self.along[1], self.along[0]])
 
     def at(self, place: float, height: float) -> Floats:
-        """(3,) [m] point of a wall's line."""
+        """Point (3,) [m] at a place [m] along the line of walls and a height [m]."""
         return np.append(self.start + place * self.along, height)
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distances (...,) [m] of points (..., 2) from a wall's line, positive to its left."""
+        """Signed distances (...,) [m] of points (..., 2) from a line of walls, positive to its left."""
         return np.asarray((points - self.start) @ self.across)
 
 
 def wall_lines(plan: FloorPlan) -> list[Line]:
-    """Walls along one line, joined; those drawn by themselves come before the edges of rooms, which yield to them."""
+    """Lines of all walls of a floor plan, those along one line joined; walls drawn by themselves come before the edges
+    of rooms, which yield to them."""
     drawn = [(line, material, name) for line, material, name in plan.walls]
     edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
     lines: list[Line] = []
@@ -77,12 +79,13 @@ def wall_lines(plan: FloorPlan) -> list[Line]:
 
 
 def is_on_line(line: Line, ends: Floats, along: Floats) -> bool:
-    """Whether a wall from one end to the other (2, 2) [m] lies on a line and along it."""
+    """Whether a wall from one end to the other (2, 2) [m] lies on a floor plan's line of walls and along it."""
     turn = abs(float(line.along[0] * along[1] - line.along[1] * along[0]))
     return turn < PARALLEL and float(np.abs(line.distance(ends)).max()) < SAME_LINE
 
 
 def _joined_spans(spans: Spans) -> Spans:
+    """Spans of a wall's line in order, those that touch joined."""
     found: Spans = []
     for low, high in sorted(spans):
         if found and low <= found[-1][1] + SAME_LINE:
@@ -93,7 +96,7 @@ def _joined_spans(spans: Spans) -> Spans:
 
 
 def without_span(spans: Spans, low: float, high: float) -> Spans:
-    """Spans of a wall's line with what lies from `low` to `high` cut out."""
+    """Spans of a floor plan's line of walls with what lies from `low` to `high` cut out."""
     found: Spans = []
     for a, b in spans:
         found += [(x, y) for x, y in ((a, min(b, low)), (max(a, high), b)) if y - x > SAME_LINE]
@@ -101,7 +104,7 @@ def without_span(spans: Spans, low: float, high: float) -> Spans:
 
 
 def snapped_spans(line: Line, lines: list[Line]) -> Spans:
-    """Spans whose ends reach the walls that they nearly touch."""
+    """Spans of a wall's line with their ends brought to the walls that they nearly touch."""
     meets = []
     for other in lines:
         slope = float(line.along @ other.across)

@@ -1,7 +1,7 @@
-"""Rooms and motions drawn at random, each from one integer seed: what a filter has never seen."""
+"""Random rooms and motions, each drawn from one integer seed: what a filter has never seen."""
 
 from rislam_rt.scene.random_rooms.floor_plan import SHAPES
-from rislam_rt.scene.random_rooms.random_motion import CYCLE, CYCLES, MOTIONS
-from rislam_rt.scene.random_rooms.room import RandomRoom, draw_room, scene_digest
+from rislam_rt.scene.random_rooms.random_motion import CYCLES, MOTIONS
+from rislam_rt.scene.random_rooms.room import RandomRoom, draw_room
 
-__all__ = ["CYCLE", "CYCLES", "MOTIONS", "SHAPES", "RandomRoom", "draw_room", "scene_digest"]
+__all__ = ["CYCLES", "MOTIONS", "SHAPES", "RandomRoom", "draw_room"]

@@ -1,4 +1,4 @@
-"""Rooms drawn at random, in memory: what a classifier learns from, so that every named room stays unseen."""
+"""Random box rooms, drawn in memory: what a classifier learns from, so that every named room stays unseen."""
 
 import numpy as np
 
@@ -9,30 +9,33 @@ from rislam_rt.scene.shapes import block, hexahedron
 from rislam_rt.scene.solids import sphere_mesh
 
 SIZE, HEIGHT = (3.5, 9.0), (2.3, 4.0)
-"""Ranges of a room's sides and height [m]."""
+"""Ranges [m] of a random box room's sides and height."""
 TILTED, TILT = 0.4, 0.08
-"""Share of rooms whose planes all lean, and standard deviation of their normals then."""
+"""Share of rooms whose planes all lean, and the standard deviation of their normals then."""
 FURNISHED = 0.4
-"""Share of rooms with a reflecting block on the floor."""
+"""Share of random box rooms with a reflecting block on the floor."""
 REFLECTION, RADIUS = (0.3, 0.95), (0.03, 0.3)
-"""Ranges of reflection coefficients, and of scatterer radii [m] (log-uniform)."""
+"""Ranges of a random box room's reflection coefficients, and of its scatterers' radii [m] (log-uniform)."""
 ALIKE, SLABS = 0.35, 0.35
-"""Shares of rooms of one reflection coefficient, and of slabs of building materials; in the others every wall has its
-own coefficient."""
+"""Shares of random box rooms of one reflection coefficient, and of slabs of building materials; in the others every
+wall has its own coefficient."""
 THICKNESS = {"concrete": 0.2, "brick": 0.12, "plasterboard": 0.025, "chipboard": 0.02, "marble": 0.03, "glass": 0.008,
              "plywood": 0.02, "wood": 0.03, "metal": 0.005}  # fmt: skip
-"""ITU materials and thicknesses [m], which vary by a factor of 0.6 to 1.6."""
+"""ITU materials of random box rooms and their thicknesses [m], which vary by a factor of 0.6 to 1.6."""
 SHADING = 0.5
-"""Share of scatterers above 0.1 m of radius that hide what lies behind them."""
+"""Share of a random box room's scatterers above 0.1 m of radius that hide what lies behind them."""
 PANEL, CEILING_PANEL, ELEMENTS = 0.8, 0.5, (4, 16)
-"""Share of rooms with a panel, of panels in the ceiling (the others are on a wall); range of elements along a side."""
+"""Share of random box rooms with a RIS panel, of panels in the ceiling (the others are on a wall); range of elements
+along a side."""
 MAX_SCATTERERS = 4
+"""Most scatterers of a random box room."""
 MARGIN = 0.5
 """Least distance [m] of a scatterer's or the panel's centre from the walls of an upright room."""
 
 
 def random_room(name: str, *, rng: np.random.Generator) -> Scene:
-    """A room with walls, perhaps a block, one to four spheres, and perhaps a panel; the agent stands at a corner."""
+    """Draw a random box room: walls, perhaps a block, one to four spheres, and perhaps a RIS panel; the agent stands at
+    a corner."""
     size = np.array([*rng.uniform(*SIZE, size=2), rng.uniform(*HEIGHT)])
     corners = _corners(size, TILT if rng.uniform() < TILTED else 0.0, rng)
     meshes = hexahedron(corners)
@@ -53,7 +56,7 @@ def random_room(name: str, *, rng: np.random.Generator) -> Scene:
 
 
 def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
-    """Corners of a random box room (2, 2, 2, 3): each the common point of three planes, so that faces are flat."""
+    """Corners (2, 2, 2, 3) of a random box room: each the common point of three planes, so that faces are flat."""
     normal = np.concatenate([np.eye(3), np.eye(3)]).reshape(2, 3, 3)
     normal = unit(normal + tilt * rng.standard_normal((2, 3, 3)))
     point = np.stack([0.5 * size * (1.0 - np.eye(3)), 0.5 * size * (1.0 + np.eye(3))])
@@ -66,6 +69,7 @@ def _corners(size: Floats, tilt: float, rng: np.random.Generator) -> Floats:
 
 
 def _materials(count: int, rng: np.random.Generator) -> list[Material]:
+    """Draw the materials of a random box room's walls and block."""
     kind = rng.uniform()
     if kind < ALIKE:
         return count * [Material(reflection=float(rng.uniform(*REFLECTION)))]
@@ -76,6 +80,7 @@ def _materials(count: int, rng: np.random.Generator) -> list[Material]:
 
 
 def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
+    """Draw a spherical scatterer in a random box room."""
     radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
     center = rng.uniform([MARGIN, MARGIN, 0.15 * size[2]], [*(size[:2] - MARGIN), 0.8 * size[2]])
     shade = None
@@ -86,7 +91,7 @@ def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
 
 
 def _panel(corners: Floats, size: Floats, rng: np.random.Generator) -> RisPanel:
-    """In the ceiling or in the upper half of a wall, its front into the room."""
+    """Draw a RIS panel in the ceiling of a random box room or in the upper half of a wall, its front into the room."""
     host, (a, b, c) = "ceiling", (corners[0, 0, 1], corners[1, 0, 1], corners[0, 1, 1])
     share = rng.uniform(0.25, 0.75, size=2)
     if rng.uniform() >= CEILING_PANEL:

@@ -1,4 +1,4 @@
-"""Floor plans drawn at random, and questions to them: simple polygons, counter-clockwise."""
+"""Random floor plans, and geometric queries to them: simple polygons, counter-clockwise."""
 
 import numpy as np
 
@@ -7,21 +7,22 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.scene.polygons import inside_loop
 
 SHAPES = ("convex", "l", "t", "u")
-"""Shapes of a plan."""
+"""Shapes of a random floor plan."""
 SIZE, SIZE_WITH_ARMS = (2.0, 30.0), (5.0, 30.0)
-"""Ranges [m] of the longer side, log-uniform; a plan with arms begins where an arm has room for an agent."""
+"""Ranges [m] of a plan's longer side, log-uniform; a plan with arms begins where an arm has room for an agent."""
 ASPECT = (0.5, 1.0)
-"""Shorter side over the longer."""
+"""Shorter side of a random floor plan over the longer."""
 RECTANGLES = 0.5
-"""Share of the convex plans that are rectangles; the others have 4 to 7 corners on an ellipse."""
+"""Share of the random convex floor plans that are rectangles; the others have 4 to 7 corners on an ellipse."""
 ARM = (0.28, 0.48)
-"""Width of an arm as a share of the side that it stands on."""
+"""Width of an arm of a random floor plan as a share of the side that it stands on."""
 OFFSET = 5.0
-"""The plan's middle lies within this of the origin [m], so that no coordinate means anything."""
+"""Largest distance [m] of a plan's middle from the origin along either axis, so that no coordinate means anything."""
 
 
 def draw_plan(shape: str, *, rng: np.random.Generator) -> Floats:
-    """Corners (E, 2) [m] of a plan of one of `SHAPES`, of random size, turned and shifted at random."""
+    """Draw the corners (E, 2) [m] of a random room's floor plan of one of `SHAPES`, of random size, turned and shifted
+    at random."""
     long = float(np.exp(rng.uniform(*np.log(SIZE if shape == "convex" else SIZE_WITH_ARMS))))
     sides = np.array([long, long * rng.uniform(*ASPECT)])
     outline = {"convex": _convex, "l": _ell, "t": _tee, "u": _horseshoe}[shape](sides, rng)
@@ -31,12 +32,12 @@ def draw_plan(shape: str, *, rng: np.random.Generator) -> Floats:
 
 
 def extent(outline: Floats) -> float:
-    """Largest distance [m] between two corners of a random room's plan."""
+    """Largest distance [m] between two corners of a random room's floor plan."""
     return float(np.linalg.norm(outline[:, None] - outline, axis=-1).max())
 
 
 def area(outline: Floats) -> float:
-    """[m^2] of a random room's plan, positive where the corners run counter-clockwise.
+    """Area [m^2] of a random room's floor plan, positive where the corners run counter-clockwise.
 
     Its rounding decides which of two flat ears is cut off, and so the meshes of every room that was ever drawn.
     """
@@ -45,7 +46,7 @@ def area(outline: Floats) -> float:
 
 
 def depth_inside(outline: Floats, points: Floats) -> Floats:
-    """Distance (...,) [m] of points (..., 2) from the outline of a plan, negative outside."""
+    """Distance (...,) [m] of points (..., 2) from the outline of a random room's floor plan, negative outside."""
     start, along = outline, np.roll(outline, -1, axis=0) - outline
     offset = points[..., None, :] - start
     share = np.clip(np.sum(offset * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
@@ -54,7 +55,7 @@ def depth_inside(outline: Floats, points: Floats) -> Floats:
 
 
 def triangulate(outline: Floats) -> Integers:
-    """Triangles (E - 2, 3), counter-clockwise, of a plan (a simple polygon), by cutting off ears."""
+    """Triangulate a random room's floor plan, a simple polygon, by cutting off ears: (E - 2, 3), counter-clockwise."""
     left = list(range(len(outline)))
     faces = []
     while len(left) > 3:
@@ -65,7 +66,8 @@ def triangulate(outline: Floats) -> Integers:
 
 
 def halve(outline: Floats, point: Floats, normal: Floats) -> Floats:
-    """Part of a convex plan where `normal . (x - point)` is not negative."""
+    """Corners of the part of a convex floor plan on one side of a line, where `normal . (x - point)` is not
+    negative."""
     side = (outline - point) @ normal
     kept = []
     for a, b, near, far in zip(outline, np.roll(outline, -1, axis=0), side, np.roll(side, -1), strict=True):
@@ -75,6 +77,7 @@ def halve(outline: Floats, point: Floats, normal: Floats) -> Floats:
 
 
 def _convex(sides: Floats, rng: np.random.Generator) -> Floats:
+    """Draw the corners of a random convex floor plan of given sides: a rectangle, or 4 to 7 corners on an ellipse."""
     if rng.uniform() < RECTANGLES:
         return np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * sides
     count = int(rng.integers(4, 8))
@@ -85,11 +88,13 @@ def _convex(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _ell(sides: Floats, rng: np.random.Generator) -> Floats:
+    """Draw the corners of a random L-shaped floor plan of given sides."""
     (a, b), (u, v) = sides, rng.uniform(*ARM, size=2) * sides
     return np.array([[0, 0], [a, 0], [a, v], [u, v], [u, b], [0, b]], dtype=np.float64)
 
 
 def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
+    """Draw the corners of a random T-shaped floor plan of given sides."""
     (a, b), (u, v) = sides, rng.uniform(*ARM, size=2) * sides
     left = rng.uniform(0.3, 0.7) * (a - u)
     right = left + u
@@ -99,6 +104,7 @@ def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
+    """Draw the corners of a random U-shaped floor plan of given sides."""
     (a, b), floor = sides, rng.uniform(*ARM) * sides[1]
     left, right = rng.uniform(ARM[0], 0.38, size=2) * a
     return np.array(
@@ -107,6 +113,7 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:
+    """Whether a floor plan's corner is an ear that can be cut off: convex, with no other corner in its triangle."""
     before, here, after = left[place - 1], left[place], left[(place + 1) % len(left)]
     corners = outline[[before, here, after]]
     if area(corners) <= 0.0:

@@ -1,4 +1,4 @@
-"""Furniture drawn at random: boxes that reflect and shade, turned anyhow, clear of each other and of the way."""
+"""Random furniture: boxes that reflect and hide, turned anyhow, clear of each other and of the agent's path."""
 
 from typing import NamedTuple
 
@@ -17,17 +17,19 @@ KINDS = {
     "table": ((0.8, 2.0), (0.5, 0.9), (0.65, 0.8)),
     "crate": ((0.3, 1.2), (0.3, 1.2), (0.3, 1.2)),
 }
-"""Ranges [m] of length, width and height; a table is a top of `TABLE_TOP` without legs."""
+"""Ranges [m] of length, width and height of each kind of furniture; a table is a top of `TABLE_TOP` without legs."""
 TABLE_TOP = 0.05
+"""Thickness [m] of a table top."""
 OFF_WAY, OFF_WALLS, APART = 0.55, 0.1, 0.15
-"""Least distances [m] of a piece from the way (where their heights meet), from the walls and from another piece."""
+"""Least distances [m] of a piece of furniture from the agent's path (where their heights meet), from the walls and from
+another piece."""
 HEADROOM = 0.4
-"""[m] above and below the way within which a piece counts as on its height, and below the ceiling."""
+"""[m] above and below the agent's path within which a piece counts as on its height, and below the ceiling."""
 _TRIES = 40
 
 
 class FurniturePiece(NamedTuple):
-    """A box on the floor, or a table top."""
+    """A piece of furniture: a box on the floor, or a table top."""
 
     kind: str
     center: Floats
@@ -35,16 +37,19 @@ class FurniturePiece(NamedTuple):
     half: Floats
     """(2,) half length and half width [m]."""
     yaw: float
+    """Angle [rad] of its length from x."""
     bottom: float
+    """Height [m] of its lower face."""
     top: float
+    """Height [m] of its upper face."""
 
     @property
     def turn(self) -> Floats:
-        """(2, 2) from the piece's axes to the room's."""
+        """Rotation (2, 2) from the axes of a piece of furniture to the room's."""
         return np.asarray(rotation_z(np.array(self.yaw))[:2, :2])
 
     def rim(self) -> Floats:
-        """(16, 2) points around a piece of furniture's outline."""
+        """Points (16, 2) [m] around the outline of a piece of furniture."""
         share = np.array([-1.0, -0.5, 0.0, 0.5])
         one = np.ones(4)
         square = np.concatenate(
@@ -53,12 +58,12 @@ class FurniturePiece(NamedTuple):
         return np.asarray(self.center + (square * self.half) @ self.turn.T)
 
     def distance(self, points: Floats) -> Floats:
-        """(...,) [m] of points (..., 2) from a piece of furniture, zero inside."""
+        """Horizontal distance (...,) [m] of points (..., 2) from a piece of furniture, zero inside."""
         local = np.abs((points - self.center) @ self.turn) - self.half
         return np.asarray(np.linalg.norm(np.maximum(local, 0.0), axis=-1))
 
     def holds(self, points: Floats, margin: float) -> Booleans:
-        """Which points (..., 3) lie in a piece of furniture or within a margin [m] of it."""
+        """Whether (...,) points (..., 3) lie in a piece of furniture or within a margin [m] of it."""
         near = self.distance(points[..., :2]) < margin
         return np.asarray(near & (points[..., 2] > self.bottom - margin) & (points[..., 2] < self.top + margin))
 
@@ -73,16 +78,16 @@ class FurniturePiece(NamedTuple):
 
 
 class PlacementLimits(NamedTuple):
-    """What a new piece must fit into."""
+    """What furniture and landmarks of a random room must fit into: its floor plan, its roof, and the agent's path."""
 
     outline: Floats
     roof: Roof
     way: Floats
-    """(K, 3) [m]."""
+    """(K, 3) [m] positions of the agent."""
 
 
 def draw_pieces(ground: PlacementLimits, count: int, *, rng: np.random.Generator) -> list[FurniturePiece]:
-    """Up to `count` pieces: fewer where there is no room."""
+    """Draw up to `count` pieces of furniture in a random room: fewer where there is no room."""
     pieces: list[FurniturePiece] = []
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     for _ in range(count):
@@ -96,14 +101,15 @@ def draw_pieces(ground: PlacementLimits, count: int, *, rng: np.random.Generator
 
 
 def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generator) -> FurniturePiece:
-    """A piece of random size at a place."""
+    """Draw a piece of furniture of one kind and random size at a place (2,) [m] and yaw [rad]."""
     length, width, height = (float(rng.uniform(*limits)) for limits in KINDS[kind])
     bottom = height - TABLE_TOP if kind == "table" else 0.0
     return FurniturePiece(kind, center, np.array([0.5 * length, 0.5 * width]), yaw, bottom, height)
 
 
 def fits(piece: FurniturePiece, ground: PlacementLimits, others: list[FurniturePiece]) -> bool:
-    """Whether a piece of furniture stands inside the plan, below the ceiling, off the way and off all others."""
+    """Whether a piece of furniture stands inside the floor plan, below the ceiling, off the agent's path and off all
+    others."""
     rim = piece.rim()
     if depth_inside(ground.outline, rim).min() < OFF_WALLS or ground.roof.height(rim).min() < piece.top + HEADROOM:
         return False

@@ -1,4 +1,4 @@
-"""Landmarks drawn at random, scatterers and panel: open, below the agent, behind a screen; on any wall or in the
+"""Random landmarks of a room, scatterers and RIS panel: open, below the agent, behind a screen; on any wall or in the
 ceiling."""
 
 import numpy as np
@@ -12,38 +12,39 @@ from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimi
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
 RADIUS = (0.03, 0.25)
-"""Range [m] of the scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
+"""Range [m] of the random scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
 PLACES = ("open", "below", "hidden")
-"""Where a scatterer is: anywhere, below the whole motion, or behind a screen for most of it."""
+"""Where a random scatterer is: anywhere, below the whole motion, or behind a screen for most of it."""
 SHARES = (0.6, 0.2, 0.2)
-"""How often each is asked for."""
+"""Shares of the random scatterers that each of `PLACES` is asked for."""
 OFF_SURFACES, OFF_WAY, APART = 0.2, 0.45, 0.5
-"""Least distances [m] of a scatterer from surfaces, from the way and from other landmarks."""
+"""Least distances [m] of a random scatterer from surfaces, from the agent's path and from other landmarks."""
 BELOW = 0.15
-"""[m] by which a scatterer lies below all of the motion."""
+"""[m] by which a random scatterer at `below` lies below all of the motion."""
 BEHIND, TALLER = (0.35, 0.7), 0.4
-"""Range [m] of a screen's distance from what it hides, and by how much it is taller."""
+"""Range [m] of a screen's distance from the scatterer that it hides, and by how much it is taller."""
 MOST = 0.6
-"""Least share of the motion from which a hidden scatterer is not seen over the straight line."""
+"""Least share of the agent's path from which a hidden scatterer is not seen over the straight line."""
 ELEMENTS = (4, 16)
-"""Range of a panel's elements along one side."""
+"""Range of a random RIS panel's elements along one side."""
 SQUARE = 0.6
-"""Share of panels that are square."""
+"""Share of random RIS panels that are square."""
 LEVELS, PATTERNS = (2, 4, 8), ("tang", "energy")
-"""Phase levels and element patterns, each as often."""
+"""Phase levels and element patterns of random RIS panels, each as often."""
 SPACING = 0.015
-"""[m] half a wavelength at 10 GHz."""
+"""Distance [m] between the elements of a random RIS panel: half a wavelength at 10 GHz."""
 EDGE = 0.4
-"""Least distance [m] of a panel's centre from the edges of its wall or ceiling."""
+"""Least distance [m] of a RIS panel's centre from the edges of its wall or ceiling."""
 ABOVE = 0.3
-"""[m] by which a panel on a wall lies above the start: an array that looks up hears nothing from below."""
+"""Least height [m] of a RIS panel on a wall above the start: an array that looks up hears nothing from below."""
 _TRIES = 60
 
 
 def draw_scatterer(
     place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> tuple[Floats, list[FurniturePiece]] | None:
-    """A place (3,) of one of `PLACES` for a scatterer, and the screen that hides it, if any; None without one."""
+    """Draw the position (3,) of a random scatterer, at one of `PLACES`, and the screen that hides it, if any; None
+    where nothing fits."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
     for _ in range(_TRIES):
@@ -67,7 +68,7 @@ def draw_scatterer(
 
 
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
-    """Share of a way (K, 3) from which furniture hides a random landmark (3,), every tenth of it looked at."""
+    """Share of the agent's path (K, 3) from which furniture hides a landmark (3,), every tenth position looked at."""
     seen_from = way[::10]
     triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
     if not triangles:
@@ -77,7 +78,7 @@ def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> fl
 
 
 def make_scatterer(number: int, position: Floats, *, rng: np.random.Generator) -> Scatterer:
-    """A sphere of random radius."""
+    """Make a spherical scatterer of random radius at a position (3,) [m]."""
     radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
     return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
 
@@ -85,7 +86,7 @@ def make_scatterer(number: int, position: Floats, *, rng: np.random.Generator) -
 def draw_panel(
     side: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> RisPanel | None:
-    """A panel on a `wall` or in the `ceiling`; None where there is no room for its centre."""
+    """Draw a RIS panel on a `wall` or in the `ceiling` of a random room; None where there is no room for its centre."""
     for _ in range(_TRIES):
         found = _on_wall(ground, rng) if side == "wall" else _in_ceiling(ground, rng)
         if found is None:
@@ -98,6 +99,7 @@ def draw_panel(
 
 
 def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec:
+    """Draw the data sheet of a RIS panel with this normal and up: size, levels, and element pattern."""
     rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
     if rng.uniform() < SQUARE:
         cols = rows
@@ -106,8 +108,8 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Place for a random panel on a wall, longer ones more often, above the start and below its upper edge: host,
-    centre, normal and up."""
+    """Draw the place of a RIS panel on a wall, longer ones more often, above the start and below its upper edge: host,
+    centre, normal and up; None where it does not fit."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)
@@ -124,6 +126,7 @@ def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Fl
 
 
 def _in_ceiling(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
+    """Draw the place of a RIS panel in the ceiling: host, centre, normal and up; None where it does not fit."""
     outline, roof = ground.outline, ground.roof
     flat = rng.uniform(outline.min(axis=0), outline.max(axis=0))
     ridge = (flat - roof.point) @ roof.axis
@@ -138,7 +141,7 @@ def _in_ceiling(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str,
 
 
 def _screen_before(point: Floats, ground: PlacementLimits, rng: np.random.Generator) -> FurniturePiece:
-    """A screen that hides a random landmark: across the line from it to the middle of the way."""
+    """Draw a screen that hides a random scatterer: across the line from it to the middle of the agent's path."""
     toward = unit(ground.way[len(ground.way) // 2, :2] - point[:2])
     center = point[:2] + rng.uniform(*BEHIND) * toward
     screen = draw_piece("screen", center, float(np.arctan2(toward[1], toward[0]) + np.pi / 2.0), rng=rng)
@@ -146,6 +149,7 @@ def _screen_before(point: Floats, ground: PlacementLimits, rng: np.random.Genera
 
 
 def _is_free(point: Floats, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats) -> bool:
+    """Whether the position of a random scatterer is off walls, furniture, other landmarks and the agent's path."""
     if float(depth_inside(ground.outline, point[:2])) < OFF_SURFACES:
         return False
     if any(piece.holds(point, OFF_SURFACES) for piece in pieces):

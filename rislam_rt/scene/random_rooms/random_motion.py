@@ -1,4 +1,4 @@
-"""Motions drawn at random: speed, rates of turn and of climb over time, integrated from a start that keeps clear."""
+"""Random motions of an agent: speed, rates of turn and of climb over time, integrated from a start that keeps clear."""
 
 from typing import NamedTuple
 
@@ -12,28 +12,30 @@ from rislam_rt.scene.random_rooms.floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import Roof
 
 MOTIONS = ("straight", "curve", "corner", "stop", "turn", "climb")
-"""Kinds of motion."""
+"""Kinds of random motion."""
 CYCLES, CYCLE = 300, 0.1
-"""Length of a motion, and time [s] between cycles: half a minute."""
+"""Number of cycles of a random motion, and time [s] between them: half a minute."""
 SPEED, SLOWEST = (0.05, 0.6), 0.01
-"""Range of speeds [m/s], log-uniform; in a room too small for a draw it is slowed down, no further than to this."""
+"""Range of random speeds [m/s], log-uniform; in a room too small for a draw it is slowed down, no further than to
+`SLOWEST`."""
 OFF_WALLS, BELOW_CEILING = 0.45, 0.6
-"""Least distances [m] of a motion from the walls and from the ceiling."""
+"""Least distances [m] of a random motion from the walls and from the ceiling."""
 HEIGHT, CLIMB = (0.3, 1.6), (0.3, 0.9)
-"""Ranges [m] of the height at the start, and of a climb or descent."""
+"""Ranges [m] of a random motion's height at the start, and of its climb or descent."""
 WANDER = 0.12
-"""Standard deviation [rad/s] of the rate of turn of a curve."""
+"""Standard deviation [rad/s] of the rate of turn of a random motion along a curve."""
 CORNER, CORNER_TIME = (0.9, 2.2), 0.5
-"""Range [rad] of the turn at a corner, and the time [s] that it takes."""
+"""Range [rad] of the turn at a corner of a random motion, and the time [s] that it takes."""
 STANDING, WALKING, BRAKING = (1.0, 3.0), (2.0, 6.0), 0.6
-"""Ranges [s] of a stop and of the way between two, and the time [s] to brake or set off."""
+"""Ranges [s] of a random motion's stops and of the time between two, and the time [s] to brake or set off."""
 SPIN = (1.0, 3.0)
-"""Range [rad] of a turn on the spot."""
+"""Range [rad] of a random motion's turn on the spot."""
 _STARTS, _SLOWER = 64, 0.8
 
 
 class MotionProfile(NamedTuple):
-    """A motion about its start: shares of the speed, rates of turn [rad/s] and of climb [m/s], (K,) each."""
+    """Profile of a random motion about its start: shares of the speed, rates of turn [rad/s] and of climb [m/s], (K,)
+    each."""
 
     pace: Floats
     turn: Floats
@@ -41,7 +43,7 @@ class MotionProfile(NamedTuple):
 
 
 def draw_motion_profile(kind: str, *, rng: np.random.Generator) -> MotionProfile:
-    """A course of one of `MOTIONS`."""
+    """Draw the profile of a random motion of one of `MOTIONS`."""
     time = _times()
     still, steady = np.zeros(CYCLES), np.ones(CYCLES)
     if kind == "straight":
@@ -57,7 +59,7 @@ def draw_motion_profile(kind: str, *, rng: np.random.Generator) -> MotionProfile
 
 
 def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.random.Generator) -> Trajectory:
-    """A course laid into a plan from a random start at a random speed, heading along the motion.
+    """Lay a random motion's profile into a floor plan, from a random start at a random speed, heading along the motion.
 
     Raises
     ------
@@ -91,19 +93,20 @@ def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.r
 
 
 def _times() -> Floats:
-    """(K,) [s] of a random motion."""
+    """Times (K,) [s] of a random motion's cycles."""
     return CYCLE * np.arange(CYCLES, dtype=np.float64)
 
 
 def _start_height(roof: Roof, place: Floats, rise: Floats, rng: np.random.Generator) -> float | None:
-    """Height [m] at the start: the whole motion stays between the lowest height and the ceiling."""
+    """Draw the height [m] at the start of a random motion, all of which stays between the lowest height and the
+    ceiling; None if it cannot."""
     room = roof.height(place) - BELOW_CEILING - rise
     low, high = HEIGHT[0] - min(0.0, float(rise.min())), min(HEIGHT[1], float(room.min()))
     return None if high < low else float(rng.uniform(low, high))
 
 
 def _wander(time: Floats, rng: np.random.Generator) -> Floats:
-    """Random motion's smooth rate of turn: three sines of 6 to 20 s and a mean."""
+    """Draw the smooth rate of turn (K,) [rad/s] of a random motion: three sines of 6 to 20 s and a mean."""
     period, phase = rng.uniform(6.0, 20.0, size=3), rng.uniform(0.0, 2.0 * np.pi, size=3)
     weight = rng.standard_normal(4) * WANDER * np.array([0.6, 0.6, 0.6, 0.5])
     waves = np.sin(2.0 * np.pi * time[:, None] / period + phase)
@@ -111,7 +114,7 @@ def _wander(time: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _corners(time: Floats, rng: np.random.Generator) -> Floats:
-    """Turns at random times, 4 to 10 s apart."""
+    """Draw the rate of turn (K,) [rad/s] of a random motion with corners at random times, 4 to 10 s apart."""
     rate, at = np.zeros(len(time)), rng.uniform(2.0, 6.0)
     while at < time[-1]:
         turn = rng.uniform(*CORNER) * rng.choice([-1.0, 1.0])
@@ -121,7 +124,7 @@ def _corners(time: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[tuple[float, float]]]:
-    """Random motion's shares of the speed, and from when to when the agent stands."""
+    """Draw the stops of a random motion: its shares of the speed (K,), and from when to when [s] the agent stands."""
     pace, stops, at = np.ones(len(time)), [], rng.uniform(*WALKING)
     while at < time[-1]:
         end = at + rng.uniform(*STANDING)
@@ -133,7 +136,8 @@ def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[t
 
 
 def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Generator) -> Floats:
-    """Random motion's turn in every stop, at a constant rate over all of it."""
+    """Draw the rate of turn (K,) [rad/s] of a random motion that turns in every stop, at a constant rate over all of
+    it."""
     rate = np.zeros(len(time))
     for begin, end in stops:
         angle = rng.uniform(*SPIN) * rng.choice([-1.0, 1.0])
@@ -142,7 +146,7 @@ def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Genera
 
 
 def _climb(time: Floats, rng: np.random.Generator) -> Floats:
-    """Random motion's one rise or fall over 4 to 10 s, its rate a raised cosine."""
+    """Draw the rate of climb (K,) [m/s] of a random motion: one rise or fall over 4 to 10 s, a raised cosine."""
     begin, length = rng.uniform(2.0, 8.0), rng.uniform(4.0, 10.0)
     share = np.clip((time - begin) / length, 0.0, 1.0)
     height = rng.uniform(*CLIMB) * rng.choice([-1.0, 1.0])

@@ -1,4 +1,4 @@
-"""A whole room from one integer: plan, shell, motion, furniture, scatterers, panel, materials."""
+"""A random room from one integer seed: floor plan, shell, motion, furniture, scatterers, RIS panel, materials."""
 
 import hashlib
 from dataclasses import dataclass, replace
@@ -25,46 +25,50 @@ from rislam_rt.scene.random_rooms.random_motion import MOTIONS, draw_motion, dra
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
 SHAPE_SHARES = (0.4, 0.2, 0.2, 0.2)
-"""How often each of `SHAPES` is drawn."""
+"""Shares of the random rooms that have each of `SHAPES`."""
 REFLECTION, FURNITURE_REFLECTION = (0.2, 0.9), (0.2, 0.8)
-"""Ranges of the reflection coefficients of walls and of furniture."""
+"""Ranges of the reflection coefficients of a random room's walls and of its furniture."""
 ALIKE = 0.5
-"""Share of rooms whose walls are all of one coefficient; else each has its own."""
+"""Share of random rooms whose walls are all of one coefficient; else each has its own."""
 MAX_PIECES, MAX_SCATTERERS = 6, 6
+"""Most pieces of furniture and most scatterers of a random room."""
 PER_PIECE = 3.0
-"""Area [m^2] for each piece of furniture."""
+"""Area [m^2] of the floor plan for each piece of furniture."""
 PANEL, CEILING_PANEL = 0.7, 0.4
-"""Share of rooms with a panel, and of panels in the ceiling."""
+"""Share of random rooms with a RIS panel, and of panels in the ceiling."""
 _TRIES = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomRoom:
-    """A room, and the classes that it belongs to."""
+    """A random room, and the classes that it belongs to, by which results are grouped."""
 
     scene: Scene
     seed: int
     shape: str
+    """Shape of the floor plan, one of `SHAPES`."""
     ceiling: str
+    """Form of the ceiling, one of `CEILINGS`."""
     motion: str
+    """Kind of the motion, one of `MOTIONS`."""
     size: float
-    """Longest way across the plan [m]."""
+    """Longest way [m] across the floor plan."""
     reflection: float
-    """Mean over walls and ceiling."""
+    """Mean reflection coefficient of walls and ceiling."""
     pieces: int
-    """Of furniture."""
+    """Number of pieces of furniture."""
     below: int
-    """Scatterers below all of the motion."""
+    """Number of scatterers below all of the motion."""
     hidden: int
-    """Scatterers not seen over the straight line, because of furniture, from `MOST` of the motion."""
+    """Number of scatterers not seen over the straight line, because of furniture, from `MOST` of the motion."""
     panel: str
-    """`none`, `ceiling` or `wall`."""
+    """Where the RIS panel is: `none`, `ceiling` or `wall`."""
     speed: float
-    """Mean over the motion [m/s]."""
+    """Mean speed [m/s] over the motion."""
 
 
 def draw_room(seed: int) -> RandomRoom:
-    """The room of a seed, the same to the last bit on every call; it passes the scene check.
+    """Draw the random room of a seed, the same to the last bit on every call; it passes the scene check.
 
     Shape, ceiling, motion and whether there is a panel are drawn once; all else is drawn anew until it fits together,
     so that what is hard to fit is no rarer for it.
@@ -91,7 +95,8 @@ def draw_room(seed: int) -> RandomRoom:
 
 
 def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
-    """One draw of a random room: plan, roof, motion, furniture, landmarks, materials; refused where nothing fits in."""
+    """One draw of a random room: floor plan, roof, motion, furniture, landmarks, materials; refused where nothing fits
+    in."""
     outline = draw_plan(shape, rng=rng)
     roof = draw_roof(outline, ceiling, rng=rng)
     agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)
@@ -126,7 +131,7 @@ def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rn
 def _landmarks(
     ground: PlacementLimits, pieces: list[FurniturePiece], panel: str, rng: np.random.Generator
 ) -> tuple[list[Scatterer], RisPanel | None]:
-    """Landmarks of a random room: scatterers, as many as fit, and the panel; screens join the pieces."""
+    """Draw the landmarks of a random room: scatterers, as many as fit, and the RIS panel; screens join the pieces."""
     positions = np.zeros((0, 3))
     ris = None if panel == "none" else draw_panel(panel, ground, pieces, positions, rng=rng)
     marks = positions if ris is None else ris.center[None]
@@ -142,7 +147,7 @@ def _landmarks(
 def _reflectors(
     shell: dict[str, Mesh], pieces: list[FurniturePiece], rng: np.random.Generator
 ) -> tuple[Reflector, ...]:
-    """Walls and furniture of a random room with their materials."""
+    """Reflectors of a random room: its walls and furniture, with random materials."""
     common = float(rng.uniform(*REFLECTION))
     own = rng.uniform(*REFLECTION, size=len(shell))
     walls = np.full(len(shell), common) if rng.uniform() < ALIKE else own
@@ -155,7 +160,7 @@ def _reflectors(
 
 
 def scene_digest(scene: Scene) -> str:
-    """SHA-256 over all numbers of a scene that was made in memory; the room of a file has that of its files."""
+    """SHA-256 over all numbers of a scene that was made in memory; the scene of a file has that of its files."""
     digest = hashlib.sha256()
 
     def take(name: str, *arrays: Floats) -> None:

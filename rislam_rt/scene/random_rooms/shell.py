@@ -1,4 +1,4 @@
-"""Shell of a random room: floor, walls and ceiling over a plan."""
+"""Shell of a random room: floor, walls and ceiling over a floor plan."""
 
 from typing import NamedTuple
 
@@ -10,28 +10,34 @@ from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.random_rooms.floor_plan import extent, halve, triangulate
 
 CEILINGS = ("flat", "shed", "gable")
-"""Forms of a ceiling: level, one slope, two slopes (over convex plans)."""
+"""Forms of a random room's ceiling: level, one slope, two slopes (over convex plans)."""
 LOWEST = (2.2, 6.0)
-"""Range [m] of the height at the lowest wall, log-uniform; a small room is at most `SLENDER` times as high as wide."""
+"""Range [m] of the height at a random room's lowest wall, log-uniform; a small room is at most `SLENDER` times as high
+as wide."""
 SLENDER, RISE, STEEPEST = 1.3, (0.3, 5.0), 0.5
-"""Range [m] by which a sloped ceiling rises, log-uniform, and its largest slope."""
+"""Largest height of a small random room over its width; range [m] by which a sloped ceiling rises, log-uniform, and its
+largest slope."""
 
 
 class Roof(NamedTuple):
-    """Height of the ceiling: `top - slope * |axis . (x - point)|` for a gable, `low + slope * ...` for a shed."""
+    """Ceiling of a random room by its height: `top - slope * |axis . (x - point)|` for a gable, `low + slope * ...` for
+    a shed."""
 
     form: str
+    """One of `CEILINGS`."""
     lowest: float
-    """[m] at the lowest wall."""
+    """Height [m] at the lowest wall."""
     slope: float
+    """Rise over run."""
     axis: Floats
     """(2,) horizontal unit vector along which it rises."""
     point: Floats
     """(2,) on the line where a gable is highest and a shed lowest."""
     highest: float
+    """Height [m] at the highest line."""
 
     def height(self, points: Floats) -> Floats:
-        """(...,) [m] height of the shell's roof over points (..., 2)."""
+        """Height (...,) [m] of a random room's ceiling over points (..., 2)."""
         along = (points - self.point) @ self.axis
         if self.form == "gable":
             return np.asarray(self.highest - self.slope * np.abs(along))
@@ -39,7 +45,7 @@ class Roof(NamedTuple):
 
 
 def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
-    """Draw the shell's ceiling, of one of `CEILINGS`, over a plan."""
+    """Draw the ceiling of a random room, of one of `CEILINGS`, over its floor plan."""
     width = extent(outline)
     lowest = min(float(np.exp(rng.uniform(*np.log(LOWEST)))), max(LOWEST[0], SLENDER * width))
     angle = rng.uniform(-np.pi, np.pi)
@@ -74,19 +80,20 @@ def build_shell(outline: Floats, roof: Roof) -> dict[str, Mesh]:
 
 
 def wall_normal(outline: Floats, number: int) -> Floats:
-    """(3,) unit normal of a wall, into the room."""
+    """Unit normal (3,) of a random room's wall, into the room."""
     along = outline[(number + 1) % len(outline)] - outline[number]
     return unit(np.array([-along[1], along[0], 0.0]))
 
 
 def ceiling_normal(roof: Roof, point: Floats) -> Floats:
-    """(3,) unit normal of the ceiling over a point (2,), downwards."""
+    """Unit normal (3,) of a random room's ceiling over a point (2,), downwards."""
     rising = -np.sign((point - roof.point) @ roof.axis) if roof.form == "gable" else 1.0
     return unit(np.array([*(rising * roof.slope * roof.axis), -1.0]))
 
 
 def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
-    """Wall of the shell: a strip from the floor to the ceiling, with a corner more where a ridge meets it."""
+    """Mesh of one wall of a random room: a strip from the floor to the ceiling, with a corner more where a ridge meets
+    it."""
     feet = [a, b]
     near, far = ((p - roof.point) @ roof.axis for p in (a, b))
     if roof.form == "gable" and near * far < 0.0:
@@ -101,4 +108,5 @@ def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
 
 
 def _lifted(points: Floats, height: Floats) -> Floats:
+    """Points (n, 3) of a random room's shell: points (n, 2) of its floor plan at heights (n,)."""
     return np.column_stack([points, height])

@@ -1,4 +1,4 @@
-"""Clipping triangles to a window of the plan."""
+"""Clipping of a mesh's triangles to a window of the plan."""
 
 import numpy as np
 
@@ -7,7 +7,8 @@ from rislam_rt.scene.meshes import Mesh
 
 
 def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
-    """What of a mesh lies within lowest and highest x and y (2, 2) [m]: faces outside go, those across are cut.
+    """Clip a mesh to a window of the plan, lowest and highest x and y (2, 2) [m]: faces outside go, those across are
+    cut.
 
     Sutherland and Hodgman (Commun. ACM 1974), side by side; a cut triangle comes back as a fan of triangles.
     """
@@ -24,7 +25,7 @@ def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
 
 
 def _clipped(polygon: Floats, window: Floats) -> Floats:
-    """Part (N, 3) of a convex polygon of an XML scene within the window to which it is clipped."""
+    """Clip a convex polygon (n, 3) to a window of the plan."""
     for axis in (0, 1):
         for sign, limit in ((1.0, window[0, axis]), (-1.0, window[1, axis])):
             depth = sign * (polygon[:, axis] - limit)

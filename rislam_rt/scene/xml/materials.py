@@ -1,4 +1,4 @@
-"""The radio materials of a Sionna scene file: read as ours, and ours written as them."""
+"""Radio materials of a Sionna scene file (XML): read as ours, and ours written as them."""
 
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
@@ -11,24 +11,25 @@ from rislam_rt.scene.xml.shapes import number
 from rislam_rt.scene.xml.untrusted_xml import children
 
 DEFAULT_THICKNESS = 0.1
-"""[m] What Sionna takes where a scene gives none."""
+"""Thickness [m] that Sionna takes where a scene file gives none."""
 ABSORBER = "absorber-radio-material"
+"""Type of a Sionna material that reflects nothing."""
 LEFT_OUT = ("xpd_coefficient", "alpha_r", "alpha_i", "lambda_")
 """Properties of a Sionna material that are not carried over: all of diffuse scattering alone."""
 
 
 class XmlMaterial(NamedTuple):
-    """A material as read."""
+    """Radio material as read from a Sionna scene file, and what could not be carried over."""
 
     material: Material | None
-    """None where nothing is reflected: an absorber."""
+    """The material; None where nothing is reflected: an absorber."""
     notes: tuple[str, ...]
     """What could not be carried over."""
 
 
 def read_material(bsdf: Element) -> XmlMaterial:
-    """The material of a `<bsdf>` element: Sionna's `itu-radio-material` and `radio-material`, or any whose name says
-    `itu_...`, as Sionna itself takes them.
+    """Read the radio material of a `<bsdf>` element of a Sionna scene file: `itu-radio-material` and `radio-material`,
+    or any whose name says `itu_...`, as Sionna itself takes them.
 
     Raises
     ------
@@ -59,7 +60,8 @@ def read_material(bsdf: Element) -> XmlMaterial:
 
 
 def material_element(material: Material | None, name: str) -> Element:
-    """A `<bsdf>` that Sionna reads: its own ITU slab, a slab of given permittivity, or air for None.
+    """Make the `<bsdf>` element of a Sionna scene file for a material: its own ITU slab, a slab of given permittivity,
+    or air for None.
 
     A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
     only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no
@@ -84,15 +86,17 @@ def material_element(material: Material | None, name: str) -> Element:
 
 
 def _is_air(values: dict[str, Element]) -> bool:
+    """Whether the values of a Sionna material are those of air."""
     return (_number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)) == (1.0, 0.0)
 
 
 def _number(values: dict[str, Element], name: str, default: float) -> float:
+    """Number that a Sionna material gives under a name, or else the default."""
     return number(values[name], "value") if name in values else default
 
 
 def _made(**values: Any) -> Material:
-    """A material of an XML scene whose numbers are in range."""
+    """Material of an XML scene file from its numbers; an error where they are out of range."""
     try:
         return Material(**values)
     except SceneError as error:

@@ -1,4 +1,4 @@
-"""Reading a Mitsuba or Sionna RT scene file as meshes with names and materials."""
+"""Reading of a Mitsuba or Sionna RT scene file (XML) as meshes with names and materials."""
 
 import importlib.util
 import re
@@ -21,16 +21,17 @@ from rislam_rt.scene.xml.shapes import shape_mesh
 from rislam_rt.scene.xml.untrusted_xml import MAX_XML_BYTES, children, parse_xml
 
 SIONNA = "sionna:"
-"""What a name begins with that is one of Sionna's own scenes."""
+"""Prefix of a source's name that is one of the scenes which Sionna brings along."""
 PICTURE_ONLY = ("default", "integrator", "sensor", "emitter", "film", "texture", "medium", "path", "string", "float",
                 "integer", "boolean", "rgb", "spectrum", "sampler")  # fmt: skip
-"""Elements beside shapes and materials: what a camera would need."""
+"""Elements of an XML scene file that only a camera needs, and that are passed over."""
 MAX_NAME = 64
+"""Most characters of a reflector's name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class XmlPart:
-    """One shape of the file."""
+    """One shape of a Mitsuba or Sionna scene file: name, mesh and material."""
 
     name: str
     mesh: Mesh
@@ -41,7 +42,7 @@ class XmlPart:
 
 @dataclass(slots=True)
 class XmlScene:
-    """What a Mitsuba scene (XML) holds that a radio sees."""
+    """Shapes of a Mitsuba or Sionna scene file (XML) that a radio sees, and notes on what was left out."""
 
     parts: list[XmlPart] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -49,7 +50,7 @@ class XmlScene:
 
 
 def find_xml(source: str) -> Path:
-    """The file that a source names: a path, or `sionna:NAME` for a scene that Sionna RT brings along.
+    """Path of the scene file that a source names: a path, or `sionna:NAME` for a scene that Sionna RT brings along.
 
     Raises
     ------
@@ -69,14 +70,15 @@ def find_xml(source: str) -> Path:
 
 
 def sionna_scenes() -> dict[str, Path]:
-    """The scene files that the installed Sionna RT brings along, by name; it is not imported for that."""
+    """Paths of the scene files that the installed Sionna RT brings along, by name; it is not imported for that."""
     found = importlib.util.find_spec("sionna")
     folders = [Path(place) / "rt" / "scenes" for place in (found.submodule_search_locations or ())] if found else []
     return {file.stem: file for folder in folders for file in sorted(folder.glob("*/*.xml"))}
 
 
 def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = None) -> XmlScene:
-    """The shapes of a Mitsuba or Sionna scene file, with radio materials; where a window is given, what lies in it.
+    """Read the shapes of a Mitsuba or Sionna scene file, with radio materials; where a window is given, what lies in
+    it.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = Non
     where = ""
     try:
         root = _root(path)
-        coats, found = _Coats(root), XmlScene()
+        materials, found = _XmlMaterials(root), XmlScene()
         count = 0
         for number, shape in enumerate(_shapes(root)):
             identity = one_line(shape.get("id") or shape.get("name") or f"shape_{number}")
@@ -102,19 +104,19 @@ def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = Non
             count += len(mesh.faces)
             if count > max_faces:
                 raise _too_many(root, number, max_faces)
-            _take(found, identity, mesh if window is None else clip_mesh(mesh, window), coats.of(shape))
+            _take(found, identity, mesh if window is None else clip_mesh(mesh, window), materials.of(shape))
         where = ""
         if not found.parts:
             where_not = "no shape in it" if window is None else "no shape within the window"
             raise Fault(where_not, "give a scene with at least one mesh there")
     except Fault as fault:
         raise SceneError(fault.at(str(path), where).line) from None
-    found.notes[:0] = coats.notes
+    found.notes[:0] = materials.notes
     return found
 
 
-class _Coats:
-    """The materials of a file by their names, each read when a shape asks for it."""
+class _XmlMaterials:
+    """Materials of an XML scene file by their names, each read when a shape asks for it."""
 
     def __init__(self, root: Element) -> None:
         self._elements = {bsdf.get("id", ""): bsdf for bsdf in children(root, "bsdf")}
@@ -123,7 +125,8 @@ class _Coats:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """Material of a shape that was read from XML: its own, or the one it refers to."""
+        """Material of a shape of an XML scene file: its own, or the one it refers to; None where nothing is
+        reflected."""
         for own in children(shape, "bsdf"):
             return self._noted(read_material(own)).material
         for reference in children(shape, "ref"):
@@ -136,12 +139,14 @@ class _Coats:
             raise Fault(f"it refers to '{one_line(name)[:40]}', which the file does not define", "add that <bsdf>")
         raise Fault("it has no material", "add <ref id=...> to a <bsdf>, e.g. of type itu-radio-material")
 
-    def _noted(self, coat: XmlMaterial) -> XmlMaterial:
-        self.notes += coat.notes
-        return coat
+    def _noted(self, material: XmlMaterial) -> XmlMaterial:
+        """Keep the notes on a material of an XML scene file, and pass it on."""
+        self.notes += material.notes
+        return material
 
 
 def _root(path: Path) -> Element:
+    """Root element of a Mitsuba or Sionna scene file."""
     try:
         with path.open("rb") as file:
             content = file.read(MAX_XML_BYTES + 1)
@@ -154,7 +159,7 @@ def _root(path: Path) -> Element:
 
 
 def _shapes(parent: Element) -> Iterator[Element]:
-    """All shapes of an XML scene in order, those within a `merge` too.
+    """All shapes of an XML scene file in order, those within a `merge` too.
 
     Raises
     ------
@@ -175,7 +180,7 @@ def _shapes(parent: Element) -> Iterator[Element]:
 
 
 def _too_many(root: Element, number: int, max_faces: int) -> Fault:
-    """Too large a scene: how far it was read, and what to do."""
+    """Error for an XML scene file with too many faces: how far it was read, and what to do."""
     return Fault(
         f"more than {max_faces} faces in the first {number + 1} of {sum(1 for _ in _shapes(root))} shapes",
         "take a part: --within x0,y0,x1,y1 keeps what lies in that window of the plan [m]",
@@ -183,7 +188,7 @@ def _too_many(root: Element, number: int, max_faces: int) -> Fault:
 
 
 def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None) -> None:
-    """Add a shape of an XML scene under a name of its own, without faces that are no more than a line."""
+    """Add a shape of an XML scene file under a name of its own, without faces that are no more than a line."""
     bad = without_area(mesh.triangles)
     if bad.any():
         found.notes.append(f"{identity}: {int(bad.sum())} faces without area left out")
@@ -195,7 +200,7 @@ def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None)
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:
-    """Name of a reflector read from XML: letters, digits, `_`, `-` and `.`, and nobody else's name."""
+    """Name of a reflector read from an XML scene file: letters, digits, `_`, `-` and `.`, and nobody else's name."""
     plain = re.sub(r"[^\w.\-]", "_", wanted)[:MAX_NAME]
     plain = plain if re.search(r"\w", plain) else "shape"
     name, number = plain, 1

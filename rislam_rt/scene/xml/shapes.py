@@ -1,4 +1,4 @@
-"""The shapes of a Mitsuba scene as triangles in the room's frame."""
+"""Shapes of a Mitsuba scene file (XML) as triangles in the room's frame."""
 
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -8,12 +8,14 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_about
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.inside_folder import read_inside
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader
+from rislam_rt.scene.read_inside_folder import read_inside
 from rislam_rt.scene.xml.untrusted_xml import children
 
 FILES = {"ply": ".ply", "obj": ".obj"}
+"""Types of an XML scene's shapes that name a mesh file, and that file's ending."""
 SHAPES = ("ply", "obj", "rectangle", "cube")
+"""Types of an XML scene's shapes that can be read."""
 
 _RECTANGLE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=np.float64)
 _CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
@@ -24,7 +26,8 @@ _CUBE_FACES = np.array(
 
 
 def shape_mesh(shape: Element, folder: Path, max_faces: int) -> Mesh:
-    """The triangles of a `<shape>` element, its `to_world` applied; mesh files lie inside the scene's folder.
+    """Mesh of a `<shape>` element of an XML scene file, its `to_world` applied; mesh files lie inside the scene's
+    folder.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def shape_mesh(shape: Element, folder: Path, max_faces: int) -> Mesh:
 
 
 def to_world(shape: Element) -> Floats:
-    """The (4, 4) matrix of an element's transform `to_world`; its parts apply in the order of the file.
+    """Matrix (4, 4) of a shape's transform `to_world` in an XML scene file; its parts apply in the order of the file.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def to_world(shape: Element) -> Floats:
 
 
 def number(element: Element, name: str, default: float | None = None) -> float:
-    """A number in an attribute of an XML shape.
+    """Number in an attribute of an element of an XML scene file.
 
     Raises
     ------
@@ -87,6 +90,7 @@ def number(element: Element, name: str, default: float | None = None) -> float:
 
 
 def _from_file(shape: Element, folder: Path, suffix: str, max_faces: int) -> Mesh:
+    """Mesh of a shape of an XML scene file that names a PLY or OBJ file."""
     names = [e.get("value", "") for e in children(shape, "string") if e.get("name") == "filename"]
     if len(names) != 1:
         raise Fault(f"{len(names)} strings called 'filename'", "name one mesh file")
@@ -97,7 +101,7 @@ def _from_file(shape: Element, folder: Path, suffix: str, max_faces: int) -> Mes
 
 
 def _part(part: Element) -> Floats:
-    """The (4, 4) matrix of one element of an XML shape's transform."""
+    """Matrix (4, 4) of one element of a shape's transform in an XML scene file."""
     matrix = np.eye(4)
     if part.tag == "translate":
         matrix[:3, 3] = _triple(part, 0.0)
@@ -117,7 +121,7 @@ def _part(part: Element) -> Floats:
 
 
 def _triple(part: Element, default: float) -> Floats:
-    """Three numbers of an XML shape from `value` (one for all, or three) or from x, y and z."""
+    """Three numbers of an element of an XML scene file, from `value` (one for all, or three) or from x, y and z."""
     if part.get("value") is None:
         return np.array([number(part, axis, default) for axis in "xyz"])
     values = _numbers(part)
@@ -127,6 +131,7 @@ def _triple(part: Element, default: float) -> Floats:
 
 
 def _numbers(part: Element) -> list[float]:
+    """Numbers in the `value` of an element of an XML scene file."""
     text = part.get("value", "")
     try:
         return [float(word) for word in text.replace(",", " ").split()]
@@ -135,7 +140,7 @@ def _numbers(part: Element) -> list[float]:
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:
-    """(3, 3) as `<rotate>` of an XML shape asks for it."""
+    """Rotation (3, 3) by an angle [rad] about an axis (3,), as `<rotate>` of an XML scene file asks for it."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         raise Fault("<rotate> without an axis", "give x, y and z of one")

@@ -1,4 +1,5 @@
-"""Parsing XML from people who may mean harm: a tree without entities, declarations or anything that leads elsewhere."""
+"""Parsing of untrusted XML, which may mean harm: a tree without entities, declarations or anything that leads
+elsewhere."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -7,14 +8,15 @@ from xml.parsers import expat
 from rislam_rt.scene.findings import Fault, one_line
 
 MAX_XML_BYTES = 50_000_000
-"""Sionna's largest city has 1 MB."""
+"""Most bytes of an XML scene file; Sionna's largest city has 1 MB."""
 MAX_DEPTH = 50
-"""Elements within elements; a scene needs five."""
+"""Most elements within each other in an XML scene file; a scene needs five."""
 MAX_DEFAULTS = 1000
+"""Most `<default>` elements of an XML scene file whose names are replaced by their values."""
 
 
 def parse_xml(content: bytes) -> Element:
-    """The root element of an XML file, `$name` replaced by the values of its `<default>` elements.
+    """Parse an untrusted XML file into its root element, `$name` replaced by the values of its `<default>` elements.
 
     A document type is refused before any of it is read: entities, whether they grow without end or name files, are
     declared there and nowhere else.
@@ -36,12 +38,12 @@ def parse_xml(content: bytes) -> Element:
 
 
 def children(element: Element, *tags: str) -> Iterator[Element]:
-    """Direct children of a parsed element with one of the tags, in order."""
+    """Direct children of an XML element with one of the tags, in order."""
     return (child for child in element if child.tag in tags)
 
 
 def _tree(content: bytes) -> Element:
-    """The tree of an XML document without types, entities and depths that could do harm."""
+    """Parse untrusted XML into a tree, without types, entities and depths that could do harm."""
     builder, parser = TreeBuilder(), expat.ParserCreate()
     depth = 0
 
@@ -73,7 +75,8 @@ def _tree(content: bytes) -> Element:
 
 
 def _filled(value: str, defaults: dict[str, str]) -> str:
-    """A value with its `$name` replaced, longest names first; what a default holds is not looked through again."""
+    """Value of an XML attribute with its `$name` replaced, longest names first; what a default holds is not looked
+    through again."""
     for name in sorted(defaults, key=len, reverse=True):
         if name and f"${name}" in value:
             return value.replace(f"${name}", defaults[name])

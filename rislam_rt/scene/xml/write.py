@@ -1,4 +1,4 @@
-"""Writing a scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
+"""Writing of a scene as a folder that Sionna RT opens: `scene.xml` beside the scene's own files."""
 
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -9,8 +9,9 @@ from rislam_rt.scene.write import mesh_file, scene_files, write_files
 from rislam_rt.scene.xml.materials import material_element
 
 XML_FILE = "scene.xml"
+"""Name of the XML scene file in the folder that is written for Sionna RT."""
 SHADE_OF = "shade-of-"
-"""What the shape of a scatterer's shade is called, before the scatterer's name."""
+"""Prefix of the name of an XML shape that is a scatterer's occluder; the scatterer's name follows."""
 
 _README = """# {name} for Sionna RT
 
@@ -30,7 +31,8 @@ also holds what Sionna's file format has no place for:
 
 
 def write_xml(scene: Scene, folder: str | Path) -> list[str]:
-    """Write a scene into a new folder, as `scene.xml` with meshes for Sionna's `load_scene`; what it cannot carry.
+    """Write a scene into a new folder, as `scene.xml` with meshes for Sionna's `load_scene`; returns what it cannot
+    carry.
 
     Raises
     ------
@@ -51,7 +53,8 @@ def write_xml(scene: Scene, folder: str | Path) -> list[str]:
 
 
 def xml_bytes(scene: Scene) -> bytes:
-    """The scene file: one `<shape>` a reflector or shade, one `<bsdf>` a material."""
+    """Content of the XML file that Sionna reads of a scene: one `<shape>` a reflector or occluder, one `<bsdf>` a
+    material."""
     root = Element("scene", {"version": "2.1.0"})
     shapes: list[tuple[str, Material | None]] = [(r.name, r.material) for r in scene.reflectors]
     shapes += [(shade.name, None) for shade in scene.occluders]
@@ -68,7 +71,7 @@ def xml_bytes(scene: Scene) -> bytes:
 
 
 def left_behind(scene: Scene) -> list[str]:
-    """What of a scene a Sionna scene file has no place for, each in one line."""
+    """Remarks, one line each, on what a scene has that a Sionna scene file (XML) cannot hold."""
     constant = [r.name for r in scene.reflectors if r.material.level is not None]
     notes = []
     if constant:
@@ -83,7 +86,8 @@ def left_behind(scene: Scene) -> list[str]:
 
 
 def _word(material: Material | None) -> str:
-    """Name of a material in a written XML scene. Sionna reads names that begin with `itu` in a way of its own."""
+    """Kind of a material, in a word, for its name in a written XML scene. Sionna reads names that begin with `itu` in a
+    way of its own."""
     if material is None:
         return "air"
     return material.itu if material.itu else ("constant" if material.level is not None else "slab")

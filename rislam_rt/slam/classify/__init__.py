@@ -1,4 +1,4 @@
-"""Which multipath components came over a landmark: a small network, its features, and a geometric baseline."""
+"""Classifiers that tell tracks of landmark paths from wall returns: a small network, its features, a baseline."""
 
 from rislam_rt.slam.classify.geometric import classify_geometric
 from rislam_rt.slam.classify.network import (
@@ -10,11 +10,10 @@ from rislam_rt.slam.classify.network import (
     network_arrays,
     read_network,
 )
-from rislam_rt.slam.classify.sighting_features import FEATURES, MotionFit, Sightings, fit_motion, track_features
+from rislam_rt.slam.classify.sighting_features import FEATURES, Sightings, fit_motion, track_features
 
 __all__ = [
     "FEATURES",
-    "MotionFit",
     "Network",
     "Sightings",
     "blend",

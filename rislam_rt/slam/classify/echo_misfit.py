@@ -1,4 +1,4 @@
-"""Echoes: could a track be the return of two walls whose own returns are there too?
+"""Echo misfit: how badly a track fits the double bounce over two walls whose own returns are among the tracks.
 
 A wall's return says where its image of the Tx is, hence where the wall is: halfway. The image over two walls is then
 known, in place and in strength, without any map.
@@ -13,24 +13,25 @@ from rislam_rt.arrays import Floats
 LENGTH_FLOOR, COSINE_FLOOR = 0.05, 0.03
 """Least standard deviations [m] and of a cosine of a predicted echo."""
 MARGIN = 0.1
-"""Log strength by which a wall's own return may be weaker than that over it and another."""
+"""Log strength by which a wall's own return may be weaker than a double bounce over it and another."""
 MAX_PARENTS = 24
-"""The strongest tracks, which may be single walls' returns."""
+"""Largest number of tracks, the strongest, that may be single walls' returns."""
 FAR = 1e4
-"""Misfit where no pair of walls could be."""
+"""Misfit of a track that no pair of walls may explain."""
 
 
 class Echo(NamedTuple):
-    """The best pair of walls for each of T tracks."""
+    """Fit of T tracks to the double bounce over the best pair of walls."""
 
     misfit: Floats
-    """(T,) squared distance, in standard deviations, from where the return would show; `FAR` without any."""
+    """Squared distance (T,), in standard deviations, from the predicted double bounce; `FAR` without any."""
     strength: Floats
-    """(T,) log strength beyond the product of both walls', 0 without any."""
+    """Log strength (T,) beyond the product of both walls', 0 without any."""
 
 
 def echo_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats) -> Echo:
-    """How far each track is from an echo: the return over two others taken for walls.
+    """Misfit of each of T tracks to the double bounce (echo) over the best two walls whose own returns are other
+    tracks.
 
     `seen` (T, 3): length [m] and two cosines in the room's axes; `strength` (T,): log amplitude over that of free
     space of the same length; `offset` (3,) [m]: from Rx to Tx, in the room's axes.

@@ -1,4 +1,4 @@
-"""Could a track be the image of another one, a point, in walls whose own returns are there too?
+"""Image misfit: how badly a track fits the image of another track's point in walls whose returns are among the tracks.
 
 The counterpart of `echo_misfit` for landmarks: a wall's return says where the wall is, a point's where the point is; so
 each path over the point and up to two of the walls, on either leg, is known in place and in strength. What lies behind
@@ -14,45 +14,45 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 LENGTH_FLOOR, COSINE_FLOOR, STRENGTH_STD = 0.05, 0.02, 0.7
 """Least standard deviations [m] and of a cosine of a predicted image; that of its log strength."""
 MAX_WALLS, MAX_POINTS = 8, 6
-"""Parents that are looked at, the likeliest first."""
+"""Largest number of tracks that are tried as walls and as points of an image, the likeliest first."""
 LIKELY_RADIUS = 0.4
-"""Radius [m] above which an apparent sphere is hardly one."""
+"""Radius [m] of a sphere of a track's strength above which it is hardly a point."""
 NEAR_ECHO, ECHO_COST = 4.0, 6.0
 """Misfit at which an echo is half believed, and what a sure one costs a parent."""
 FAR, OUTSIDE = 1e4, 3.0
-"""Misfit, and distance [m] from a mirror, where there is none."""
+"""Misfit of a track that is no point's image, and distance [m] from a mirror, where there is none."""
 
 
 class Image(NamedTuple):
-    """The best parents of T tracks."""
+    """Fit of T tracks to the mirror image of the best point in the best walls."""
 
     misfit: Floats
-    """(T,) squared distance in standard deviations, uncertainty of the parents added; `FAR` without any."""
+    """Squared distance (T,) in standard deviations, the parents' uncertainty added; `FAR` without any."""
     strength: Floats
-    """(T,) log strength beyond the predicted, 0 without any."""
+    """Log strength (T,) beyond the predicted one, 0 without any."""
     mirror: Floats
-    """(T,) [m] by which the track's point is nearer to the agent than to its nearest image in a wall, at most 3."""
+    """Distance (T,) [m], at most 3, by which a track's point is nearer to the Tx than to the Tx's image in a wall."""
 
 
 class _Mirrors(NamedTuple):
-    """Mirrorings over 0, 1 or 2 walls, N in all."""
+    """Affine maps of N reflections in sequences of 0, 1 or 2 walls."""
 
     matrix: Floats
-    """(N, 3, 3)."""
+    """Linear parts (N, 3, 3)."""
     shift: Floats
-    """(N, 3) [m]."""
+    """Shifts (N, 3) [m]."""
     strength: Floats
-    """(N,) sum of the walls' log strengths."""
+    """Sums (N,) of the walls' log strengths."""
     cost: Floats
-    """(N,)."""
+    """Sums (N,) of the walls' costs, what doubt there is that they are walls."""
     bounces: Integers
-    """(N,)."""
+    """Number (N,) of walls."""
     walls: Integers
-    """(N, 2) tracks that show the walls, -1 for none."""
+    """Tracks (N, 2) whose returns show the walls, -1 for none."""
 
 
 def image_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats, still: Floats, echo: Floats) -> Image:
-    """How near each track is to the image of a point, and to the walls' mirrors.
+    """Misfit of each of T tracks to the image of another track's point in other tracks' walls, and distance to walls.
 
     `seen`, `std`, `strength`, `offset` as for `echo_misfit`; `still` (T,): probability that it moves as a static point
     does; `echo` (T,): its misfit as an echo.
@@ -90,7 +90,7 @@ def image_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats, st
 
 
 def _mirrors(shown: Floats, offset: Floats, strength: Floats, cost: Floats, walls: Integers) -> _Mirrors:
-    """All mirrorings over up to two of the walls, from the images (W, 3) of the Tx that they show."""
+    """Reflections in all sequences of up to two walls, from the images (W, 3) of the Tx that their returns show."""
     normal = shown - offset
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     depth = np.sum(0.5 * (shown + offset) * normal, axis=1)
@@ -111,7 +111,7 @@ def _mirrors(shown: Floats, offset: Floats, strength: Floats, cost: Floats, wall
 def _predict(
     mirrors: _Mirrors, point: Floats, offset: Floats, strength: Floats, length: Floats, points: Integers
 ) -> tuple[Floats, Floats, Floats, Integers]:
-    """Predicted images of points in mirrors: place (C, 3), log strength (C,), uncertainty (C,), parents (C, 5)."""
+    """Predicted images of points in mirrors: returns (C, 3), log strengths (C,), uncertainties (C,), parents (C, 5)."""
     rx, tx = np.nonzero(mirrors.bounces[:, None] + mirrors.bounces <= 2)
     keep = mirrors.bounces[rx] + mirrors.bounces[tx] > 0
     rx, tx = rx[keep], tx[keep]
@@ -138,7 +138,7 @@ def _predict(
 
 
 def _mirror_gap(point: Floats, shown: Floats, offset: Floats, walls: Integers, cost: Floats) -> Floats:
-    """(T,) [m] by which a point is nearer to the agent than to its images; doubtful walls count less."""
+    """Distance (T,) [m] by which points are nearer to the Tx than to its images in walls; doubtful walls count less."""
     gap = np.linalg.norm(point[:, None] - shown[walls], axis=2) - np.linalg.norm(point - offset, axis=1)[:, None]
     own: Booleans = np.arange(len(point))[:, None] == walls
     return np.asarray(np.minimum(np.where(own, OUTSIDE, gap + 0.1 * cost[walls]).min(axis=1), OUTSIDE))

@@ -13,20 +13,21 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.slam.classify.sighting_features import FEATURES
 
 NUM_LAYERS = 3
+"""Number of the network's layers."""
 WEIGHTS = "weights.npz"
 """The trained network's file, beside this module."""
 
 LEAST_SHARE, SURE = 0.3, 8.0
-"""Share of the latest look in a track's log odds at least, and the largest log odds of a look."""
+"""Least weight of the latest classification in a track's log odds, and the largest log odds of one classification."""
 
 
 class Network(NamedTuple):
     """Weights of F features, two hidden layers of H and one output: F x H, H x H, H x 1, each with its bias."""
 
     mean: Floats
-    """(F,) taken off the features."""
+    """Means (F,) that are taken off the features."""
     scale: Floats
-    """(F,) by which they are then divided."""
+    """Scales (F,) by which the features are then divided."""
     weight: tuple[Floats, ...]
     """Three matrices (inputs, outputs)."""
     bias: tuple[Floats, ...]
@@ -39,7 +40,7 @@ def classify(features: Floats, network: Network) -> Floats:
 
 
 def log_odds(features: Floats, network: Network) -> Floats:
-    """Network's log odds (M,) of keep against remove; hidden layers are tanh."""
+    """Network's log odds (M,) that a track is a landmark path (keep), not a wall return, from features (M, F)."""
     value = (features - network.mean) / network.scale
     for layer, (weight, bias) in enumerate(zip(network.weight, network.bias, strict=True)):
         value = value @ weight + bias
@@ -49,7 +50,7 @@ def log_odds(features: Floats, network: Network) -> Floats:
 
 
 def blend(odds: Floats, looks: Integers, fresh: Floats) -> Floats:
-    """Network's log odds (M,) of a track over its life: `odds` after `looks` (M,) earlier looks, and `fresh` ones now.
+    """Network's log odds (M,) of tracks over their lives: `odds` after `looks` (M,) earlier ones, and `fresh` ones now.
 
     A mean of the first looks, then one that forgets; clipped, so that no single look decides for good.
     """
@@ -102,7 +103,7 @@ def read_network(file: IO[bytes] | Path) -> Network:
 
 
 def network_arrays(network: Network) -> dict[str, Any]:
-    """What `read_network` reads, for `np.savez`."""
+    """Arrays of a network by name, for `np.savez`, as `read_network` reads them."""
     arrays: dict[str, Any] = {"features": np.array(FEATURES), "mean": network.mean, "scale": network.scale}
     for layer in range(NUM_LAYERS):
         arrays |= {f"weight{layer}": network.weight[layer], f"bias{layer}": network.bias[layer]}

@@ -1,4 +1,4 @@
-"""Features of a track, what it shows of its path: strength, fading, direction, answer to the agent's own motion.
+"""Features of a track that tell its kind of path: strength, fading, direction, change with the agent's own motion.
 
 To first order, over a displacement d of the agent, the direction cosines h of a path that comes from a fixed point at
 distance 1/q turn by `-q P d`, P the projection across h; its length changes by `-a h . d`. For a scatterer
@@ -49,44 +49,47 @@ STD_SCALE = 1.5
 LENGTH_FLOOR, COSINE_FLOOR = 0.01, 0.01
 """Least standard deviations [m] and of a cosine: what the first order in the motion leaves out."""
 TURN_PRIOR, APPROACH_PRIOR = (0.5, 0.7), (1.5, 1.0)
-"""Mean and standard deviation of `q length / 2` and of `a` before anything was seen of them."""
+"""Prior mean and standard deviation of `q length / 2` and of `a`."""
 FADING_FLOOR = 0.05
 """Fading (standard deviation of the log amplitude) that cannot be told from none."""
 
 
 class Sightings(NamedTuple):
-    """What T tracks have shown in the last W cycles, the latest last, and from where the agent saw it."""
+    """Measurements of T tracks in the last W cycles, the latest last, and the poses from which the agent made them."""
 
     seen: Floats
-    """(T, W, 3) length [m] and two cosines in the body frame."""
+    """Lengths [m] and two cosines in the body frame (T, W, 3)."""
     std: Floats
-    """(T, W, 3)."""
+    """Standard deviations (T, W, 3) of lengths and cosines."""
     log_amplitude: Floats
-    """(T, W)."""
+    """Log amplitudes (T, W)."""
     held: Booleans
-    """(T, W) whether there was a measurement; the other entries mean nothing."""
+    """Whether (T, W) there was a measurement; the other entries mean nothing."""
     position: Floats
-    """(W, 3) [m] of the agent, as it believes."""
+    """Positions (W, 3) [m] of the agent, as it estimates them."""
     heading: Floats
-    """(W,) [rad]."""
+    """Headings (W,) [rad] of the agent."""
 
 
 class MotionFit(NamedTuple):
-    """How T tracks answer to the motion, (T,) each."""
+    """Fit of how direction and length of T tracks change with the agent's motion, (T,) each."""
 
     turn: Floats
-    """q times half the length, from the turning across the path's azimuth: 1 for a scatterer, 0 for one wall."""
+    """Turn across the path's azimuth, q times half the length: 1 for a scatterer, 0 for one wall."""
     turn_std: Floats
+    """Standard deviation of that turn."""
     turn_along: Floats
-    """The same from the turning along its azimuth."""
+    """Turn along the path's azimuth, q times half the length."""
     turn_along_std: Floats
+    """Standard deviation of that turn."""
     approach: Floats
-    """a: 2 for a scatterer and for one wall's return."""
+    """Approach a, the change of length: 2 for a scatterer and for one wall's return."""
     approach_std: Floats
+    """Standard deviation of the approach."""
     misfit_static: Floats
     """Mean squared residual, in standard deviations, of a scatterer (turns 1, approach 2)."""
     misfit_moving: Floats
-    """Of one wall's return (turns 0, approach 2)."""
+    """Mean squared residual, in standard deviations, of one wall's return (turns 0, approach 2)."""
     height: Floats
     """Third cosine of the arrival."""
     arrival_std: Floats
@@ -94,7 +97,7 @@ class MotionFit(NamedTuple):
 
 
 def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floats:
-    """(T, 20) features, see `FEATURES`; every track needs one measurement at least.
+    """Features (T, 20) of tracks, by `FEATURES`, for their classification; every track needs one measurement at least.
 
     The tracks should be all that the agent holds at a time: some features relate them to each other.
     """
@@ -139,7 +142,7 @@ def track_features(sightings: Sightings, body: Body, radio: RadioConfig) -> Floa
 
 
 def fit_motion(sightings: Sightings) -> MotionFit:
-    """Features of a track's motion: least squares of turns and approach, and how well the two simple cases fit."""
+    """Least-squares fit of tracks' turn and approach to the agent's motion, and how well the two simple cases fit."""
     held, seen = sightings.held, sightings.seen
     std = np.maximum(STD_SCALE * sightings.std, [LENGTH_FLOOR, COSINE_FLOOR, COSINE_FLOOR])
     weight = np.where(held[..., None], 1.0 / std**2, 0.0)
@@ -177,19 +180,20 @@ def fit_motion(sightings: Sightings) -> MotionFit:
 
 
 class _Fitted(NamedTuple):
-    """P parameters of T tracks, and the squared residuals (T,) of the two simple cases."""
+    """Fitted P parameters of T tracks, and the squared residuals (T,) of the two simple cases."""
 
     value: Floats
-    """(T, P)."""
+    """Fitted parameters (T, P)."""
     std: Floats
-    """(T, P)."""
+    """Standard deviations (T, P) of the parameters."""
     static: Floats
+    """Squared residuals (T,) of a scatterer."""
     moving: Floats
+    """Squared residuals (T,) of one wall's return."""
 
 
 def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> _Fitted:
-    """Turns of a track as features; `level` (T, W, 2, 2) brings the mean cosines, which are free, into the body
-    frame."""
+    """Least-squares turns of tracks' directions; `level` (T, W, 2, 2) brings free mean cosines to the body frame."""
     root = np.sqrt(weight)
     columns = np.concatenate([level, by_turn, seen[..., None]], axis=-1) * root[..., None]
     gram = np.einsum("tkia,tkib->tab", columns, columns)
@@ -205,7 +209,7 @@ def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> 
 
 
 def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) -> _Fitted:
-    """Approach of a track as a feature; the mean length is free."""
+    """Least-squares approach of tracks, the change of their lengths with the agent's motion; mean lengths are free."""
     total = np.maximum(weight.sum(axis=1), 1e-300)
     x, y, z = (v - (np.sum(weight * v, axis=1) / total)[:, None] for v in (towards, seen, bulge))
     mean, spread = APPROACH_PRIOR
@@ -217,7 +221,7 @@ def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) 
 
 
 def _latest(sightings: Sightings) -> tuple[Floats, Floats]:
-    """Last measurement (T, 3) of each track and its deviations, as features need it: cosines in the room's axes."""
+    """Latest measurement (T, 3) of each track, cosines in room axes, and its standard deviations (T, 3)."""
     last = sightings.held.shape[1] - 1 - np.argmax(sightings.held[:, ::-1], axis=1)
     rows = np.arange(len(last))
     seen, std = sightings.seen[rows, last], sightings.std[rows, last]

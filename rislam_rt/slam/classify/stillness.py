@@ -1,4 +1,4 @@
-"""Still or moving: which explains a motion, a static point or an image that moves with the agent?"""
+"""Stillness of a track: whether a static point or an image that moves with the agent explains its motion."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 
 
 def stillness(turn: Floats, turn_std: Floats, approach: Floats, approach_std: Floats) -> Floats:
-    """Probability (M,) that a track stands still: a static point against one wall, equal priors.
+    """Probability (M,) that a track is a static point's, not a wall's, from fitted turn and approach; equal priors.
 
     Each likelihood is Gaussian in the fitted turn and approach. A wall has turn 0 and approach 2 (0 for a pair of
     opposite walls); a landmark's path, images included, a turn of 1 with a spread of 0.35 and an approach of 1.8 with
@@ -21,4 +21,5 @@ def stillness(turn: Floats, turn_std: Floats, approach: Floats, approach_std: Fl
 
 
 def _log_normal(miss: Floats, std: Floats) -> Floats:
+    """Log density of a normal, without its constant."""
     return np.asarray(-0.5 * (miss / std) ** 2 - np.log(std))

@@ -1,1 +1,1 @@
-"""The paper's particle filter: agent particles, each with clouds of landmark particles; the rest is the window's."""
+"""The paper's nested particle filter: agent particles with clouds of landmark particles; births are the window's."""

@@ -1,4 +1,4 @@
-"""The particles as the front end looks at them: their mean and covariance as a Gaussian over a window of poses.
+"""Gaussian view of the nested filter's particles: their mean and covariance as a sliding window of poses.
 
 Prediction, association, births and the map ask a belief for its present mean and covariance and for the way that led
 there (`slam.window`). A window whose accelerations follow the trail of the particles, and whose first pose is as
@@ -10,20 +10,20 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
+from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD, POSE, TURN, basis, latest
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, basis, last_pose_matrix
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
 FOLLOWED, MET = 1e-4, 1e-8
-"""Deviations [m, rad] with which the window follows the trail, and [m, m/s, rad] with which it meets the present."""
+"""Deviations [m, rad] with which the window follows the particles' trail, and [m, m/s, rad] meets the present."""
 ROUNDING = 1e-14
-"""Variance [m^2, ...] up to which a thing is known exactly: what rounding makes of none."""
+"""Variance [m^2, ...] up to which a coordinate counts as known exactly: rounding makes as much of none."""
 
 
 def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamConfig) -> Window:
-    """The particles' Gaussian, with K poses `step` (K - 1,) [s] apart; `heading` (K,) [rad] as the compass told."""
+    """Gaussian of the particles as a window of K poses `step` (K - 1,) [s] apart; compass `heading` (K,) [rad]."""
     mean, covariance = gaussian(belief)
     exact = np.diag(covariance) < ROUNDING
     covariance[exact] = covariance[:, exact] = 0.0
@@ -35,7 +35,7 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     head, accel = _motion(step, trail, mean, std, turns)
     size, count, slim = len(mean), len(heading), POSE + len(mean) - HEAD
     back = np.eye(size)
-    back[:HEAD, :HEAD] = np.linalg.inv(latest(step.tobytes(), turns)[:, :HEAD])
+    back[:HEAD, :HEAD] = np.linalg.inv(last_pose_matrix(step.tobytes(), turns)[:, :HEAD])
     whole = np.zeros((size + accel.size,) * 2)
     whole[:size, :size] = back @ covariance @ back.T
     prior = Quadratic(inverse(whole[:size, :size] + ROUNDING * np.eye(size)), np.zeros(size), head)
@@ -48,7 +48,7 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
 
 
 def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool) -> tuple[Floats, Floats]:
-    """Head (7 + 3F,) and accelerations (K - 1, A) of the smoothest way along the trail (K, 4) to the present."""
+    """Smoothest motion along the particles' trail (K, 4) to now: window head (7 + 3F,), accelerations (K - 1, A)."""
     count, head = len(trail), mean.copy()
     accel = np.zeros((count - 1, len(std)))
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)

@@ -1,4 +1,4 @@
-"""The paper's particle filter, one cycle of it: predict, classify, associate, weigh, resample, births and deaths.
+"""The paper's nested particle filter, a cycle of it: predict, classify, associate, weigh, resample, births and deaths.
 
 What is expected, what comes out as one, who is who, what a track is and which point is the panel is asked of the window
 filter's parts, which see the particles by their mean and covariance (`gaussian_view`); pose and map are the particles'.
@@ -30,54 +30,62 @@ from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
 from rislam_rt.slam.nested.wall_return_removal import wall_returns
 from rislam_rt.slam.observations import stranger_density
-from rislam_rt.slam.returns import AXES, observe, poses_of
+from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, StepInfo
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init
 from rislam_rt.slam.window import revisit as window_revisit
-from rislam_rt.slam.window.births.feature_removal import release
+from rislam_rt.slam.window.births.feature_removal import remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle
-from rislam_rt.slam.window.cycle_explanation import grow, learn_cycle, listen, outcome_of, take_in, unexplained
+from rislam_rt.slam.window.cycle_explanation import (
+    components_to_explain,
+    learn_cycle,
+    log_associations,
+    outcome_of,
+    remove_or_add_features,
+    unexplained,
+)
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.relinearisation import renew as renew_slots
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import REFRESH
 
 BROAD = 10.0
-"""Standard deviation [m] of a landmark before its measurements."""
+"""Prior standard deviation [m] of a landmark's position before its measurements."""
 WALL_CYCLES = 20
-"""Measurements that a track needs where walls are found by points alone: two legs leave more room for error."""
+"""Measurements that a track needs before birth where walls are found by points alone: two legs leave room for error."""
 HELD = 1e-4
-"""Deviation [m, m/s, rad] of the start up to which a number is held and not sampled."""
+"""Standard deviation [m, m/s, rad] of the start up to which a coordinate is held fixed and not sampled."""
 
 
 class NestedState(NamedTuple):
-    """All that the filter knows."""
+    """State of the nested particle filter: the particles, and a window state for all that is not pose or place."""
 
     front: WindowState
-    """What is known beside pose and places; its window is the particles' Gaussian."""
+    """Window state with tracks, log and landmark table; its window is the particles' Gaussian view."""
     belief: Nested
+    """The particles of the agent and of the landmarks."""
 
 
 def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> NestedState:  # fmt: skip
-    """Particles drawn from the start prior, and an empty map."""
+    """State of the nested filter before the first cycle: particles drawn from the start prior, and an empty map."""
     once = replace(sensor, period=ONE_PULSE)  # particles know nothing of what is heard a period too early
     return _begin(window_init(start, body, ris, once, config, rng=rng), config, rng=rng)
 
 
 def revisit(state: NestedState, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
-    """The particle filter of another run, or another agent, on the map of an earlier one (see `window.revisit`)."""
+    """State of the nested filter for another run, or another agent, on the map of an earlier one (`window.revisit`)."""
     return _begin(window_revisit(state.front, start, config, rng=rng), config, rng=rng)
 
 
 def _begin(front: WindowState, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
-    """Particles with the mean and covariance of a front end's single pose and map."""
+    """State of the nested particle filter with particles that have the mean and covariance of a window state."""
     mean, covariance = window_gaussian.now(front.window)
     std = np.sqrt(np.diag(covariance))[:HEAD]
     mean[6] += front.heading[-1]
@@ -90,7 +98,7 @@ def step(
     state: NestedState, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> tuple[NestedState, StepInfo]:  # fmt: skip
-    """Advance by one cycle: `dt` [s] since the last, `heading` [rad], `code` as the agent believes it was applied.
+    """Advance the nested filter by one cycle: `dt` [s] since the last, `heading` [rad], `code` held to be applied.
 
     Raises
     ------
@@ -104,27 +112,27 @@ def step(
     turn = heading - float(state.front.heading[-1])
     front, belief = _move(state, dt, heading, code, config, rng=rng)
     scene, landmarks, engine = front.scene, front.landmarks, pick_engine(config.nested.engine)
-    heard = listen(measurement, scene)
+    heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
     view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers)
-    front, used = take_in(front, observed, view)
+    front, used = log_associations(front, observed, view)
     told = update(belief, _seen(front, view, used), config.nested, engine)
-    front = _look(front, told.belief, config)
-    left = renew_slots(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
+    front = _refresh_view(front, told.belief, config)
+    left = relinearise(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED
 
-    grown = grow(front, left, view)
+    grown = remove_or_add_features(front, left, view)
     # a wall found by a point that it stands before is gone with it
     found = grown.landmarks.ident
-    grown = release(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
+    grown = remove_from_map(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
     belief = _follow_map(told.belief, front, grown, config, rng=rng)
     ess = effective_size(belief)
     belief, resampled = renew(belief, _spans(grown), config.nested, engine, rng=rng)
     outcome = outcome_of(len(measurement), len(grown.landmarks.ident), grown.lost_log_odds >= 0.0)
-    front = _look(grown._replace(cycle=grown.cycle + 1), belief, config)
+    front = _refresh_view(grown._replace(cycle=grown.cycle + 1), belief, config)
     count = len(front.landmarks.points)
     info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome)
     return NestedState(front, belief), info
@@ -133,7 +141,7 @@ def step(
 def _move(
     state: NestedState, dt: float, heading: float, code: RisCode | None, config: SlamConfig, *, rng: np.random.Generator
 ) -> tuple[WindowState, Nested]:
-    """The belief carried to the next cycle, whose pose joins the trail."""
+    """Predict the particles to the next cycle by the motion model, and append the present poses to their trail."""
     front, belief = state
     first = dt <= 0.0 and front.cycle == 0
     if not first:
@@ -150,22 +158,21 @@ def _move(
     front = front._replace(
         window=front.window._replace(step=step), heading=headings, codes=(*front.codes, code)[-keep:]
     )  # fmt: skip
-    return _look(front, belief, config), belief
+    return _refresh_view(front, belief, config), belief
 
 
-def _look(front: WindowState, belief: Nested, config: SlamConfig) -> WindowState:
-    """The front end's state after the particles have changed."""
+def _refresh_view(front: WindowState, belief: Nested, config: SlamConfig) -> WindowState:
+    """Window state whose window is the Gaussian view of the particles, after these have changed."""
     return front._replace(window=gaussian_view(belief, front.window.step, front.heading, config))
 
 
 def _spans(front: WindowState) -> Floats:
-    """(K,) time [s] from each pose of the trail to now."""
+    """Times (K,) [s] from each pose of the particles' trail to now."""
     return np.append(np.cumsum(front.window.step[::-1])[::-1], 0.0)
 
 
 def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
-    """What was seen and is used (A,): each cluster as its strongest return, moved by what the partner in its cell is
-    expected to pull."""
+    """Observed returns (A,) that weigh the particles: of an unresolved group the strongest, less its partner's pull."""
     log, row = front.log, view.row[used]
     at = np.searchsorted(log.cycle, front.cycle) + view.pick[used]
     returns = compile_forms(front.landmarks.rows(log.form[at, 0]))
@@ -174,8 +181,7 @@ def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
 
 
 def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
-    """Which tracks are not examined: young ones, and wall returns, where these are thrown away; and which of the log's
-    components (N,) are such returns."""
+    """Tracks not examined for births (young; wall returns, if thrown away), and which log entries are wall returns."""
     tracks, scene = front.tracks, front.scene
     need = config.nested.birth_cycles if config.use_vt or not len(front.landmarks.ident) else WALL_CYCLES
     looked = np.maximum(tracks.looked, 2 * need // 3)  # looked at again when their measurements have grown by a half
@@ -191,7 +197,7 @@ def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Bool
 def _follow_map(
     belief: Nested, before: WindowState, after: WindowState, config: SlamConfig, *, rng: np.random.Generator
 ) -> Nested:
-    """The particles with the landmarks that the front end holds now: some have gone, one may be new."""
+    """Particles with the landmarks that the window state holds now: removed ones dropped, a new one initialised."""
     keep = np.isin(before.landmarks.ident, after.landmarks.ident)
     belief = belief if keep.all() else drop(belief, keep)
     for row in range(len(belief.clouds), len(after.landmarks.ident)):
@@ -201,7 +207,7 @@ def _follow_map(
 
 
 def _history(front: WindowState, row: int) -> LandmarkHistory:
-    """What a new feature of the front end's map was found by."""
+    """Measurements from which a new feature of the map was found, and its prior, for its particles' initialisation."""
     landmarks, log, window = front.landmarks, front.log, front.window
     at = (log.form[:, 0] == landmarks.ident[row]).any(axis=1).nonzero()[0]
     forms = landmarks.rows(log.form[at[0]])

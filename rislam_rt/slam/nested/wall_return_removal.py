@@ -1,4 +1,4 @@
-"""Removal of wall returns, as the paper has it: tracks that a classifier takes for them become no landmark."""
+"""Removal of wall returns, as in the paper: tracks that a classifier takes for wall returns become no landmark."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from rislam_rt.slam.window.tracks import WindowTracks
 def wall_returns(
     tracks: WindowTracks, log: Log, cycle: int, poses: Floats, body: Body, radio: RadioConfig, config: NestedConfig
 ) -> Booleans:
-    """(T,) tracks that are taken for wall returns, from the last K poses (K, 4) [m, rad] as the agent believes them.
+    """Whether each track (T,) is a wall return, by the classifier, from K estimated poses (K, 4) [m, rad].
 
     What the receiver says ran over the panel is none, however it looks to a classifier.
     """

@@ -1,4 +1,4 @@
-"""The protocol of every estimator of pose and map: four functions, the same inputs and outputs for all of them.
+"""Protocol of every SLAM estimator of pose and map: four functions, the same inputs and outputs for all of them.
 
 The default filter (`slam`) and each folder of `slam.schemes` are such a set, as modules.
 """
@@ -12,26 +12,26 @@ from rislam_rt.slam.start_prior import StartPrior
 
 
 class SlamEstimator(Protocol):
-    """State and settings are the estimator's own."""
+    """Protocol of a SLAM estimator: `init`, `step`, `predict`, `estimate`; state and settings are its own."""
 
     def init(
         self, start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: Any,
         *, rng: np.random.Generator,
     ) -> Any:  # fmt: skip
-        """The state before the first cycle: the start prior, and nothing known of the room."""
+        """State of the estimator before the first cycle: the start prior of the agent, and an empty map."""
         ...
 
     def step(
         self, state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
         *, rng: np.random.Generator,
     ) -> tuple[Any, Any]:  # fmt: skip
-        """State after a cycle, and its `StepInfo`: `dt` [s] since the last, `heading` [rad], the code held applied."""
+        """State after a measurement, and its `StepInfo`: `dt` [s] since the last, `heading` [rad], code as believed."""
         ...
 
     def predict(self, state: Any, dt: float, config: Any) -> SlamEstimate:
-        """The belief carried over `dt` [s] without noise: what the design of the next code goes by."""
+        """Estimate of pose and map predicted `dt` [s] ahead without noise, for which the next code is designed."""
         ...
 
     def estimate(self, state: Any, config: Any) -> SlamEstimate:
-        """What every estimator gives: mean and covariance of the pose, equally likely samples of it, and the map."""
+        """Estimate that the state holds: mean, covariance, equally likely samples of the pose, and the map."""
         ...

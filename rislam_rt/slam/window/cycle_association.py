@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_reach
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses, poses_of
+from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
@@ -21,7 +21,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
 
@@ -35,8 +35,11 @@ class CycleAssociation(NamedTuple):
     covariance: Floats
     """(7 + 3F, 7 + 3F) ...and their covariance."""
     poses: Poses
+    """Tx and Rx positions of the present pose."""
     expected: ExpectedComponents
+    """Predicted returns, R of them."""
     groups: UnresolvedClusters
+    """Their clusters, C of them."""
     clear: Floats
     """(R,) probability that nothing occludes each return..."""
     scatter: Floats
@@ -121,8 +124,8 @@ def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) ->
     """Covariance of the present with the height's variance widened by what the motion model may be off by, where wall
     returns are used.
 
-    Across, a livelier motion is looked at beside the one that is held (`filter._notice`); upwards none is. Without wall
-    returns next to nothing measures the height: a gate as wide as it may be off holds anything.
+    Across, a livelier motion is looked at beside the one that is held (`filter._associate_over_motions`); upwards none
+    is. Without wall returns next to nothing measures the height: a gate as wide as it may be off holds anything.
     """
     if not scene.use_vt:
         return covariance

@@ -10,19 +10,19 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Measurement, RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, is_los, observations_of
-from rislam_rt.slam.returns import TX
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
-from rislam_rt.slam.window.births.feature_removal import condemned, release
+from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
-from rislam_rt.slam.window.landmarks.landmark_update import learn
+from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
-from rislam_rt.slam.window.rim import bring_back
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
@@ -35,13 +35,14 @@ class HeardCycle(NamedTuple):
     alternated codes."""
 
     observed: Observations
+    """These components in the filter's units."""
     free: Integers
     """(M,) index of each in the measurement."""
     landmark: Integers
     """(N,) label of every component of the measurement: `REMOVED` for the direct path, else `UNUSED`."""
 
 
-def listen(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
+def components_to_explain(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
     """Select a measurement's components that need an explanation, without direct path and echoes, sorted by delay and
     direction so that nothing hangs on their order."""
     observed = observations_of(measurement, scene.radio)
@@ -52,7 +53,9 @@ def listen(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
     return HeardCycle(observed.take(free), free, landmark)
 
 
-def take_in(state: WindowState, observed: Observations, view: CycleAssociation) -> tuple[WindowState, Booleans]:
+def log_associations(
+    state: WindowState, observed: Observations, view: CycleAssociation
+) -> tuple[WindowState, Booleans]:
     """Append a cycle's components to the log with the paths that they were associated with, and mark which of the
     associated ones (A,) update the Gaussian.
 
@@ -74,7 +77,7 @@ def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) ->
     slope = view.expected.jacobian[lead]
     slope = slope + share[..., None] * (view.expected.jacobian[mate] - slope)
     left = log.seen[at] - seen
-    bring_back(seen, log.std[at], left, slope)
+    correct_horizon_bias(seen, log.std[at], left, slope)
     std = np.sqrt(log.std[at] ** 2 + log.extra[at])
     return left / std, slope / std[..., None]
 
@@ -104,7 +107,7 @@ def learn_cycle(
         state = state._replace(lost_log_odds=odds)
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
-    visibility, landmarks = learn(
+    visibility, landmarks = update_landmarks(
         state.visibility, landmarks, state.window, expected, groups, view.clear, view.scatter, view.shows, row, pick,
         raw, observed, view.poses,
         state.scene, code,
@@ -134,7 +137,7 @@ def scatter_variance(scatter: Floats, std: Floats) -> Floats:
     return np.asarray(CONSTANTS.memory * (np.maximum(scatter, 1.0) - 1.0)[:, None] * std**2)
 
 
-def weigh_again(log: Log, left: Residuals, num_poses: int) -> Log:
+def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
     """Re-estimate the extra variance of all wall returns in the log from the residuals of the same path in earlier and
     later cycles.
 
@@ -227,13 +230,13 @@ def _names(landmarks: WindowTable, forms: Integers) -> Integers:
     return np.where(pair | (point & (wall >= 0)), named, own)
 
 
-def grow(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:
+def remove_or_add_features(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:
     """Remove features that the evidence contradicts or, in a cycle without removals, let tracks give birth to
     features."""
     fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
-        gone = condemned(state.landmarks, left, state.log)
-        state, fresh = release(state, ~gone), not gone.any()
+        gone = features_to_remove(state.landmarks, left, state.log)
+        state, fresh = remove_from_map(state, ~gone), not gone.any()
     return births(state, view) if fresh else state
 
 

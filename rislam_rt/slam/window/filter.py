@@ -14,23 +14,23 @@ from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
 from rislam_rt.slam.window.cycle_explanation import (
-    grow,
+    components_to_explain,
     innovations,
     learn_cycle,
-    listen,
+    log_associations,
     outcome_of,
-    take_in,
+    remove_or_add_features,
+    reweigh_wall_returns,
     unexplained,
-    weigh_again,
 )
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log
-from rislam_rt.slam.window.relinearisation import renew
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH, STILL
 from rislam_rt.slam.window.state import WindowState
@@ -78,19 +78,19 @@ def step(
     state = _move(state, dt, heading)
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
-    heard = listen(measurement, scene)
+    heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
-    state, view = _notice(state, heading, code, observed, strangers)
+    state, view = _associate_over_motions(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
-    state, used = take_in(state, observed, view)
+    state, used = log_associations(state, observed, view)
     state, left, nis = _solve(state, view, used)
     jumped = state.lost_log_odds == 0.0
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
     if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
-        state = state._replace(log=weigh_again(state.log, left, state.window.num_poses))
-    state, wrong = recovery.ask(state)
-    state = grow(state, left, view)
+        state = state._replace(log=reweigh_wall_returns(state.log, left, state.window.num_poses))
+    state, wrong = recovery.check_motion(state)
+    state = remove_or_add_features(state, left, view)
     outcome = outcome_of(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
@@ -124,7 +124,7 @@ def smoothed(state: WindowState) -> Floats:
     return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 
-def _notice(
+def _associate_over_motions(
     state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
 ) -> tuple[WindowState, CycleAssociation]:
     """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, or a jump in
@@ -152,7 +152,7 @@ def _notice(
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
-            return recovery.landed(state, by), view
+            return recovery.after_jump(state, by), view
     return state._replace(window=window), best
 
 
@@ -215,7 +215,7 @@ def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[
     innovation, jacobian = innovations(view, state.log, used, state.cycle)
     window = window_gaussian.with_present(state.window, innovation, jacobian)
     window = window_gaussian.solve(window, spread=False)
-    window, left = renew(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else window.num_poses - 1)
+    window, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else window.num_poses - 1)
     window = window_gaussian.weigh_holds(window_gaussian.solve(window))
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
 

@@ -40,14 +40,14 @@ class Log(NamedTuple):
     map lacks."""
 
     def take(self, rows: Any) -> "Log":
-        """Log with only some of the components."""
+        """Measurement log with only some of the components."""
         return Log._make(field[rows] for field in self)
 
     def explain(
         self, rows: Integers, forms: Integers, share: Floats | float, shared: Floats | float, scatter: Floats
     ) -> "Log":
-        """Log with components `rows` (A,) associated with forms (A, 2, 5) of idents, with the partners' shares (A,) and
-        extra variances (A, 3): by paths of the map in their cells, and by scatter."""
+        """Measurement log with components `rows` (A,) associated with forms (A, 2, 5) of idents, with partners' shares
+        (A,) and extra variances (A, 3): by paths of the map in their cells, and by scatter."""
         form, shares, variance, known = self.form.copy(), self.share.copy(), self.extra.copy(), self.shared.copy()
         form[rows], shares[rows], variance[rows], known[rows] = forms, share, shared + scatter, shared
         return self._replace(form=form, share=shares, extra=variance, shared=known)
@@ -65,14 +65,15 @@ class Log(NamedTuple):
 
 
 def empty_log() -> Log:
-    """Log without measurements."""
+    """Measurement log without measurements."""
     none, count = np.zeros(0), np.zeros(0, dtype=np.int64)
     wide = np.zeros((0, 3))
     return Log(count, wide, wide, none, none, count, count, np.zeros((0, 2, 5), dtype=np.int64), none, wide, wide)
 
 
 def append(log: Log, observed: Observations, cycle: int, first: int) -> Log:
-    """Log with a cycle's components appended, not yet associated, and without those of cycles before `first`."""
+    """Measurement log with a cycle's components appended, not yet associated, and without those of cycles before
+    `first`."""
     count, old = len(observed.seen), log.take(slice(np.searchsorted(log.cycle, first), None))
     fresh = Log(
         np.full(count, cycle), observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std,
@@ -94,7 +95,7 @@ class Residuals(NamedTuple):
     """(A, 3) measured less predicted length and cosines, in standard deviations."""
 
     def take(self, rows: Any) -> "Residuals":
-        """Only some of the residuals."""
+        """Only some of the measurements' residuals."""
         return Residuals._make(field[rows] for field in self)
 
 

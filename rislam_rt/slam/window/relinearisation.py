@@ -4,16 +4,16 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import linearise_each, poses_of
+from rislam_rt.slam.predicted_returns import linearise_each, poses_of
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
-from rislam_rt.slam.window.rim import bring_back
-from rislam_rt.slam.window.smoother.steps import POSE
+from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 from rislam_rt.slam.window.state import WindowState
 
 
-def renew(state: WindowState, first: int) -> tuple[Window, Residuals]:
+def relinearise(state: WindowState, first: int) -> tuple[Window, Residuals]:
     """Re-linearise the measurements of the poses from `first` on at the window's estimate, whose last pose is that of
     the cycle; returns the window and its residuals."""
     window, log = state.window, state.log
@@ -56,7 +56,7 @@ def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats)
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
     left = log.seen[rows] - seen
     left[:, 0] = scene.sensor.nearest(left[:, 0])
-    bring_back(seen, log.std[rows], left, slopes)
+    correct_horizon_bias(seen, log.std[rows], left, slopes)
     slopes /= std[..., None]
     return Residuals(rows, slot, left / std), slopes
 

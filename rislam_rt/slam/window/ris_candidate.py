@@ -5,15 +5,15 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
-from rislam_rt.slam.arrival_rays import places
+from rislam_rt.slam.arrival_rays import scatterer_positions
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER
-from rislam_rt.slam.returns import Poses, reflect
+from rislam_rt.slam.predicted_returns import Poses, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import DRAWS
 from rislam_rt.slam.window.tracks import WindowTracks
 
@@ -36,14 +36,14 @@ def weigh_tracks(
         return tracks
     spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
     looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
-    place, _ = places(looks, poses)
+    place, _ = scatterer_positions(looks, poses)
     count = len(rows)
     sight = PanelObservation(
         place, np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)), np.ones(count),
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).converged()
+    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
     return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
 
 
@@ -62,7 +62,7 @@ def find_candidate(
     few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
     told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
-    spots, _ = places(tracks.mean[rows, :, 0], poses)
+    spots, _ = scatterer_positions(tracks.mean[rows, :, 0], poses)
     if len(walls) and len(rows):
         out = features[walls] - mean[:3]
         image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])

@@ -18,12 +18,19 @@ class WindowState(NamedTuple):
     and the odds of being lost."""
 
     cycle: int
+    """Number of cycles that have passed."""
     config: SlamConfig
+    """Settings of the filter."""
     window: Window
+    """Gaussian of the last K poses and the map."""
     landmarks: WindowTable
+    """What is known of the features besides their places."""
     log: Log
+    """Measurements of the window's cycles, and the paths that they were associated with."""
     tracks: WindowTracks
+    """Components that no path of the map explains, followed over cycles."""
     visibility: VisibilityObservations
+    """Occlusion and scatter of each path that was looked for."""
     motion_mode: Floats
     """(2, L) probabilities of the motion modes in the step before the window's first, horizontal and vertical; (3, L)
     with the rate of turn, where the heading is not known."""
@@ -34,9 +41,10 @@ class WindowState(NamedTuple):
     shift: Floats
     """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
     scene: KnownEnvironment
+    """What the filter is told beforehand: body, radio, sensor, panels."""
     lost_log_odds: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
-    asked: bool
+    start_was_wrong: bool
     """Whether the first tracks have shown that the start's velocity or heading was told wrong."""
     turned: float
     """[rad] correction of the compass since it was found to be wrong."""

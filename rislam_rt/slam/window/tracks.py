@@ -48,6 +48,7 @@ class WindowTracks(NamedTuple):
     hidden: Floats
     """(T, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
     next_ident: int
+    """Number of the next track."""
 
     @property
     def identity(self) -> PanelIdentity:
@@ -55,7 +56,7 @@ class WindowTracks(NamedTuple):
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     def keep(self, rows: Booleans) -> "WindowTracks":
-        """Tracks with only those marked in `rows` (T,)."""
+        """Only the tracks that are marked in `rows` (T,)."""
         return self if rows.all() else WindowTracks._make([*(field[rows] for field in self[:-1]), self.next_ident])
 
 

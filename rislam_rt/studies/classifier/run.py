@@ -1,13 +1,10 @@
 """A run of the classifier's training: gather examples in random rooms, train, choose, score once on the named rooms."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import Scene
-from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.slam.classify import Network
 from rislam_rt.studies.classifier.gather import Examples
 from rislam_rt.studies.classifier.score import (
@@ -19,7 +16,7 @@ from rislam_rt.studies.classifier.score import (
     rules,
     score,
 )
-from rislam_rt.studies.classifier.sets import Sets, gather_sets
+from rislam_rt.studies.classifier.sets import Sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import train_network
 
@@ -41,19 +38,6 @@ class Training(NamedTuple):
     the network is chosen, and F1 on all test rooms."""
     importance: dict[str, Floats]
     """Loss of F1 on all test rooms when a feature is shuffled, by feature, several shuffles each."""
-
-
-def run_training(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Training:
-    """Gather examples, train the classifier of multipath components and score it; the seed decides all draws.
-
-    Raises
-    ------
-    SceneError
-        A room is too full for random walks.
-    TraceError, SetupError
-        The traced channel failed, or the machine lacks what it needs.
-    """
-    return train_and_score(gather_sets(scenes, spec, progress=progress), spec)
 
 
 def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:

@@ -8,11 +8,9 @@ from rislam_rt.studies.swept.spec import (
     Fig4bSpec,
     Fig4cSpec,
     HardwareSpec,
-    MismatchSection,
     RobustnessSpec,
     RoomsSpec,
     SweptSpec,
-    VariantSection,
 )
 from rislam_rt.studies.swept.sweep import build_sweep, check_swept
 
@@ -23,11 +21,9 @@ __all__ = [
     "Fig4cSpec",
     "Group",
     "HardwareSpec",
-    "MismatchSection",
     "RobustnessSpec",
     "RoomsSpec",
     "SweptSpec",
-    "VariantSection",
     "build_sweep",
     "cell_spec",
     "check_swept",

@@ -16,6 +16,7 @@ from rislam_rt.pipeline.specification.read import Table, build_spec
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene import load_scene
+from rislam_rt.shipped import room_beside
 from rislam_rt.sweeps.cell_work import one_line
 from rislam_rt.toml import put_dotted
 
@@ -31,7 +32,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
-    scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
+    scene = load_scene(room_beside(Path(settings["beside"]), str(settings["scene"])))
     setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))._replace(receptions=Receptions())
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": setup.seconds}

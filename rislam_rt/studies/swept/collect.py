@@ -100,7 +100,7 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
-    """Difference [m] of their RMSE and ours, with its interval, over the seeds that both have; None for fewer than two."""
+    """Difference [m] of their RMSE and ours, with its interval, over seeds that both have; None of fewer than two."""
     both = ~(np.isnan(ours) | np.isnan(theirs))
     if both.sum() < 2:
         return None

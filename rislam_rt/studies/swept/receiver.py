@@ -19,6 +19,7 @@ from rislam_rt.pipeline.signals import panel_codes
 from rislam_rt.pipeline.specification.spec import Settings, build_settings
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
+from rislam_rt.shipped import room_beside
 from rislam_rt.studies.swept.cell import cell_spec
 
 HALF = 0.683
@@ -32,7 +33,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """
     begin, spec = process_time(), cell_spec(settings)
     prepare_channel(spec.channel)
-    scene = load_scene(Path(settings["beside"]) / str(settings["scene"]))
+    scene = load_scene(room_beside(Path(settings["beside"]), str(settings["scene"])))
     setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
     made, motion = build_settings(spec), setup.scene.agent
     build = np.random.default_rng(setup.seeds.hardware)

@@ -54,7 +54,7 @@ class _OneRoom(SweptSpec):
     """Settings of swept studies in a single room."""
 
     scene: str | None = None
-    """Scene folder, relative to the pipeline file; `--scene` comes first."""
+    """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
 
 
 class Fig4bSpec(_OneRoom):

@@ -10,6 +10,7 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.scene import load_scene
+from rislam_rt.shipped import room_beside
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept.cell import FUNCTION, cell_spec
 from rislam_rt.studies.swept.spec import (
@@ -102,7 +103,7 @@ def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str,
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         spec = cell_spec({**settings, **local}, pipeline)
-        room = load(pipeline.parent / str(settings["scene"]))
+        room = load(room_beside(pipeline.parent, str(settings["scene"])))
         try:
             check_run(room, spec)
         except RislamError as error:
@@ -117,5 +118,5 @@ def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str,
 def swept_record(spec: SweptSpec, sweep: Sweep, pipeline: Path) -> dict[str, Any]:
     """Record for JSON of what is needed to repeat a swept study, with the SLAM run's settings, defaults filled in."""
     named = next((axis.values for axis in sweep.axes if axis.key == "scene"), [sweep.base.get("scene")])
-    scenes = [load_scene(pipeline.parent / str(name)) for name in named]
+    scenes = [load_scene(room_beside(pipeline.parent, str(name))) for name in named]
     return study_record(spec, scenes, settings=cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"))

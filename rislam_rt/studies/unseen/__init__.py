@@ -2,19 +2,16 @@
 
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, Recorder, answers_from_arrays, replay
-from rislam_rt.studies.unseen.file import Recording, read_recording, write_recording
+from rislam_rt.studies.unseen.file import read_recording
 from rislam_rt.studies.unseen.score import score_run
-from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
+from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.studies.unseen.sweep import build_unseen, count_tests
-from rislam_rt.studies.unseen.truth import Truth, build_truth
+from rislam_rt.studies.unseen.truth import build_truth
 
 __all__ = [
-    "TEST",
     "Answers",
     "Inputs",
     "Recorder",
-    "Recording",
-    "Truth",
     "UnseenSpec",
     "answers_from_arrays",
     "build_truth",
@@ -23,5 +20,4 @@ __all__ = [
     "read_recording",
     "replay",
     "score_run",
-    "write_recording",
 ]

@@ -145,6 +145,6 @@ def test_the_search_is_named(rooms):
         channel = ImageSourceChannel(rooms.paper(), RadioConfig(), 2, how)
         assert channel.paths(trajectory).source == f"image source, {said}"
     hall = ImageSourceChannel(load_scene(SCENES / "large_hall"), RadioConfig(), 2)
-    assert not hall.looked.exhaustive
+    assert not hall.sequence_search.exhaustive
     with pytest.raises(ConfigError, match="search: 'rays' received"):
         ImageSourceChannel(rooms.paper(), RadioConfig(), 2, "rays")

@@ -67,7 +67,7 @@ def test_a_power_is_an_energy_over_the_sounding():
         (["radio.sounding_s=1e-6"], "'power_dbm' and 'sounding_s' together"),
         (["radio.power_dbm=20.0", "radio.sounding_s=1e-6"], "give 'noise_psd'"),
         (["radio.power_dbm=20.0", "radio.sounding_s=1e-6", "radio.energy_j=2.0"], "not both"),
-        (["radio.tx_pattern=yagi"], "should be 'iso', 'dipole', 'hw_dipole' or 'tr38901'"),
+        (["radio.tx_pattern=yagi"], "give 'iso', 'dipole', 'hw_dipole' or 'tr38901'"),
         (["receiver.slots=1"], "unknown key"),
     ],
 )

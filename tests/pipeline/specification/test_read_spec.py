@@ -1,5 +1,6 @@
 """Pipeline files: what they become, and what is said of a bad one."""
 
+import re
 from dataclasses import fields
 
 import numpy as np
@@ -81,7 +82,7 @@ def test_override_wins_over_the_file(write):
     [
         ("", "name", "missing"),
         (MINIMAL + "[radio]\ncarier_ghz = 5.0\n", "radio.carier_ghz", "carrier_ghz"),
-        (MINIMAL + "[radio.array]\nrows = 0\n", "radio.array.rows", "greater than or equal to 1"),
+        (MINIMAL + "[radio.array]\nrows = 0\n", "radio.array.rows", "give at least 1"),
         (MINIMAL + '[slam]\nnum_samples = "many"\n', "slam.num_samples", "many"),
         (MINIMAL + "[slam]\nnum_samples = -3\n", "slam.num_samples", "-3"),
         (MINIMAL + "[radio]\nreference_snr_db = 1.0\nnoise_psd = 1.0\n", "radio", "not both"),
@@ -100,6 +101,28 @@ def test_bad_file_is_one_line_with_file_and_field(write, text, place, hint):
     assert place in message
     assert hint in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("setting", "cure"),
+    [
+        ("schemes=optimized,random", """give a list, in quotes: 'schemes=["optimized", "random"]'"""),
+        ("schemes=[optimized]", """give a list, in quotes: 'schemes=["optimized"]'"""),
+        ("radio.carrier_ghz=10e9", "give at most 3000 GHz"),
+        ("start.position_std_m=-1", "give at least 0 m"),
+        ("cycles=many", "give a whole number"),
+        ("radio.bandwidth_ghz=wide", "give a number"),
+        ("receiver.merge=3", "give true or false"),
+    ],
+)
+def test_a_value_that_cannot_be_is_told_what_can(write, setting, cure):
+    with pytest.raises(ConfigError, match=f"received; {re.escape(cure)}$"):
+        load_spec(write(MINIMAL), [setting])
+
+
+def test_a_list_that_is_none_is_told_as_the_file_needs_it(write):
+    with pytest.raises(ConfigError, match=r"""schemes: 'exact' received; give a list, schemes = \["exact"\]$"""):
+        load_spec(write(MINIMAL + 'schemes = "exact"\n'))
 
 
 @pytest.mark.parametrize("setting", ["", "seed", "=3", "a b=1", "name.x=1", "seed=seven", "radio.x=1"])

@@ -107,8 +107,11 @@ def test_every_variable_has_a_unit(stored):
 
 def test_configuration_repeats_the_run(stored, short_spec):
     from rislam_rt.pipeline import load_spec
+    from rislam_rt.shipped import room_beside
 
-    assert load_spec(stored / "config.toml") == short_spec
+    spec = load_spec(stored / "config.toml")
+    assert spec.model_copy(update={"scene": short_spec.scene}) == short_spec
+    assert room_beside(stored, spec.scene).samefile(stored / "scene"), "the room in the folder, wherever it was taken"
 
 
 def test_a_file_that_is_cut_or_gone_is_told(copied, tmp_path):

@@ -11,7 +11,7 @@ from rislam_rt.scene.random_rooms.floor_plan import area, depth_inside, draw_pla
 from rislam_rt.scene.random_rooms.landmarks import MOST
 from rislam_rt.scene.random_rooms.random_motion import CLIMB, CORNER, CYCLE, OFF_WALLS, SPIN
 
-MEANT = ("below the array", "more than a perfect plate", "more than 1/B", "never in front", "a wavelength or more")
+MEANT = ("below the array", "more than a perfect plate", "more than 1 / B", "never in front", "a wavelength or more")
 """Warnings of the scene check about what is drawn on purpose."""
 
 

@@ -12,7 +12,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 from rislam_rt.slam.nested.particles.new_landmark import LandmarkHistory, initialise_landmark
 from rislam_rt.slam.nested.particles.particle_belief import Nested, draw, gaussian, propagate, remember, renew
 from rislam_rt.slam.nested.particles.weights import Seen, update
-from rislam_rt.slam.returns import NONE, Returns, observe, poses_of
+from rislam_rt.slam.predicted_returns import NONE, Returns, observe, poses_of
 from rislam_rt.slam.window.landmarks.path_forms import compile_forms
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))

@@ -16,7 +16,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import (
 )
 from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, observe
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, observe
 
 N, M = 12, 240
 LEGS = np.array([[0, NONE, NONE], [0, 1, NONE], [0, 1, 2], [0, 2, 1], [TX, NONE, NONE], [TX, 1, NONE], [TX, 2, 1]])

@@ -14,7 +14,7 @@ from rislam_rt.slam.nested.particles.particle_belief import Nested
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update
-from rislam_rt.slam.returns import Returns, observe, poses_of
+from rislam_rt.slam.predicted_returns import Returns, observe, poses_of
 from rislam_rt.slam.window.smoother import window_gaussian
 
 LANDMARKS = np.array([[2.0, 1.0, 1.0], [3.0, 3.0, 3.0]])

@@ -17,9 +17,16 @@ from rislam_rt.slam.schemes import bp_slam_aoa
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import CandidatePairs, View, claims, likelihoods, spread_of
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_update import absorb
-from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import POINT, WALL, Ends, GaussianFeatures, look, returns_of
+from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
+    POINT,
+    WALL,
+    Ends,
+    GaussianFeatures,
+    predict_returns,
+    returns_of,
+)
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.sums import prune
+from rislam_rt.slam.schemes.shared.gaussian_sums import prune
 from rislam_rt.slam.step_info import REMOVED
 
 CONFIG = bp_slam_aoa.BpSlamAoaConfig(sigma_a=0.01)
@@ -121,7 +128,7 @@ def test_returns_are_those_of_the_mirror_images() -> None:
 def test_one_gaussian_and_one_certain_component_are_a_kalman_filter(kind: int) -> None:
     """Known association, nothing else possible: the joint posterior of course and feature is Kalman's."""
     course, features = course_at(np.array([0.2, 0.1, 0.0])), one(kind, np.array([1.5, 2.0, 1.8]))
-    predicted = look(features, course, ENDS, FREE)
+    predicted = predict_returns(features, course, ENDS, FREE)
     noise = np.array([[1e-4, 4e-4, 9e-4]])
     seen = predicted.seen + np.array([[0.02, -0.01, 0.015]])
     scan = ComponentScan(seen, np.sqrt(noise), np.array(predicted.log_amplitude), np.full(1, 0.1), np.full(1, 1e-30))
@@ -151,7 +158,10 @@ def test_the_evidence_of_one_feature_is_the_sum_over_its_associations() -> None:
     """A tree, on which Bethe's evidence is exact: missed, or made one of three components, each else something new."""
     course, features = course_at(np.zeros(3)), one(POINT, np.array([1.5, 2.0, 1.8]))._replace(existence=np.array([0.6]))
     view = View(
-        look(features, course, ENDS, FREE), np.array([0.8]), np.zeros((1, 3, 3)), CandidatePairs(*np.zeros((5, 3), int))
+        predict_returns(features, course, ENDS, FREE),
+        np.array([0.8]),
+        np.zeros((1, 3, 3)),
+        CandidatePairs(*np.zeros((5, 3), int)),
     )
     view = view._replace(pairs=view.pairs._replace(component=np.arange(3)))
     density, fresh = np.array([3.0, 0.2, 1.0]), np.array([0.5, 0.1, 2.0])
@@ -170,7 +180,7 @@ def test_a_new_feature_is_where_its_component_came_from(row: int) -> None:
     course = course_at(agent)
     found = hypothesise(scan, 0, TURN, FREE, 24.0, CONFIG)
     new = born([found], np.ones(1), course, ENDS, 0, CONFIG)
-    predicted = look(new, course._replace(covariance=np.zeros((6, 6))), ENDS, FREE)
+    predicted = predict_returns(new, course._replace(covariance=np.zeros((6, 6))), ENDS, FREE)
     spread = np.sqrt(np.einsum("cii->ci", predicted.own)) + STD
     likely = new.share > 1e-3
     assert (np.abs(predicted.seen - seen[row]) < 4.0 * spread)[likely].all()

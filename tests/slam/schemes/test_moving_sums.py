@@ -8,9 +8,9 @@ from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
 from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
+from rislam_rt.slam.schemes.shared.gaussian_sums import Sums, born, carry, predict_ranges, prune, unit_of
 from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims
-from rislam_rt.slam.schemes.shared.sums import Sums, born, carry, look, prune, unit_of
 
 CONFIG = bp_slam.BpSlamConfig(sigma_a=0.01)
 MODEL = Bistatic(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]))
@@ -72,7 +72,7 @@ def test_the_range_of_a_gaussian_is_that_of_its_point() -> None:
     walk, speed = sums.walk[sums.owner], sums.speed[sums.owner]
     point = PLACE + sums.mean[:, :1] * unit_of(sums.mean, walk, speed)
     wanted = sum(np.linalg.norm(point - agent - end, axis=1) for end in (MODEL.tx, MODEL.rx))
-    assert np.allclose(look(sums, course, agent, MODEL).length, wanted, rtol=0.0, atol=5e-4)
+    assert np.allclose(predict_ranges(sums, course, agent, MODEL).length, wanted, rtol=0.0, atol=5e-4)
 
 
 def test_the_range_to_a_wall_is_that_of_the_image() -> None:
@@ -84,7 +84,7 @@ def test_the_range_to_a_wall_is_that_of_the_image() -> None:
     # the wall's normal is the walk but for sqrt(LEAST_ACROSS) = 0.01 rad across
     depth = 2.0 * (2.0 - ahead @ (0.4 * ahead + MODEL.tx))
     wanted = np.linalg.norm(MODEL.tx - MODEL.rx + depth * ahead)
-    assert look(sums, course, PLACE + 0.4 * ahead, MODEL).length[0] == pytest.approx(wanted, abs=3e-3)
+    assert predict_ranges(sums, course, PLACE + 0.4 * ahead, MODEL).length[0] == pytest.approx(wanted, abs=3e-3)
 
 
 def test_one_gaussian_and_one_certain_range_are_a_kalman_filter() -> None:
@@ -97,7 +97,7 @@ def test_one_gaussian_and_one_certain_range_are_a_kalman_filter() -> None:
         existence=np.array([1.0]), slope=rng.normal(0.0, 0.2, rows.slope.shape), covariance=1e-3 * rows.covariance
     )
     sums = Sums(*sums[:7], *(column[:1] for column in sums[7:-1]), np.ones(1))
-    sight = look(sums, course, PLACE, MODEL)
+    sight = predict_ranges(sums, course, PLACE, MODEL)
     scan = Scan(sight.length + 0.01, np.array([0.02]))
     fresh = np.array([1.0 + 1e-12])
     found = claims(sums, sight, course, scan, fresh, odds)
@@ -118,7 +118,7 @@ def test_existence_after_a_cycle(existence: float, ranges: int) -> None:
     odds, course = Odds(0.7, 1.0, 30.0), course_after(4, 2)
     sums = prune(one_feature(course), 0.0, 0.9, 5)
     sums = Sums(*sums[:5], np.array([existence]), sums[6], *(column[:1] for column in sums[7:-1]), np.ones(1))
-    sight = look(sums, course, PLACE, MODEL)
+    sight = predict_ranges(sums, course, PLACE, MODEL)
     scan = Scan(sight.length[:ranges] + 0.01, np.full(ranges, 0.02))
     fresh = 1.0 + birth_ratio(scan.length, 6.0, odds)
     after, _ = absorb(sums, sight, course, scan, claims(sums, sight, course, scan, fresh, odds), odds)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.slam.observations import UNTOLD, Observations
-from rislam_rt.slam.returns import Poses
+from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window import cycle_association
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.cycle_explanation import _names, innovations, scatter_variance, weigh_again
+from rislam_rt.slam.window.cycle_explanation import _names, innovations, reweigh_wall_returns, scatter_variance
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals
 
@@ -37,7 +37,7 @@ def scatter_held(log):
 def test_what_was_weighed_before_its_scatter_was_known_is_weighed_by_it():
     truth = np.tile([1.0, 50.0], (CYCLES, 1))
     log, left = log_of(truth)
-    found = scatter_held(weigh_again(log, left, CYCLES))
+    found = scatter_held(reweigh_wall_returns(log, left, CYCLES))
     near = np.array([(0.9 ** np.abs(np.arange(CYCLES) - slot)).sum() for slot in range(CYCLES)])
     np.testing.assert_allclose(found, (CONSTANTS.crowd + near[:, None] * truth) / (1.0 + near[:, None]), rtol=1e-9)
     assert (found[:, 0] < 0.25 * CONSTANTS.crowd).all()
@@ -48,7 +48,7 @@ def test_neighbours_that_come_do_not_count_against_what_was_long_before():
     truth = np.ones((CYCLES, 2))
     truth[CYCLES // 2 :, 0] = 100.0
     log, left = log_of(truth)
-    found = scatter_held(weigh_again(log, left, CYCLES))
+    found = scatter_held(reweigh_wall_returns(log, left, CYCLES))
     assert found[0, 0] < 0.5 * found[-1, 0]
     assert (np.diff(found[:, 0]) > 0.0).all()
 
@@ -57,7 +57,7 @@ def test_a_gross_error_counts_as_the_loudest_neighbour():
     truth = np.ones((CYCLES, 2))
     truth[3, 0] = 1e9
     log, left = log_of(truth)
-    assert scatter_held(weigh_again(log, left, CYCLES)).max() < 1e3
+    assert scatter_held(reweigh_wall_returns(log, left, CYCLES)).max() < 1e3
 
 
 def test_a_level_ray_moves_nothing_where_it_is_reported_on_average():

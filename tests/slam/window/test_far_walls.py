@@ -9,7 +9,7 @@ from rislam_rt.measurement import ReceiverConfig, build_sensor, with_reference_s
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.observations import free_space
-from rislam_rt.slam.returns import AXES, poses_of
+from rislam_rt.slam.predicted_returns import AXES, poses_of
 
 REPEAT = SPEED_OF_LIGHT * 128 / 1e9
 """[m] after which 128 tones over 1 GHz repeat."""

@@ -7,14 +7,14 @@ import numpy as np
 from rislam_rt.model import Body, RadioConfig, SensorModel
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window import filter as window_filter
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import append, empty_log
-from rislam_rt.slam.window.relinearisation import renew
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 
@@ -34,11 +34,11 @@ def test_a_cycle_in_which_nothing_was_heard_takes_nothing_of_the_one_before():
     log = append(empty_log(), observed, 3, 0).explain(np.array([0]), form, 0.0, 0.0, np.zeros((1, 3)))
     known = {"window": window, "log": log, "landmarks": landmarks, "scene": SCENE, "heading": np.zeros(2)}
     for cycle, heard in ((3, True), (4, False)):
-        found, left = renew(SimpleNamespace(**known, cycle=cycle), 1)
+        found, left = relinearise(SimpleNamespace(**known, cycle=cycle), 1)
         assert len(left.row) == heard
         assert found.slots.hessian[-1].any() == heard
     # the whole window then: it is the pose before that heard it
-    found, left = renew(SimpleNamespace(**known, cycle=4), 0)
+    found, left = relinearise(SimpleNamespace(**known, cycle=4), 0)
     np.testing.assert_array_equal(left.slot, [0])
 
 

@@ -8,7 +8,7 @@ import pytest
 from rislam_rt.slam import window
 from rislam_rt.slam.model_constants import CONSTANTS, ModelConstants
 from rislam_rt.slam.window.landmarks.measurement_prediction import PANEL_STD
-from rislam_rt.slam.window.smoother.factor import inverse, solution
+from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 
 SOURCES = [path.read_text() for path in Path(window.__file__).parents[1].rglob("*.py")]
 

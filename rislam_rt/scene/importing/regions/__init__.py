@@ -1,1 +1,2 @@
-"""The flat and round regions of a mesh, grouped into walls and things, and made of as few faces as will do."""
+"""Flat and round regions of an imported mesh, grouped into walls and objects, and simplified to as few faces as will
+do."""

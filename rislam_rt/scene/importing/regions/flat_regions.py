@@ -1,4 +1,4 @@
-"""Flat regions of a mesh: corners joined, neighbours in one plane joined, with the size of each."""
+"""Flat regions of a mesh: neighbouring triangles in one plane joined, with the plane and the size of each."""
 
 from typing import NamedTuple
 
@@ -11,46 +11,47 @@ from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
 FLAT_ANGLE = np.radians(0.5)
-"""Neighbours that meet at less than this are one plane: half a degree looks flat to whoever drew it."""
+"""Angle [rad] of neighbouring triangles below which they are one plane: half a degree looks flat to whoever drew it."""
 
 
 class Edges(NamedTuple):
-    """Pairs of triangles that share an edge."""
+    """Pairs (a, b) of a mesh's triangles that share an edge."""
 
     a: Integers
     b: Integers
     turn: Floats
-    """(E,) [rad] angle at which they meet, zero in one plane, whichever way either is turned."""
+    """(E,) [rad] angle at which the two triangles meet, zero in one plane, whichever way either is turned."""
 
 
 class FlatRegions(NamedTuple):
-    """R flat regions of a welded mesh."""
+    """R flat regions of a mesh whose triangles share their corners."""
 
     mesh: Welded
-    """Its triangles turned to their region's normal."""
+    """The mesh, its triangles turned to their region's normal."""
     region: Integers
-    """(F,)."""
+    """(F,) region of each triangle."""
     normal: Floats
-    """(R, 3)."""
+    """(R, 3) unit normal of each region's plane."""
     offset: Floats
-    """(R,) [m]."""
+    """(R,) [m] of each region's plane: `normal . x = offset`."""
     area: Floats
-    """(R,) [m^2]."""
+    """(R,) [m^2] of each region."""
     width: Floats
     """(R,) [m] short side of the rectangle with the same second moments."""
     residual: Floats
-    """(R,) [m] farthest corner from the plane."""
+    """(R,) [m] distance of a region's farthest corner from its plane."""
     component: Integers
-    """(R,) piece of the mesh that hangs together by edges: a leg that stands on a corner of the floor is none of it."""
+    """(R,) connected part of the mesh, by edges, that each region belongs to: a leg that stands on a corner of the
+    floor is none of it."""
     edges: Edges
 
     def faces_of(self, regions: Integers) -> Integers:
-        """(T, 3) triangles of regions."""
+        """Triangles (T, 3) of a mesh in given flat regions."""
         return self.mesh.faces[np.isin(self.region, regions)]
 
 
 def find_facets(mesh: Welded) -> FlatRegions:
-    """Part a welded mesh into flat regions: neighbours of one part that meet at less than `FLAT_ANGLE`."""
+    """Part a mesh into flat regions: neighbouring triangles of one part that meet at less than `FLAT_ANGLE`."""
     triangles = mesh.vertices[mesh.faces]
     cross = triangle_cross(triangles)
     area, normal = 0.5 * np.linalg.norm(cross, axis=1), unit(cross)
@@ -70,13 +71,14 @@ def find_facets(mesh: Welded) -> FlatRegions:
 
 
 def bounds_of(facets: FlatRegions, regions: Integers) -> Floats:
-    """(2, 3) [m] lowest and highest corner of regions."""
+    """Bounds (2, 3) [m] of flat regions of a mesh: lowest and highest corner."""
     corners = facets.mesh.vertices[facets.faces_of(regions)].reshape(-1, 3)
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
 def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float) -> Integers:
-    """Number (R,) of the patch of chosen regions that hang together by edges that meet at `low` to `high` [rad]."""
+    """Group number (R,) of each flat region of a mesh: chosen regions that hang together by edges at which they meet at
+    `low` to `high` [rad] have one."""
     edges, region = facets.edges, facets.region
     a, b = region[edges.a], region[edges.b]
     joined = (a != b) & (edges.turn >= low) & (edges.turn <= high) & chosen[a] & chosen[b]
@@ -84,6 +86,7 @@ def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float
 
 
 def _edges(faces: Integers, normal: Floats) -> Edges:
+    """Pairs of a mesh's triangles that share an edge, with the angles at which they meet."""
     ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     owner = np.tile(np.arange(len(faces)), 3)
     order = np.lexsort((owner, ends[:, 1], ends[:, 0]))
@@ -95,13 +98,14 @@ def _edges(faces: Integers, normal: Floats) -> Edges:
 
 
 def _largest(region: Integers, area: Floats, count: int) -> Integers:
-    """(R,) the largest triangle of each region."""
+    """Index (R,) of the largest triangle of each flat region."""
     order = np.lexsort((-area, region))
     return order[np.searchsorted(region[order], np.arange(count))]
 
 
 def _planes(triangles: Floats, area: Floats, region: Integers, side: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Least-squares plane of every region by its triangles' second moments; normals on the side of `side` (R, 3)."""
+    """Least-squares plane of each flat region by its triangles' second moments, normals on the side of `side` (R, 3):
+    normal, offset, width and residual."""
     count = len(side)
     total = np.bincount(region, area, count)
     middle = triangles.mean(axis=1)

@@ -1,4 +1,5 @@
-"""Simplification of meshes: flat regions by their outlines, clutter by cells, each with how far it is off [m]."""
+"""Simplification of imported meshes: flat regions by their outlines, clutter by cells, each with how far it is off
+[m]."""
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, si
 
 
 def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
-    """(V,) corners where three regions (numbered by `label` (R,)) meet, or two at an open edge: none may be moved."""
+    """Whether (V,) simplification may not move a mesh's corner: three flat regions (numbered by `label` (R,)) meet
+    there, or two at an open edge."""
     faces, mine = facets.mesh.faces, label[facets.region]
     pairs = np.unique(np.column_stack([faces.ravel(), np.repeat(mine, 3)]), axis=0)
     count = np.bincount(pairs[:, 0], minlength=len(facets.mesh.vertices))
@@ -22,7 +24,7 @@ def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
 
 
 def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, tolerance: float) -> tuple[Mesh, float]:
-    """One flat mesh of regions in one plane, and its largest error [m].
+    """Simplify flat regions in one plane to one flat mesh; also its largest error [m].
 
     Outlines are thinned within a tolerance [m] and filled anew; where an outline crosses itself the triangles stay as
     they are.
@@ -41,7 +43,7 @@ def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, toleranc
 
 
 def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
-    """Points of a simplified mesh in a plane, moved only where rounding does not explain that they are off."""
+    """Points of a simplified mesh put into a plane, moved only where rounding does not explain that they are off."""
     height = points @ normal - offset
     return points - height[:, None] * normal if np.abs(height).max() > 1e-6 else points
 
@@ -49,7 +51,8 @@ def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
 def _filled(
     faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float
 ) -> tuple[Mesh | None, float]:
-    """The thinned outlines as a mesh, and how far the farthest corner is off them [m]."""
+    """Mesh triangulated from the simplified outlines of a flat region (None where that fails), and the largest distance
+    [m] of its corners from them."""
     flat = points @ np.stack(plane_tangents(normal), axis=-1)
     drawn = outline_loops(faces)
     loops = [simplify_loop(loop, points, kept, tolerance) for loop in drawn]
@@ -74,19 +77,21 @@ def _filled(
 
 
 def _off_loop(corners: Floats, loop: Floats) -> float:
-    """Largest distance [m] of corners (n, 3) from a simplified closed loop (m, 3)."""
+    """Largest distance [m] of a flat region's corners (n, 3) from its simplified closed loop (m, 3)."""
     edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
     return float(distance_to_edges(corners, edges).max())
 
 
 def _around(hole: Floats, outers: list[Floats]) -> int | None:
-    """Smallest outer loop around a hole, by the middle of its first edge, for simplification."""
+    """Number of the smallest outer loop of a simplified flat region around a hole, by the middle of the hole's first
+    edge; None if there is none."""
     around = [k for k, outer in enumerate(outers) if inside_loop(outer, 0.5 * (hole[0] + hole[1]))]
     return min(around, key=lambda k: signed_area(outers[k])) if around else None
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
-    """Clutter (T, 3, 3) with the corners of each cell [m] joined in their mean, and how far the farthest moved [m].
+    """Simplify clutter, triangles (T, 3, 3), by joining the corners in each cell [m] in their mean; also the largest
+    distance [m] that one moved.
 
     What shrinks to a line or a point is gone: it was finer than a cell. Rossignac and Borrel 1993.
     """
@@ -105,5 +110,5 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 
 
 def has_area(triangles: Floats) -> Booleans:
-    """Which triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
+    """Whether (T,) triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
     return np.asarray(triangle_heights(triangles) > 1e-4)

@@ -1,4 +1,5 @@
-"""Which flat regions belong together, and what to call them: the shell of the room, and each thing in it."""
+"""Groups of a mesh's flat regions that belong together, and their names: the shell of the room, and each object in
+it."""
 
 import re
 from typing import NamedTuple
@@ -11,11 +12,11 @@ from rislam_rt.geometry.connected_parts import connected
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, bounds_of
 
 SPAN = 0.6
-"""A piece that spans this share of the room along two axes is its shell."""
+"""Share of the room along two axes that a connected part of its mesh spans if it is the room's shell."""
 TOUCH = 5e-3
-"""[m] Things whose boxes are nearer than this are one."""
+"""Distance [m] of two objects' boxes below which they are one object."""
 UPRIGHT, LEVEL = np.sin(np.radians(15.0)), np.cos(np.radians(15.0))
-"""Largest and smallest vertical component of a wall's and a floor's normal."""
+"""Largest and smallest vertical component of the normals of a wall and of a floor."""
 
 _NAMELESS = re.compile(
     r"(?i)(mesh|object|obj|node|geometry|geom|cube|plane|cylinder|sphere|circle|default|group|scene|root|world|solid|"
@@ -25,18 +26,21 @@ _SHELL = re.compile(r"(?i)(^|[^a-z])(walls?|floors?|ceilings?|roof|wand|boden|de
 
 
 class RegionGroup(NamedTuple):
-    """Regions that are one thing."""
+    """Group of a mesh's flat regions that are one object, or the shell of the room."""
 
     name: str
     node: str
     regions: Integers
+    """Numbers of its flat regions."""
     shell: bool
+    """Whether it is the shell of the room."""
 
 
 def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
-    """All pieces, the shell first; `nodes` are the node names of the mesh's parts.
+    """Group the flat regions of a room's mesh into its shell, which comes first, and objects; `nodes` are the node
+    names of the mesh's parts.
 
-    A node with a name of its own is one piece; whatever has none is parted into what hangs together.
+    A node with a name of its own is one object; whatever has none is parted into what hangs together.
     """
     part = np.zeros(len(facets.area), dtype=np.int64)
     part[facets.region] = facets.mesh.part
@@ -74,7 +78,8 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
 
 
 def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
-    """Whether a thing is one flat region in the plane of a wall that it touches: the piece above a door."""
+    """Whether an object is one flat region in the plane of a wall of the shell that it touches, as the wall above a
+    door."""
     if len(regions) != 1:
         return False
     normal, offset = facets.normal[regions[0]], facets.offset[regions[0]]
@@ -88,7 +93,7 @@ def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
 
 
 def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
-    """Regions whose boxes touch, as groups: a seat and its legs are a chair."""
+    """Join objects of a mesh whose boxes touch, as groups of regions: a seat and its legs are a chair."""
     if not things:
         return []
     low, high = np.stack([bounds_of(facets, regions) for regions in things], axis=1)
@@ -100,7 +105,8 @@ def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
 
 
 def plain_name(name: str) -> str:
-    """Name of a region's group from a node's name: `Office Chair.002` is `office_chair_002`; or empty."""
+    """Plain name of an object from its node's name: `Office Chair.002` is `office_chair_002`; empty for a name that
+    says nothing."""
     if _NAMELESS.fullmatch(name):
         return ""
     plain = re.sub(r"[^\w.\-]+", "_", name.strip(), flags=re.UNICODE).strip("_.-").lower()
@@ -108,13 +114,14 @@ def plain_name(name: str) -> str:
 
 
 def place_free_name(name: str) -> str:
-    """Name of a region's group, empty too where it says no more than wall, floor or ceiling."""
+    """Plain name of a wall from its node's name; empty too where that says no more than wall, floor or ceiling."""
     plain = plain_name(name)
     return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
 
 
 def kind_by_shape(bounds: Floats, room: Floats) -> str:
-    """Name of a group of regions by its size and place; nothing that is computed with."""
+    """Name of an object of an imported room by its size and place (`table`, `cabinet`, ...); nothing that is computed
+    with."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])
     bottom, top = float(bounds[0, 2]) - floor, float(bounds[1, 2]) - floor
     longest, shortest = float(size[:2].max()), float(size[:2].min())
@@ -132,7 +139,8 @@ def kind_by_shape(bounds: Floats, room: Floats) -> str:
 
 
 def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
-    """Name of a group of regions by where in the shell it is: `floor`, `ceiling`, `wall_north` (y to the north)."""
+    """Name of a wall by where in the shell of an imported room it is: `floor`, `ceiling`, `wall_north` (y to the
+    north)."""
     center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
     if abs(normal[2]) >= LEVEL:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
@@ -144,7 +152,8 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
 
 
 def numbered(names: list[str]) -> list[str]:
-    """Names of region groups made different: the second of one name gets `_2`, and so on."""
+    """Names of an imported room's reflectors or occluders made different: the second of one name gets `_2`, and so
+    on."""
     taken: set[str] = set()
     found = []
     for name in names:
@@ -158,6 +167,7 @@ def numbered(names: list[str]) -> list[str]:
 
 
 def _is_shell(bounds: Floats, room: Floats) -> bool:
+    """Whether bounds (2, 3) span enough of an imported room's along two axes to be those of its shell."""
     size = room[1] - room[0]
     share = (bounds[1] - bounds[0]) / np.where(size > 0.0, size, 1.0)
     return int((share >= SPAN).sum()) >= 2

@@ -1,4 +1,4 @@
-"""Round surfaces in a mesh of flat facets: which facets are one, and the cylinder that some of them are."""
+"""Round surfaces in a mesh of flat facets: which facets make one, and the cylinder that some of them are."""
 
 from typing import NamedTuple
 
@@ -11,31 +11,34 @@ from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.shapes import joined, quad
 
 CREASE = np.radians(35.0)
-"""Facets that meet at more than this are an edge: a round thing is drawn with eleven sides or more."""
+"""Angle [rad] of neighbouring facets above which they meet in an edge: a round thing is drawn with eleven sides or
+more."""
 WIDEST = 0.5
-"""[m] Wider facets are walls of a bay, not a drawing of something round."""
+"""Width [m] above which a facet is a wall of a bay, not a drawing of something round."""
 FEWEST = 5
-"""Facets of a patch: fewer are a bevel."""
+"""Least number of facets of a round surface: fewer are a bevel."""
 
 
 class RoundPatch(NamedTuple):
-    """A patch of facets that is round; a cylinder if it has a radius."""
+    """A round surface made of flat facets of a mesh; a cylinder if it has a radius."""
 
     regions: Integers
+    """Numbers of its facets (flat regions)."""
     axis: Floats
-    """(3,)."""
+    """(3,) unit vector along the cylinder."""
     center: Floats
     """(3,) [m] a point of the axis."""
     radius: float
-    """[m], 0 for any other round shape."""
+    """[m] of the cylinder, 0 for any other round shape."""
     along: tuple[float, float]
-    """[m] from `center` along the axis."""
+    """[m] from where to where it reaches along the axis, from `center`."""
     arc: tuple[float, float]
     """[rad] from where to where it goes round; all the way if that is 2 pi."""
 
 
 def find_round(facets: FlatRegions) -> list[RoundPatch]:
-    """All round patches: facets narrower than `WIDEST` that meet their neighbours at less than `CREASE`."""
+    """Find the round surfaces of a mesh: facets narrower than `WIDEST` that meet their neighbours at less than
+    `CREASE`."""
     narrow = facets.width < WIDEST
     group = crease_groups(facets, narrow, float(FLAT_ANGLE), float(CREASE))
     order = np.argsort(group, kind="stable")
@@ -44,13 +47,13 @@ def find_round(facets: FlatRegions) -> list[RoundPatch]:
 
 
 def sides_for(radius: float, sagitta: float, arc: float) -> int:
-    """Number of flat sides of an arc [rad] that keep within a sagitta [m] of it."""
+    """Number of flat sides that keep a cylinder's arc [rad] within a sagitta [m]."""
     step = 2.0 * np.arccos(max(1.0 - sagitta / radius, np.cos(np.pi / 6.0)))
     return max(int(np.ceil(arc / step)), 1)
 
 
 def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
-    """A round surface as a prism: a cylinder's flat sides, without ends, and how far they are off it [m].
+    """Mesh of a cylinder as a prism, its flat sides without ends, and how far they are off it [m].
 
     All the way round the girth is the true one, so that its shadow is (Cauchy); an arc has its corners on the circle.
     """
@@ -70,7 +73,8 @@ def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
 
 
 def _cylinder(facets: FlatRegions, regions: Integers) -> RoundPatch:
-    """The cylinder through the corners of a patch, if they lie on one and it covers it."""
+    """Fit a cylinder to the corners of a patch of facets; the radius is 0 where they lie on none, or it is not
+    covered."""
     normal, area = facets.normal[regions], facets.area[regions]
     values, vectors = np.linalg.eigh(np.einsum("r,ri,rj->ij", area, normal, normal) / area.sum())
     axis = vectors[:, 0] * (1.0 if vectors[np.argmax(np.abs(vectors[:, 0])), 0] > 0.0 else -1.0)

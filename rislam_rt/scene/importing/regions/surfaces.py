@@ -1,4 +1,4 @@
-"""From flat regions to surfaces that reflect and clutter that shades."""
+"""Surfaces of an imported mesh: its flat regions sorted into those that reflect and clutter that hides."""
 
 from typing import NamedTuple
 
@@ -15,58 +15,63 @@ from rislam_rt.scene.importing.regions.round_surfaces import RoundPatch, prism
 from rislam_rt.scene.meshes import Mesh
 
 RESTING = 5e-3
-"""[m] A face this near a wall of the shell, on the far side of its thing, stands on it: nobody sees it."""
+"""Distance [m] from a wall of the shell up to which a face on the far side of its object stands on it: nobody sees
+it."""
 MAX_SHADE_FACES = 3000
-"""Occluders are tested against every segment of every path; cells grow until no more triangles are left."""
+"""Most triangles of all clutter: occluders are tested against every segment of every path; cells grow until no more are
+left."""
 OUTLINE = 0.125
-"""[wavelengths] Outlines of flat regions are thinned within this."""
+"""Tolerance [wavelengths] within which outlines of flat regions are simplified."""
 SAGITTA = 0.25
-"""[wavelengths] Flat sides keep within this of the cylinder that they stand for; half of it where they reflect."""
+"""Tolerance [wavelengths] of flat sides to the cylinder that they stand for; half of it where they reflect."""
 
 
 class Surface(NamedTuple):
-    """A flat mesh that reflects."""
+    """Flat surface of an imported mesh that reflects."""
 
     piece: int
+    """Number of the object that it belongs to, 0 for the shell of the room."""
     part: int
-    """Part of the file, for its names."""
+    """Part of the file that it comes from, for its names."""
     normal: Floats
     mesh: Mesh
     area: float
+    """[m^2] of the regions that it stands for."""
     error: float
-    """[m]."""
+    """[m] that it is off the imported mesh."""
 
 
 class ClutterMesh(NamedTuple):
-    """Triangles (T, 3, 3) [m] of a piece that shade."""
+    """Triangles (T, 3, 3) [m] of one object of an imported mesh that hide and do not reflect."""
 
     piece: int
     triangles: Floats
 
 
 class SortedSurfaces(NamedTuple):
-    """A mesh as what reflects and what shades."""
+    """Imported mesh sorted into surfaces that reflect and clutter that hides, with figures for the report."""
 
     surfaces: list[Surface]
     clutter: list[ClutterMesh]
     shade_error: float
-    """[m]."""
+    """Largest distance [m] that a corner of the clutter was moved."""
     cell: float
-    """[m] of the cells in which corners of clutter were joined."""
+    """Side [m] of the cells in which corners of clutter were joined."""
     narrow: float
-    """[m] width below which regions shade."""
+    """Width [m] below which regions hide and do not reflect."""
     shading: float
-    """[m^2] of regions that shade."""
+    """Area [m^2] of regions that hide and do not reflect."""
     gone: float
-    """[m^2] of regions that are neither: faces that rest on walls, things smaller than the detail."""
+    """Area [m^2] of regions that do neither: faces that rest on walls, things smaller than the detail."""
     cylinders: list[tuple[float, int, float]]
-    """Radius [m], flat sides and error [m] of each."""
+    """Radius [m], number of flat sides, and error [m] of each cylinder."""
 
 
 def sort_regions(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
 ) -> SortedSurfaces:
-    """Decide for every region whether it reflects, shades or goes."""
+    """Sort the flat regions of an imported mesh: decide for each whether it reflects, hides what lies behind, or is
+    left out."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
         owner[piece.regions] = number
@@ -96,7 +101,8 @@ def sort_regions(
 
 
 def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
-    """Which regions reflect like planes, and the width [m] from which on they do."""
+    """Whether (R,) each flat region of an imported mesh reflects like a plane, and the width [m] from which on they
+    do."""
     flat = ~rounded & (facets.residual <= OUTLINE * options.wavelength)
     width = np.minimum(facets.width, np.sqrt(facets.area))
     narrow = options.narrow
@@ -107,7 +113,7 @@ def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> 
 
 
 def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -> Booleans:
-    """Regions of things that lie on walls of the shell, their thing rising from there."""
+    """Whether (R,) each flat region of an object lies on a wall of the room's shell from which the object rises."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
     corners = facets.mesh.vertices[facets.mesh.faces]
@@ -128,7 +134,8 @@ def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -
 
 
 def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
-    """Number (R,) of the wall each region belongs to: those of the shell in one plane and of one part are one."""
+    """Number (R,) of the wall that each flat region belongs to: those of the room's shell in one plane and of one part
+    are one wall."""
     group = np.arange(len(mirror))
     rows = shell[mirror[shell]]
     for place, i in enumerate(rows):
@@ -150,7 +157,8 @@ def _with_clutter(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], owner: Integers,
     part: Integers, mirror: Booleans, resting: Booleans, narrow: float, options: ImportOptions,
 ) -> SortedSurfaces:  # fmt: skip
-    """Cylinders as prisms and all else that does not reflect in cells."""
+    """Complete the sorted surfaces of an imported mesh: cylinders as prisms, and all else that does not reflect as
+    clutter."""
     wavelength, cylinders, prisms = options.wavelength, [], []
     rest = ~mirror & ~resting
     for found in rounds:
@@ -185,7 +193,8 @@ def _with_clutter(
 
 
 def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
-    """Clutter thinned in cells of one size, the smallest with which it is few enough."""
+    """Simplify clutter in cells of one size [m], the smallest with which it is few enough triangles; also the largest
+    error [m] and that size."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
         if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:
@@ -196,13 +205,14 @@ def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], fl
 
 
 def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
+    """Planes (normal, offset) of the reflecting walls of an imported room's shell."""
     return [
         (s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200
     ]
 
 
 def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
-    """Triangles (T, 3, 3) without those that lie flat on a wall of the shell."""
+    """Clutter triangles (T, 3, 3) without those that lie flat on a wall of an imported room's shell."""
     keep = has_area(triangles)
     for normal, offset in planes:
         keep &= np.abs(triangles @ normal - offset).max(axis=1) > RESTING

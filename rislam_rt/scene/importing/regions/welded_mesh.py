@@ -1,4 +1,4 @@
-"""A mesh whose triangles share their corners: those of its parts joined where they are nearly the same."""
+"""Welded mesh, whose triangles share their corners: those of its parts joined where they are nearly the same."""
 
 from typing import NamedTuple
 
@@ -10,22 +10,24 @@ from rislam_rt.geometry.connected_parts import connected
 from rislam_rt.geometry.triangles import triangle_heights
 
 WELD = 2e-5
-"""[m] Corners nearer than this are one: what float32 leaves open in a file of 100 m, and no drawing means less."""
+"""Distance [m] of corners below which they are one: what float32 leaves open in a file of 100 m, and no drawing means
+less."""
 
 
 class Welded(NamedTuple):
-    """A mesh whose triangles share their corners."""
+    """A welded mesh, whose triangles share their corners."""
 
     vertices: Floats
     """(V, 3) [m]."""
     faces: Integers
-    """(F, 3)."""
+    """(F, 3) indices into `vertices`."""
     part: Integers
     """(F,) part of the file that each comes from."""
 
 
 def weld(triangles: list[Floats]) -> Welded:
-    """Join the corners of parts (T, 3, 3) [m]; triangles without area and doubles are left out."""
+    """Weld the parts (T, 3, 3) [m] of a mesh at their common corners; triangles without area and doubles are left
+    out."""
     corners = np.concatenate([t.reshape(-1, 3) for t in triangles])
     part = np.repeat(np.arange(len(triangles)), [len(t) for t in triangles])
     vertices, index = np.unique(corners, axis=0, return_inverse=True)

@@ -1,1 +1,1 @@
-"""Rooms from scans: levels, an outline that is straight, and what stands in it."""
+"""Import of rooms from scans: planes of a noisy mesh, straight outlines of them, and what stands in the room."""

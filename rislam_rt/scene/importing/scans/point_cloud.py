@@ -1,4 +1,4 @@
-"""A scanned mesh as a cloud of points with normals and areas, thinned out."""
+"""A scanned mesh as a point cloud with normals and areas, subsampled."""
 
 from typing import NamedTuple
 
@@ -12,31 +12,33 @@ from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
 SPACING = 0.04
-"""[m] One point of the mesh is looked at in every cube of this size."""
+"""Side [m] of the cubes in each of which one point of a scanned mesh is kept."""
 
 
 NEIGHBOURS = 30
-"""Points for the normal at each: a patch some 12 cm wide."""
+"""Neighbouring points of a scan for the normal at each: a patch some 12 cm wide."""
 
 
 SMOOTHING = 3
-"""Times that the direction in which corners face is averaged over their neighbours."""
+"""Times that the normals at a scanned mesh's corners are averaged over their neighbours."""
 
 
 class PointCloud(NamedTuple):
-    """N points of a mesh, thinned."""
+    """Point cloud of N points subsampled from a scanned mesh."""
 
     points: Floats
+    """(N, 3) [m] positions."""
     normal: Floats
-    """(N, 3) of a small patch about each."""
+    """(N, 3) unit normal of a small patch about each point."""
     area: Floats
-    """(N,) [m^2] that each stands for."""
+    """(N,) [m^2] that each point stands for."""
     noise: float
-    """[m] standard deviation of points off the patches about them, their median."""
+    """Standard deviation [m] of points off the patches about them, their median."""
 
 
 def downsample_mesh(mesh: Welded) -> PointCloud:
-    """The cloud of a welded mesh: one corner for every cube and side, with the normal of the patch about it.
+    """Point cloud of a scanned mesh: one corner for every cube of `SPACING` and side, with the normal of the patch
+    about it.
 
     Both faces of a thin board stay apart where the mesh says which side is which.
     """
@@ -60,7 +62,8 @@ def downsample_mesh(mesh: Welded) -> PointCloud:
 
 
 def _facing(mesh: Welded) -> tuple[Floats, Floats]:
-    """(V, 3) where each corner faces, smoothed over its neighbours, and the area (V,) [m^2] that it stands for."""
+    """Normal (V, 3) of a scanned mesh at each corner, smoothed over its neighbours, and the area (V,) [m^2] that it
+    stands for."""
     triangles = mesh.vertices[mesh.faces]
     cross = triangle_cross(triangles)
     share, facing = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 3))

@@ -1,4 +1,4 @@
-"""Outlines of scanned planes: where points are, gaps of the scan filled, edges laid where two planes meet."""
+"""Outlines of the planes of a scan: where points are, gaps of the scan filled, edges laid where two planes meet."""
 
 from typing import NamedTuple
 
@@ -15,29 +15,31 @@ from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, si
 from rislam_rt.scene.shapes import joined
 
 CELL = 0.1
-"""[m] Of the grid in which a plane's points are counted."""
+"""Side [m] of the cells in which the points of a scanned plane are counted."""
 BRIDGE = 2
-"""[cells] Gaps up to twice this are closed before holes are looked for."""
+"""Half the width [cells] of the gaps of a scanned plane that are closed before holes are looked for."""
 LEAST_PART = 0.2
-"""[m^2] Smaller parts of a plane are left out."""
+"""Least area [m^2] of a connected part of a scanned plane; smaller ones are left out."""
 MEET = 2.5
-"""[cells] An edge this near the line where two planes meet lies on it."""
+"""Distance [cells] up to which an edge near the line where two planes meet is laid on it."""
 SHORT = 4.0
-"""[cells] Steps of an outline up to this long are the grid's, or too fine to tell from it."""
+"""Length [cells] of an outline's steps up to which they are the grid's, or too fine to tell from it."""
 BREAK = 1.0
-"""[m] Along the line where two planes meet, what both lack up to this long is a hole of the scan."""
+"""Length [m] along the line where two planes meet up to which what both lack is a hole of the scan."""
 SLANT = np.cos(np.radians(20.0))
+"""Least cosine of the angle between an outline's edge and the line where two planes meet, for it to be laid there."""
 
 
 class Outline(NamedTuple):
-    """A plane's mesh, and what was filled of the scan's holes that no bridge closed [m^2]."""
+    """Outline of a scanned plane as a mesh, and the area [m^2] of the scan's holes filled that no bridge closed."""
 
     mesh: Mesh
     filled: float
 
 
 class _Edge(NamedTuple):
-    """A line in the plane: `normal . x = offset`, and whether another plane gives it."""
+    """Edge of a scanned plane's outline, a line in the plane: `normal . x = offset`, and whether another plane gives
+    it."""
 
     normal: Floats
     offset: float
@@ -46,7 +48,8 @@ class _Edge(NamedTuple):
 
 
 def outline_planes(planes: list[ScanPlane], cloud: PointCloud, fill: float) -> list[Outline | None]:
-    """A clean mesh for every plane; holes up to `fill` [m^2] are closed. None where nothing large enough is left."""
+    """Meshes of the outlines of a scan's planes; holes up to `fill` [m^2] are closed. None where nothing large enough
+    is left."""
     trees = [cKDTree(cloud.points[plane.members]) for plane in planes]
     return [_outline(number, planes, trees, cloud, fill) for number in range(len(planes))]
 
@@ -54,7 +57,7 @@ def outline_planes(planes: list[ScanPlane], cloud: PointCloud, fill: float) -> l
 def _outline(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], cloud: PointCloud, fill: float
 ) -> Outline | None:
-    """Outline of one plane of a scan as a mesh: its cells, small holes filled, edges moved to where planes meet."""
+    """Mesh of the outline of one scanned plane: its cells, small holes filled, edges moved to where planes meet."""
     plane = planes[number]
     frame = np.stack(plane_tangents(plane.normal), axis=-1)
     flat = cloud.points[plane.members] @ frame
@@ -62,7 +65,7 @@ def _outline(
     size = np.ceil((flat.max(axis=0) - low) / CELL).astype(int) + BRIDGE + 2
     there = np.zeros(size, dtype=np.bool_)
     there[tuple(((flat - low) / CELL).astype(int).T)] = True
-    there, filled = _closed(there, _ridges(number, planes, trees, frame, low, there.shape), fill)
+    there, filled = _filled_cells(there, _meeting_cells(number, planes, trees, frame, low, there.shape), fill)
     meshes = []
     for loops in _loops(there):
         corners = [low + CELL * loop for loop in loops]
@@ -74,17 +77,19 @@ def _outline(
 
 
 def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats, float, float]:
-    """Line in a scanned plane's frame (3, 2) where another plane cuts it: normal, offset [m], sine of the angle."""
+    """Line where another plane cuts a scanned plane, in the latter's frame (3, 2): normal, offset [m], and sine of the
+    angle between the planes."""
     line = frame.T @ other.normal
     slope = float(np.linalg.norm(line))
     rest = other.offset - plane.offset * float(plane.normal @ other.normal)
     return (line / slope, rest / slope, slope) if slope > 0.0 else (line, rest, slope)
 
 
-def _ridges(
+def _meeting_cells(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats, low: Floats, shape: tuple[int, ...]
 ) -> Booleans:
-    """Cells along the lines where other planes meet this one: a hole of the scan that reaches there ends there.
+    """Cells of a scanned plane along the lines where other planes meet it: a hole of the scan that reaches there ends
+    there.
 
     A line counts from the first to the last of its places where the other plane has points, breaks of up to a metre
     bridged.
@@ -115,7 +120,8 @@ def _ridges(
 
 
 def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Booleans) -> Booleans:
-    """Which places (S, 2) of a line lie between its end and where it meets another line, if both end near there."""
+    """Whether (S,) points (S, 2) on the line where two scanned planes meet lie between the line's end and its crossing
+    with another such line, if both lines end near there."""
     distance, at = cKDTree(other_flat).query(flat)
     meet = int(np.argmin(distance))
     steps = int(BREAK / (0.5 * CELL))
@@ -129,14 +135,14 @@ def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Boo
     return added
 
 
-def _closed(there: Booleans, ridges: Booleans, fill: float) -> tuple[Booleans, float]:
-    """Outline of a scan's plane with gaps bridged and small holes filled; also the area [m^2] of the holes."""
+def _filled_cells(there: Booleans, meeting: Booleans, fill: float) -> tuple[Booleans, float]:
+    """Cells of a scanned plane with gaps bridged and small holes filled; also the area [m^2] of the holes."""
     solid = binary_closing(there, iterations=BRIDGE)
-    walled = solid | ridges
+    walled = solid | meeting
     holes, count = label(binary_fill_holes(walled) & ~walled)
     small = [k for k in range(1, count + 1) if (holes == k).sum() * CELL**2 <= fill]
     patched = solid | np.isin(holes, small)
-    patched |= binary_closing(patched, iterations=BRIDGE) & ridges
+    patched |= binary_closing(patched, iterations=BRIDGE) & meeting
     parts, count = label(patched)
     keep = [k for k in range(1, count + 1) if (parts == k).sum() * CELL**2 >= LEAST_PART]
     kept = np.isin(parts, keep)
@@ -144,7 +150,7 @@ def _closed(there: Booleans, ridges: Booleans, fill: float) -> tuple[Booleans, f
 
 
 def _loops(there: Booleans) -> list[list[Floats]]:
-    """Outer outline and holes (n, 2) [cells] of each connected part of a scan's plane, thinned."""
+    """Outer outline and holes (n, 2) [cells] of each connected part of a scanned plane, simplified."""
     shape = (there.shape[0] + 1, there.shape[1] + 1)
     corners = np.arange(shape[0] * shape[1]).reshape(shape)
     points = np.moveaxis(np.indices(shape), 0, -1).reshape(-1, 2).astype(np.float64)
@@ -163,7 +169,8 @@ def _loops(there: Booleans) -> list[list[Floats]]:
 
 
 def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
-    """Outline of a scan's plane whose edges lie where planes meet, its corners where its edges meet."""
+    """Outline (n, 2) of a scanned plane with its edges laid on the lines where other planes meet it, its corners where
+    its edges meet."""
     ends = zip(loop, np.roll(loop, -1, axis=0), strict=True)
     edges = [_edge(start, end, number, planes, trees, frame) for start, end in ends]
     # a short edge beside one that another plane gives is the grid's cut through a corner
@@ -182,11 +189,14 @@ def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKD
         corners.append(np.linalg.solve(system, np.array([before.offset, edge.offset])))
     moved = np.array(corners)
     far = cKDTree(loop).query(moved)[0].max() if len(moved) > 2 else np.inf
-    return _converged(moved if far < (SHORT + 1.0) * CELL else loop, number, planes, trees, frame)
+    return _snapped_corners(moved if far < (SHORT + 1.0) * CELL else loop, number, planes, trees, frame)
 
 
-def _converged(corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
-    """Corners of a scan's outline that nearly lie on other planes put there: on two at most."""
+def _snapped_corners(
+    corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats
+) -> Floats:
+    """Outline (n, 2) of a scanned plane with the corners that nearly lie on other planes put on them: on two at
+    most."""
     plane, moved = planes[number], corners.copy()
     for k, corner in enumerate(corners):
         place = frame @ corner + plane.offset * plane.normal
@@ -210,7 +220,7 @@ def _converged(corners: Floats, number: int, planes: list[ScanPlane], trees: lis
 
 
 def _same(a: _Edge, b: _Edge) -> bool:
-    """Whether two edges of a scan's outline lie on the line of one plane."""
+    """Whether two edges of a scanned plane's outline lie on its line with one and the same other plane."""
     parallel = abs(float(a.normal @ b.normal)) > 0.999
     return bool(a.met and b.met and parallel and abs(abs(a.offset) - abs(b.offset)) < 1e-9)
 
@@ -218,7 +228,7 @@ def _same(a: _Edge, b: _Edge) -> bool:
 def _edge(
     start: Floats, end: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats
 ) -> _Edge:  # fmt: skip
-    """Line of an outline's edge: where the nearest other plane of the scan cuts this one, if near all along."""
+    """Line of one edge of a scanned plane's outline: where the nearest other plane cuts this one, if near all along."""
     plane, along = planes[number], end - start
     length = float(np.linalg.norm(along))
     normal = np.array([along[1], -along[0]]) / length
@@ -238,6 +248,7 @@ def _edge(
 
 
 def _mesh(loops: list[Floats], frame: Floats, plane: ScanPlane) -> Mesh | None:
+    """Mesh of a scanned plane from its outer outline and holes (n, 2); None if they make no polygon."""
     outer, holes = loops[0], loops[1:]
     if signed_area(outer) <= 0.0 or any(signed_area(h) >= 0.0 or not inside_loop(outer, h.mean(axis=0)) for h in holes):
         return None

@@ -1,4 +1,4 @@
-"""Planes in a scanned mesh: noise estimated from the mesh itself, planes fitted in the order of their area."""
+"""Planes fitted to a scanned mesh in the order of their area; the noise is estimated from the mesh itself."""
 
 from typing import NamedTuple
 
@@ -10,39 +10,41 @@ from rislam_rt.geometry.connected_parts import connected
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 
 LEAN = np.cos(np.radians(30.0))
-"""A point belongs to a plane whose normal is this near its own."""
+"""Least cosine of the angle between a scanned point's normal and that of the plane it belongs to."""
 ALIKE = np.cos(np.radians(1.0))
-"""Two parts of one wall are parallel within this."""
+"""Least cosine of the angle between two parts of one scanned wall."""
 LEAST_AREA = 0.3
-"""[m^2] Smaller planes are clutter."""
+"""Least area [m^2] of a scanned plane; smaller ones are clutter."""
 GAP = 0.3
-"""[m] A scan's holes up to this wide part no plane."""
+"""Width [m] of a scan's holes up to which they part no plane."""
 NARROWEST = 0.25
-"""[m] Narrower planes are strips of something round, or clutter."""
+"""Least width [m] of a scanned plane; narrower ones are strips of something round, or clutter."""
 ROUND = 1.3
-"""Where the residual is more than this many times the noise, the surface is not flat."""
+"""Residual over noise above which a scanned surface is not flat."""
 WIDTHS = 3.0
-"""Standard deviations of the noise within which a point belongs to a plane."""
+"""Standard deviations of the scan's noise within which a point belongs to a plane."""
 MAX_PLANES = 60
+"""Most planes that are fitted to a scan."""
 _SEEDS, _SCORED = 200, 6000
 
 
 class ScanPlane(NamedTuple):
-    """A plane and the points that it explains."""
+    """Plane fitted to a scan, `normal . x = offset`, and the points that it explains."""
 
     normal: Floats
     offset: float
     members: Integers
+    """Indices of its points in the cloud."""
     residual: float
-    """[m] root mean square distance of its points."""
+    """Root mean square distance [m] of its points."""
     area: float
-    """[m^2]."""
+    """Area [m^2] that its points stand for."""
     width: float
-    """[m] Short side of the rectangle with the same second moments."""
+    """Short side [m] of the rectangle with the same second moments."""
 
 
 def find_planes(cloud: PointCloud) -> list[ScanPlane]:
-    """Planes of a cloud, the largest first.
+    """Fit planes to the point cloud of a scan, the largest first.
 
     In every round planes through some patches are scored by the area that lies on them (RANSAC with the normals that
     the patches have: Schnabel, Wahl and Klein, Computer Graphics Forum 2007); the best is fitted to what it explains
@@ -62,8 +64,8 @@ def find_planes(cloud: PointCloud) -> list[ScanPlane]:
 
 
 def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | None:
-    """The plane of a scan that holds the most area among the free points, fitted anew as it narrows; None if too
-    small."""
+    """Fit the plane to a scan that holds the most area among its free points, anew as it narrows; None if that is too
+    little."""
     rows = np.flatnonzero(free)
     if cloud.area[rows].sum() < LEAST_AREA:
         return None
@@ -82,7 +84,7 @@ def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | 
         on = rows[(np.abs(height) < width) & (cloud.normal[rows] @ plane > LEAN)]
         if len(on) < 4:
             break
-        groups = _hanging_together(cloud, on)
+        groups = _connected_groups(cloud, on)
         members = groups[0]
         plane, offset = _fit(cloud.points[members], cloud.area[members], plane)
     else:
@@ -95,8 +97,9 @@ def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | 
     return ScanPlane(plane, offset, members, residual, float(weight.sum()), float(np.sqrt(12.0 * max(spread[1], 0.0))))
 
 
-def _hanging_together(cloud: PointCloud, rows: Integers) -> list[Integers]:
-    """Groups of points over gaps of up to `GAP`: the largest first, then others of at least `LEAST_AREA`."""
+def _connected_groups(cloud: PointCloud, rows: Integers) -> list[Integers]:
+    """Groups of a scan's points that are connected over gaps of up to `GAP`: the largest first, then others of at least
+    `LEAST_AREA`."""
     cells, box = np.unique(np.floor(cloud.points[rows] / (0.5 * GAP)).astype(np.int64), axis=0, return_inverse=True)
     near = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
     label = connected(near, len(cells))[box.ravel()]
@@ -106,7 +109,8 @@ def _hanging_together(cloud: PointCloud, rows: Integers) -> list[Integers]:
 
 
 def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bool:
-    """Whether points apart from those that a plane was fitted to lie on it too, with no lean or step of their own."""
+    """Whether scanned points apart from those that a plane was fitted to lie on it too, with no lean or step of their
+    own."""
     height = cloud.points[rows] @ plane - offset
     own, _ = _fit(cloud.points[rows], cloud.area[rows], plane)
     noise = max(cloud.noise, 1e-3)
@@ -114,7 +118,8 @@ def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bo
 
 
 def _fit(points: Floats, weight: Floats, side: Floats) -> tuple[Floats, float]:
-    """Plane of least weighted squares through points (N, 3), its normal on the side of `side`."""
+    """Plane of least weighted squares through scanned points (N, 3), its normal on the side of `side`: normal and
+    offset."""
     middle = weight @ points / weight.sum()
     local = points - middle
     normal = np.linalg.eigh(np.einsum("n,ni,nj->ij", weight, local, local))[1][:, 0]

@@ -1,4 +1,4 @@
-"""A scanned mesh, with noise and holes, as clean planes and the clutter that they leave."""
+"""Import of a room from a scanned mesh, with noise and holes, as clean planes and the clutter that they leave."""
 
 import numpy as np
 
@@ -14,19 +14,20 @@ from rislam_rt.scene.importing.scans.scan_outline import BRIDGE, CELL, Outline, 
 from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_planes
 
 FLAT_SHARE = 0.3
-"""Of a mesh's area: where less of it is in wide flat regions, it is a scan."""
+"""Share of a mesh's area in wide flat regions below which it is a scan."""
 CLOSE = 0.05
-"""[m] What lies this near a plane is explained by it, whatever the noise: skirting boards, frames, sockets."""
+"""Distance [m] from a scanned plane up to which it explains what is there, whatever the noise: skirting boards, frames,
+sockets."""
 
 
 def looks_scanned(facets: FlatRegions, options: ImportOptions) -> bool:
-    """Whether a mesh has the noise of a scan: hardly any of it is flat."""
+    """Whether an imported mesh has the noise of a scan: hardly any of it is flat."""
     flat = facets.area[(facets.width >= options.narrow) & (facets.residual < 1e-3)].sum()
     return bool(flat < FLAT_SHARE * facets.area.sum())
 
 
 def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, list[str]]:
-    """What of a scan reflects and what shades, and remarks on noise and holes.
+    """Sort a scanned mesh into surfaces that reflect and clutter that hides; also remarks on noise and holes.
 
     Raises
     ------
@@ -64,7 +65,8 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
 
 
 def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline], noise: float) -> bool:
-    """Whether a plane is the back of what stands on a larger one: parallel, nearer than noise can tell, within it."""
+    """Whether a scanned plane is the back of what stands on a larger one: parallel, nearer than noise can tell, within
+    it."""
     (plane, outline), (wall, around) = pair, larger
     corners = outline.mesh.vertices
     if abs(float(plane.normal @ wall.normal)) < np.cos(np.radians(5.0)):
@@ -77,6 +79,7 @@ def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline],
 
 
 def _remarks(kept: list[tuple[ScanPlane, Outline]], noise: float) -> list[str]:
+    """Remarks on a scan: its noise, the residuals of its planes, and the holes filled."""
     worst = max(plane.residual for plane, _ in kept)
     filled = sum(outline.filled for _, outline in kept)
     return [
@@ -89,7 +92,7 @@ def _remarks(kept: list[tuple[ScanPlane, Outline]], noise: float) -> list[str]:
 
 
 def _unexplained(mesh: Welded, surfaces: list[Surface], reach: float) -> Booleans:
-    """Triangles of a scan with a corner farther from every clean plane than a reach [m]."""
+    """Whether (F,) all corners of a scan's triangle are farther than `reach` [m] from every fitted plane."""
     walls = np.concatenate([s.mesh.triangles for s in surfaces])
     distance = np.full(len(mesh.vertices), np.inf)
     for normal, offset in ((s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces):

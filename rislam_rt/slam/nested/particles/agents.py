@@ -1,4 +1,4 @@
-"""Agent particles: motion and resampling that keep mean and covariance exactly.
+"""Agent particles of the nested filter: motion and resampling that keep mean and covariance exactly.
 
 What a room cannot tell (a shift or drift of everything together) no later measurement mends. An ordinary resampling
 of N particles shifts the mean by a standard deviation over sqrt(N) and takes 1/N of the variance away; over hundreds
@@ -14,28 +14,28 @@ from rislam_rt.slam.nested.particles.landmark_cloud import kernel_width
 from rislam_rt.slam.systematic_resampling import systematic_ancestors
 
 ROOM = 10
-"""Particles a dimension that are needed to correct a covariance."""
+"""Number of agent particles per dimension that are needed to correct a covariance."""
 ROUNDING = 1e-9
 """Relative spread below which a value counts as constant."""
 DEEP = 30.0
-"""Largest logarithm of a rate while weights are fitted."""
+"""Largest logarithm of the Poisson rate while a likelihood is fitted to weights."""
 STEPS = 40
-"""Most Newton steps of that fit."""
+"""Largest number of Newton steps of a likelihood's fit to weights."""
 TERM_ROOM = 2.5
-"""Effective particles a coefficient that are needed to fit a likelihood to weights."""
+"""Effective number of agent particles per coefficient that are needed to fit a likelihood to weights."""
 KERNEL_DIMS = 4
-"""Dimensions that the kernel's width counts: start position and velocity in the plane; the rest follows from them."""
+"""Number of dimensions for the kernel's width: start position and velocity in the plane; the rest follows from them."""
 
 
 class Whitened(NamedTuple):
     """Weighted samples in coordinates in which they have mean zero and unit covariance, null directions left out."""
 
     values: Floats
-    """(N, K)."""
+    """Samples (N, K) in the whitened coordinates."""
     mean: Floats
-    """(D,)."""
+    """Weighted mean (D,) of the samples."""
     factor: Floats
-    """(D, K): `sample = mean + factor @ value`."""
+    """Factor (D, K) back to the samples: `sample = mean + factor @ value`."""
 
 
 def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -68,7 +68,7 @@ def standardise(weight: Floats, values: Floats) -> Floats:
 
 
 def exact_noise(values: Floats, dims: int, *, rng: np.random.Generator) -> Floats:
-    """(N, dims) motion noise for agent particles (N, D): uncorrelated with them, with exact moments in this sample.
+    """Motion noise (N, dims) for agent particles (N, D): uncorrelated with them, with exact moments in this sample.
 
     Weights do not count here: `posterior` corrects for what they do.
     """
@@ -103,7 +103,7 @@ def posterior(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _likelihood(log_weight: Floats, known: Floats) -> tuple[Floats, Floats] | None:
-    """Gaussian that fits agent particles' weights: slope b (K,), precision I + C of `exp(a + b y - y C y / 2)`.
+    """Gaussian fitted to agent particles' weights: slope b (K,), precision I + C of `exp(a + b y - y C y / 2)`.
 
     Poisson regression with a logarithmic link: its solution gives the sample the same mean and second moment as the
     weights do, and noise on the weights only costs accuracy. None where it does not exist or is no Gaussian.

@@ -1,4 +1,4 @@
-"""The engine as fused Dr.Jit kernels, for CPU (LLVM) and GPU (CUDA).
+"""Engine that weighs and resamples landmark particles by fused Dr.Jit kernels, for CPU (LLVM) and GPU (CUDA).
 
 A lane of the machine takes some of the particles of one agent particle, four at a time: what depends on the agent
 particle alone is loaded once a lane and not once a particle, and memory is read in packets. Sums are kept a lane and
@@ -27,13 +27,13 @@ from rislam_rt.slam.nested.particles.quantisation import TOP, WORDS, Quantisatio
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
 
 PACKET = 4
-"""Particles that a lane handles at once; M must be a multiple of it."""
+"""Number of particles that a lane handles at once; M must be a multiple of it."""
 LANES = {"llvm": 8, "cuda": 64}
-"""Most lanes an agent particle: on a CPU about the fastest, on a GPU enough to fill it."""
+"""Largest number of lanes per agent particle: on a CPU about the fastest, on a GPU enough to fill it."""
 
 
 class DrJitEngine:
-    """Dr.Jit on the device that `rislam_rt.backend` chose."""
+    """Engine of landmark particles in Dr.Jit, on the device that `rislam_rt.backend` chose."""
 
     def __init__(self) -> None:
         self.name = prepare_backend().variant.split("_")[0]
@@ -43,20 +43,20 @@ class DrJitEngine:
         self._four_int, self._four_signed, self._two_int = types.Array4u, types.Array4i, types.Array2u
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
-        """See `Engine`."""
+        """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
         step = steps(np.abs(points).max(axis=(1, 2)))
         grid = Quantisation(self._int(encode(points, step).ravel()), step)
         total = np.logaddexp.reduce(log_weight, axis=1)[row]
         return Cloud(grid, self._upload(log_weight), block, row, total, points.shape[1])
 
     def read(self, cloud: Cloud) -> tuple[Floats, Floats]:
-        """See `Engine`."""
+        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle, for tests and pictures."""
         points = decode(cloud.points.words.numpy().reshape(-1, cloud.size, WORDS), cloud.points.step)[cloud.block]
         log_weight = cloud.log_weight.numpy().reshape(-1, cloud.size)[cloud.row]
         return points, log_weight - cloud.log_total[:, None]
 
     def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
-        """See `Engine`."""
+        """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
         dr, count, size = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, size)
         known = self._known(constants, agent)
@@ -82,7 +82,7 @@ class DrJitEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=found.log_total), found
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """See `Engine`."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         children = self._draw(cloud, self._ancestors(cloud, size, kernel.comb), size, kernel.stride)
         grain = cloud.points.step[cloud.block]
@@ -100,7 +100,7 @@ class DrJitEngine:
         return Cloud(points, uniform, np.arange(count), np.zeros(count, dtype=np.int64), np.zeros(count), size)
 
     def compact(self, cloud: Cloud) -> Cloud:
-        """See `Engine`."""
+        """Copy a cloud without the blocks and rows that no agent particle points at."""
         used, block = np.unique(cloud.block, return_inverse=True)
         rows, row = np.unique(cloud.row, return_inverse=True)
         words = self._pick(cloud.points.words, self._four_int, used, WORDS * cloud.size // PACKET)
@@ -109,7 +109,7 @@ class DrJitEngine:
         return cloud._replace(points=points, log_weight=log_weight, block=block, row=row)
 
     def _add(self, top: Any, sums: tuple[Any, ...], log_weight: Any, x: Any, y: Any, z: Any) -> tuple[Any, ...]:
-        """A packet joins the lane's sums, which are relative to the largest log weight so far."""
+        """Add a packet of particles to a lane's sums, which are relative to the largest log weight so far."""
         dr = self._dr
         peak = dr.maximum(top, dr.max(log_weight))
         scale = dr.exp(dr.maximum(top - peak, DEEPEST))
@@ -125,13 +125,14 @@ class DrJitEngine:
         )
 
     def _dot(self, start: Any, first: Any, second: Any) -> Any:
-        """`start` plus the products of two packets: one sum a lane, so that all sums stay in registers."""
+        """Add the products of two packets to `start`: one sum a lane, so that all sums stay in registers."""
         for a, b in zip(first, second, strict=True):
             start = self._dr.fma(a, b, start)
         return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
-        """(N * size,) systematic resampling: each survivor marks its first child, and a running maximum fills in."""
+        """Ancestors (N * size,) by systematic resampling: survivors mark their first child, a running maximum fills
+        in."""
         dr, count, old = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, old)
         packets = old // PACKET
@@ -169,7 +170,7 @@ class DrJitEngine:
         return ancestors
 
     def _draw(self, cloud: Cloud, ancestors: Any, size: int, stride: int) -> Any:
-        """Points of the ancestors in Dr.Jit, children of one parent put far apart."""
+        """Copy the points of resampled ancestors in Dr.Jit, children of one parent put far apart."""
         dr, count = self._dr, len(cloud.block)
         agent, place, lanes = self._lanes(count, size)
         packets, block = size // PACKET, self._look_up(cloud.block, agent) * cloud.size
@@ -188,7 +189,7 @@ class DrJitEngine:
         return children
 
     def _mixed(self, children: Any, at: Any, base: Any, size: int, kernel: Kernel) -> list[Any]:
-        """Four points at packet `at` of the agent particles whose points begin at `base`, mixed with their partners."""
+        """Four points at packet `at`, of agent particles whose points begin at `base`, mixed with their partners."""
         partner = at * PACKET + kernel.offset
         partner = self._dr.select(partner >= size, partner - size, partner)
         own, other = self._packet(children, base + at * PACKET), self._packet(children, base + partner)
@@ -216,7 +217,7 @@ class DrJitEngine:
         return sums[:3].T, sums[3:][SECOND].transpose(2, 0, 1), lane_sums[0].max(axis=1).astype(np.float64)
 
     def _mix(self, children: Any, count: int, size: int, kernel: Kernel, mean: Floats, turn: Floats) -> Any:
-        """Words of the mixed points less their means (N, 3), turned and stretched to new steps by (N, 3, 3)."""
+        """Quantised words of the mixed points less their means (N, 3), turned, stretched to new steps by (N, 3, 3)."""
         dr = self._dr
         agent, place, lanes = self._lanes(count, size)
         known = self._known(np.concatenate([mean, turn.reshape(count, 9)], axis=1).T, agent)
@@ -238,7 +239,7 @@ class DrJitEngine:
         return moved
 
     def _packet(self, points: Any, at: Any) -> list[Any]:
-        """x, y and z in Dr.Jit of four neighbouring points, in steps."""
+        """Coordinates x, y and z, in steps, of four neighbouring points in Dr.Jit."""
         a, b = (self._dr.gather(self._four_int, points, at // 2 + k) for k in range(2))
         parts = split(self._four_int(a[0], a[2], b[0], b[2]), self._four_int(a[1], a[3], b[1], b[3]))
         return [self._four(self._dr.reinterpret_array(self._four_signed, part) >> 11) for part in parts]
@@ -248,7 +249,7 @@ class DrJitEngine:
         return self._dr.while_loop(start, lambda step, *_: step < packets, body)
 
     def _lanes(self, count: int, size: int) -> tuple[Any, Any, int]:
-        """Agent particle of each lane, the lane's place among those of its agent particle, and how many those are."""
+        """Agent particle of each Dr.Jit lane, the lane's place among those of that particle, and how many those are."""
         packets = size // PACKET
         lanes = max(k for k in range(1, LANES[self.name] + 1) if packets % k == 0)
         lane = self._dr.arange(self._int, count * lanes)
@@ -256,15 +257,16 @@ class DrJitEngine:
         return agent, lane - agent * lanes, lanes
 
     def _known(self, constants: Floats, agent: Any) -> list[Any]:
-        """Constants (K, N) in Dr.Jit as each lane sees them."""
+        """Constants (K, N) of the agent particles, gathered in Dr.Jit for each lane."""
         table, count = self._upload(constants), constants.shape[1]
         return [self._dr.gather(self._float, table, agent + k * count) for k in range(len(constants))]
 
     def _look_up(self, table: Integers, agent: Any) -> Any:
+        """Entries of an integer table (N,) in Dr.Jit for each lane's agent particle."""
         return self._dr.gather(self._int, self._int(table.astype(np.uint32)), agent)
 
     def _pick(self, part: Any, four: Any, blocks: Integers, packets: int) -> Any:
-        """Blocks in Dr.Jit of so many packets of the type `four`."""
+        """Copy some blocks of a Dr.Jit array, each of so many packets of the type `four`."""
         dr = self._dr
         index = dr.arange(self._int, len(blocks) * packets)
         block = index // packets
@@ -274,4 +276,5 @@ class DrJitEngine:
         return picked
 
     def _upload(self, values: Floats) -> Any:
+        """Copy an array to Dr.Jit's device, flat and in float32."""
         return self._float(np.ascontiguousarray(values, dtype=np.float32).ravel())

@@ -9,7 +9,7 @@ from rislam_rt.slam.nested.particles.numpy_engine import NumpyEngine
 
 @cache
 def pick_engine(name: str) -> CloudEngine:
-    """The engine that weighs particles: `auto`, `drjit` or `numpy`; Dr.Jit is imported here and not before.
+    """Engine that weighs landmark particles, `auto`, `drjit` or `numpy`; Dr.Jit is imported here and not before.
 
     Raises
     ------

@@ -12,7 +12,7 @@ KLD_QUANTILE = 2.33
 
 
 def kld_count(cells: float) -> float:
-    """Particles for a belief that fills so many cells (Fox 2003, eq. 13; Wilson-Hilferty quantile of chi^2)."""
+    """Number of particles for a belief that fills so many cells (Fox 2003, eq. 13; Wilson-Hilferty chi^2 quantile)."""
     free = max(cells - 1.0, 0.0)
     if free == 0.0:
         return 1.0
@@ -21,13 +21,13 @@ def kld_count(cells: float) -> float:
 
 
 def occupied_cells(covariance: Floats, cell: float) -> float:
-    """Cells of edge `cell` that a Gaussian fills within two standard deviations along its axes."""
+    """Number of cells of edge `cell` [m] that a Gaussian fills within two standard deviations along its axes."""
     std = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0.0))
     return float(np.prod(np.maximum(4.0 * std / cell, 1.0)))
 
 
 def num_agents(covariance: Floats, config: NestedConfig) -> int:
-    """Agent particles for a position of covariance (3, 3)."""
+    """Number of agent particles for a position of covariance (3, 3) [m^2], by KLD-sampling."""
     if not config.adaptive:
         return config.num_agents
     wanted = kld_count(occupied_cells(covariance, config.agent_cell))
@@ -35,7 +35,7 @@ def num_agents(covariance: Floats, config: NestedConfig) -> int:
 
 
 def num_points(covariance: Floats, agents: int, features: int, config: NestedConfig) -> int:
-    """Particles of a landmark, a multiple of 4, given its covariance (3, 3) for one agent particle.
+    """Number of particles of a landmark, a multiple of 4, by its covariance (3, 3) [m^2] for one agent particle.
 
     `capacity` is shared by `features` landmarks of `agents` agent particles each.
     """

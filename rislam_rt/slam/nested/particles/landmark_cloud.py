@@ -21,47 +21,47 @@ make denormal numbers, which are slow."""
 LEAST_STD = 1e-4
 """Least standard deviation [m] of a cloud that is resampled: a collapsed one must not stay so."""
 LARGEST_WIDTH = 0.9
-"""Largest kernel width."""
+"""Largest kernel width of resampling, in standard deviations."""
 
 SECOND = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
-"""Where xx, xy, ... stand among sums in the order xx, yy, zz, xy, xz, yz."""
+"""Index (3, 3) of the second moments xx, xy, ... among sums in the order xx, yy, zz, xy, xz, yz."""
 
 
 class Cloud(NamedTuple):
-    """Landmark particles. The arrays belong to the engine, numpy's or Dr.Jit's."""
+    """Particles of one landmark for all N agent particles. The arrays belong to the engine, numpy's or Dr.Jit's."""
 
     points: Any
     """B blocks of M points, offsets from the centre [m]."""
     log_weight: Any
     """R rows of M, float32, not normalised."""
     block: Integers
-    """(N,) block of each agent particle's points."""
+    """Block (N,) of each agent particle's points."""
     row: Integers
-    """(N,) row of its weights."""
+    """Row (N,) of each agent particle's weights."""
     log_total: Floats
-    """(N,) logarithm of the sum of its weights."""
+    """Logarithm (N,) of the sum of each agent particle's weights."""
     size: int
-    """M."""
+    """Number M of landmark particles of each agent particle."""
 
 
 class CloudSums(NamedTuple):
-    """What a pass over all particles of a cloud found, for each of N agent particles."""
+    """Weights and moments of a landmark's cloud for each of N agent particles, from one pass over its particles."""
 
     log_total: Floats
-    """(N,) logarithm of the sum of the new weights."""
+    """Logarithm (N,) of the sum of the new weights."""
     ess: Floats
-    """(N,) effective sample size, 1 to M."""
+    """Effective sample size (N,) of the landmark particles, 1 to M."""
     mean: Floats
-    """(N, 3) of the offsets [m]."""
+    """Weighted mean (N, 3) [m] of the offsets."""
     covariance: Floats
-    """(N, 3, 3) [m^2]."""
+    """Weighted covariance (N, 3, 3) [m^2] of the offsets."""
 
 
 class Kernel(NamedTuple):
-    """How a cloud is resampled: chance and smoothing, drawn by the caller so that engines agree."""
+    """Random numbers and smoothing with which a cloud is resampled, drawn by the caller so that engines agree."""
 
     comb: Floats
-    """(N,) in [0, 1): where systematic resampling of each agent particle starts."""
+    """Starts (N,) in [0, 1) of systematic resampling for each agent particle."""
     stride: int
     """Multiplier, coprime to M, of the permutation that takes children of one parent apart."""
     offset: int
@@ -71,28 +71,29 @@ class Kernel(NamedTuple):
 
 
 class CloudEngine(Protocol):
-    """The heavy passes, on whatever machine."""
+    """Protocol of the engines that weigh and resample clouds of landmark particles, on CPU or GPU."""
 
     name: str
+    """Name of the engine: `numpy`, or Dr.Jit's `llvm` or `cuda`."""
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
-        """Cloud of points (B, M, 3) and log weights (R, M)."""
+        """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
 
     def read(self, cloud: Cloud) -> tuple[Floats, Floats]:
         """Offsets (N, M, 3) and normalised log weights (N, M) of every agent particle, for tests and pictures."""
 
     def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
-        """Multiply the weights by the likelihood of some returns, constants (K, N) float32."""
+        """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """`size` particles of equal weight for every agent particle, with its mean at zero and covariance (N, 3, 3)."""
+        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
 
     def compact(self, cloud: Cloud) -> Cloud:
-        """The same cloud without blocks and rows that nobody points at."""
+        """Copy a cloud without the blocks and rows that no agent particle points at."""
 
 
 def combine(lanes: Floats) -> CloudSums:
-    """Sums over the particles of an agent from sums over parts of them.
+    """Weights and moments of a cloud for each of N agent particles, from sums over C parts of its particles.
 
     Parameters
     ----------

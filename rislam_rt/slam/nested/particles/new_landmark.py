@@ -1,4 +1,4 @@
-"""A track becomes a landmark: every agent particle fits it to its own trail, then measures it cycle by cycle."""
+"""Initialisation of a new landmark: every agent particle fits it to its own trail and absorbs its past measurements."""
 
 from typing import NamedTuple
 
@@ -11,38 +11,38 @@ from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, mean
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, trace_sightline
 from rislam_rt.slam.nested.particles.weights import FLOOR, trusted
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.returns import Returns, linearise, poses_of
+from rislam_rt.slam.predicted_returns import Returns, linearise, poses_of
 
 ITERATIONS = 4
 """Gauss-Newton steps of each agent particle's fit."""
 
 
 class LandmarkHistory(NamedTuple):
-    """K measurements of a landmark that the map lacks, each over the same way."""
+    """K past measurements of a landmark that the map lacks, all over the same path, and the landmark's prior."""
 
     returns: Returns
-    """The one way, by rows of the G known landmarks on it; row G is the one sought."""
+    """The one path, by rows of the G known landmarks on it; row G is the new landmark."""
     known: Integers
-    """(G,) landmarks of the belief."""
+    """Rows (G,) of the known landmarks in the belief."""
     anchor: Floats
-    """(G + 1, 3) [m]."""
+    """Anchors (G + 1, 3) [m] of these landmarks, where they are walls."""
     place: Floats
-    """(3,) [m] about where it is; of its prior the mean."""
+    """Prior mean (3,) [m] of the new landmark: about where it is."""
     prior: Floats
-    """(3, 3) [m^2] what is known of it without its measurements: an upright wall is upright, the rest is anywhere."""
+    """Prior covariance (3, 3) [m^2] of the new landmark: an upright wall is upright, the rest is anywhere."""
     slots: Integers
-    """(K,) rows of the trail that its measurements come from."""
+    """Rows (K,) of the trail at whose poses the measurements were made."""
     seen: Floats
-    """(K, 3)."""
+    """Measured lengths [m] and cosines (K, 3)."""
     variance: Floats
-    """(K, 3)."""
+    """Variances (K, 3) of the measurements."""
 
 
 def initialise_landmark(
     belief: Nested, history: LandmarkHistory, body: Body, spans: Floats, config: NestedConfig, engine: CloudEngine,
     *, rng: np.random.Generator,
 ) -> Nested:  # fmt: skip
-    """The belief with one more landmark; `spans` (K,) [s] from each row of the trail to now.
+    """Particles with one more landmark, found from its history; `spans` (K,) [s] from each row of the trail to now.
 
     The history enters measurement by measurement, from the poses of the trail, as if the landmark had been there all
     along; agent particles are resampled in between, as what it tells of their past may be decisive.
@@ -61,7 +61,7 @@ def initialise_landmark(
 
 
 def _fit(belief: Nested, history: LandmarkHistory, body: Body) -> tuple[Floats, Floats, Floats]:
-    """Each agent particle's least-squares landmark (N, 3), its mean covariance (3, 3), and variances (K, 3)."""
+    """Least-squares position (N, 3) of a new landmark for each agent particle, covariance (3, 3), variances (K, 3)."""
     feature = np.broadcast_to(history.place, belief.position.shape).copy()
     information, known = np.linalg.inv(history.prior), mean_covariances(belief)[history.known]
     noise = history.variance + FLOOR**2
@@ -84,8 +84,7 @@ def _fit(belief: Nested, history: LandmarkHistory, body: Body) -> tuple[Floats, 
 
 
 def _past_sighting(belief: Nested, history: LandmarkHistory, body: Body, row: int, noise: Floats) -> Sighting:
-    """A past measurement as the new landmark's cloud sees it; what it carries of others' errors counts as often as it
-    repeats."""
+    """Past measurement as a likelihood for a new landmark's cloud; errors of others count as often as they repeat."""
     past, sought = belief.trail[history.slots[row]], len(history.known)
     poses = poses_of(past[:, :3], past[:, 3], body)
     features = np.concatenate([belief.mean[:, history.known], belief.centre[:, -1:]], axis=1)

@@ -1,4 +1,4 @@
-"""The belief: agent particles, each with a cloud of landmark particles (eqs. `landmarkRenew`, `agentRenew`)."""
+"""Belief of the nested filter: agent particles, each with landmarks' clouds (eqs. `landmarkRenew`, `agentRenew`)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,50 +11,50 @@ from rislam_rt.slam.nested.particles.kld_sampling import num_agents, num_points
 from rislam_rt.slam.nested.particles.landmark_cloud import HOPELESS, LEAST_STD, Cloud, CloudEngine, Kernel, kernel_width
 from rislam_rt.slam.nested.particles.sightline import Sighting, pack
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 PRIMES = (7919, 5003, 3001, 1009, 409, 211, 101, 53, 29, 13, 7, 5, 3)
-"""Strides of the permutations; one that does not divide M is taken."""
+"""Strides of the permutation of resampled particles; the first that does not divide M is taken."""
 SPARSE = 0.5
 """Share of the blocks in use below which a cloud is written anew without the others."""
 PROPOSAL = 1.5
-"""Standard deviations of a new cloud over those of the Gaussian that it is drawn from."""
+"""Standard deviations of a new landmark's cloud over those of the Gaussian that it is drawn from."""
 
 
 class Nested(NamedTuple):
-    """N agent particles with F landmarks."""
+    """Belief of the nested filter: N agent particles, each with a cloud of particles of F landmarks."""
 
     position: Floats
-    """(N, 3) [m]."""
+    """Positions (N, 3) [m] of the agent particles."""
     velocity: Floats
-    """(N, 3) [m/s]."""
+    """Velocities (N, 3) [m/s] of the agent particles."""
     heading: Floats
-    """(N,) [rad]."""
+    """Headings (N,) [rad] of the agent particles."""
     log_weight: Floats
-    """(N,), normalised."""
+    """Log weights (N,) of the agent particles, normalised."""
     trail: Floats
-    """(K, N, 4) positions [m] and headings [rad] of the last K cycles, the present one last."""
+    """Positions [m] and headings [rad] (K, N, 4) of the agent particles in the last K cycles, the present one last."""
     clouds: tuple[Cloud, ...]
-    """F of them."""
+    """Landmark particles, a cloud for each of F landmarks."""
     centre: Floats
-    """(N, F, 3) [m] where a cloud's offsets count from."""
+    """Centres (N, F, 3) [m] from which the clouds' offsets count."""
     mean: Floats
-    """(N, F, 3) [m] of each cloud."""
+    """Means (N, F, 3) [m] of the clouds."""
     covariance: Floats
-    """(N, F, 3, 3) [m^2] of each cloud, given the agent particle."""
+    """Covariances (N, F, 3, 3) [m^2] of the clouds, given the agent particle."""
     ess: Floats
-    """(F,) effective share of landmark particles, over the agent particles on average."""
+    """Effective share (F,) of landmark particles, averaged over the agent particles."""
     updates: Integers
-    """(F,) measurements that each landmark has had."""
+    """Number (F,) of measurements that each landmark has had."""
 
     @property
     def weight(self) -> Floats:
-        """(N,), summing to one."""
+        """Weights (N,) of the agent particles, summing to one."""
         return np.exp(self.log_weight)
 
 
 def begin(pose: Floats) -> Nested:
-    """Agent particles (N, 7) of equal weight (position, velocity, heading), and an empty map."""
+    """Belief of agent particles (N, 7) of equal weight (position, velocity, heading), and an empty map."""
     count = len(pose)
     weight, trail = np.full(count, -np.log(count)), pose[None, :, [0, 1, 2, 6]]
     empty, none, spread = np.zeros((count, 0, 3)), np.zeros(0, dtype=np.int64), np.zeros((count, 0, 3, 3))
@@ -62,14 +62,14 @@ def begin(pose: Floats) -> Nested:
 
 
 def draw(mean: Floats, std: Floats, count: int, *, rng: np.random.Generator) -> Nested:
-    """Agent particles from a Gaussian over position, velocity and heading (7,), with its moments exactly."""
+    """Belief of agent particles from a Gaussian over position, velocity and heading (7,), with its exact moments."""
     return begin(mean + std * agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, 7))))
 
 
 def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng: np.random.Generator) -> Nested:
-    """Belief after white acceleration, constant over `dt` [s], of deviations `accelerate` (3,) [m/s^2].
+    """Predict the agent particles over `dt` [s] by constant random accelerations, deviations `accelerate` (3,) [m/s^2].
 
-    `turn` [rad] is that of a random step of the heading.
+    `turn` [rad] is the standard deviation of a random step of the heading.
     """
     noise = agents.exact_noise(joint(belief), 4, rng=rng)
     acceleration = noise[:, :3] * accelerate
@@ -79,13 +79,13 @@ def propagate(belief: Nested, dt: float, accelerate: Floats, turn: float, *, rng
 
 
 def remember(belief: Nested, most: int) -> Nested:
-    """Belief whose trail ends with the present pose, and holds `most` poses at most."""
+    """Append the agent particles' present poses to their trail, which holds `most` poses at most."""
     here = np.column_stack([belief.position, belief.heading])
     return belief._replace(trail=np.concatenate([belief.trail, here[None]])[-most:])
 
 
 def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: CloudEngine) -> tuple[Nested, float]:
-    """The particles' belief, reweighted by returns that speak of landmark `owner`, and the log evidence of these.
+    """Reweight agent and landmark particles by returns over landmark `owner`, and return the log evidence of these too.
 
     The previous weight enters once, however many returns there are. If no particle can explain them, the belief stays
     as it was and the evidence is minus infinity.
@@ -112,7 +112,7 @@ def absorb(belief: Nested, owner: int, sightings: Sequence[Sighting], engine: Cl
 def renew(
     belief: Nested, spans: Floats, config: NestedConfig, engine: CloudEngine, *, rng: np.random.Generator
 ) -> tuple[Nested, bool]:
-    """Resample what has degenerated: clouds first, then agent particles (whether these were is told).
+    """Resample degenerate landmark clouds, then the agent particles if they are degenerate; returns whether these were.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def place_landmark(
     belief: Nested, mean: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine,
     *, rng: np.random.Generator,
 ) -> Nested:  # fmt: skip
-    """A new landmark, of which nothing is known: particles about a Gaussian, weighed to stand for a flat prior.
+    """Add a new landmark of flat prior to the particles: a cloud drawn about a Gaussian and weighed against it.
 
     They are drawn `PROPOSAL` times as wide as the Gaussian that the landmark's measurements will give, so that these
     find enough of them. All agent particles share one block of offsets, and differ in their centres.
@@ -161,7 +161,7 @@ def place_landmark(
 
 
 def drop(belief: Nested, keep: Booleans) -> Nested:
-    """Belief with only some of the landmarks."""
+    """Belief of particles with only some of the landmarks, those of `keep` (F,)."""
     rows = np.flatnonzero(keep)
     return belief._replace(
         clouds=tuple(belief.clouds[row] for row in rows),
@@ -174,7 +174,7 @@ def drop(belief: Nested, keep: Booleans) -> Nested:
 
 
 def gaussian(belief: Nested) -> tuple[Floats, Floats]:
-    """Mean (7 + 3F,) and covariance of pose and landmarks: the agent particles' own, and their clouds' on average.
+    """Mean and covariance of pose and landmarks (7 + 3F,): the agent particles' own, and their clouds' on average.
 
     No cloud, single precision as it is, counts as known to better than `LEAST_STD`.
     """
@@ -186,7 +186,7 @@ def gaussian(belief: Nested) -> tuple[Floats, Floats]:
 
 
 def mean_covariances(belief: Nested) -> Floats:
-    """(F, 3, 3) [m^2] of every landmark given the agent's trajectory, averaged over the belief."""
+    """Covariances (F, 3, 3) [m^2] of the landmarks given the agent's trajectory, averaged over the agent particles."""
     return np.einsum("n,nfij->fij", belief.weight, belief.covariance)
 
 
@@ -196,7 +196,7 @@ def effective_size(belief: Nested) -> float:
 
 
 def joint(belief: Nested) -> Floats:
-    """(N, 7 + 3F) the belief's agent particles with their clouds: position, velocity, heading, clouds' means."""
+    """Coordinates (N, 7 + 3F) of the agent particles with their clouds: position, velocity, heading, clouds' means."""
     count = len(belief.log_weight)
     pose = [belief.position, belief.velocity, belief.heading[:, None]]
     return np.concatenate([*pose, belief.mean.reshape(count, -1)], axis=1)
@@ -205,7 +205,7 @@ def joint(belief: Nested) -> Floats:
 def _renew_cloud(
     belief: Nested, owner: int, config: NestedConfig, engine: CloudEngine, *, rng: np.random.Generator
 ) -> Nested:
-    """Landmark particles of one landmark, resampled within every agent particle."""
+    """Resample the particles of one landmark within every agent particle."""
     count, cloud = len(belief.log_weight), belief.clouds[owner]
     size = num_points(mean_covariances(belief)[owner], count, len(belief.clouds), config)
     stride = next((p for p in PRIMES if np.gcd(p, size) == 1), 1)
@@ -221,7 +221,7 @@ def _renew_cloud(
 def _renew_agents(
     belief: Nested, spans: Floats, config: NestedConfig, engine: CloudEngine, *, rng: np.random.Generator
 ) -> Nested:
-    """Agent particles resampled: clouds follow by index, moved as a whole with the kernel; so is the trail."""
+    """Resample the agent particles; clouds follow by index and move as a whole with the kernel, as the trail does."""
     count = num_agents(agents.moments(belief.weight, belief.position)[1], config)
     ancestors, moved = agents.resample(belief.log_weight, joint(belief), count, rng=rng)
     position, velocity, heading = moved[:, :3], moved[:, 3:6], moved[:, 6]
@@ -246,7 +246,7 @@ def _renew_agents(
 
 
 def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
-    """A cloud as the children see it; written anew only if most of it is nobody's any more."""
+    """Cloud of a landmark for the children of resampled agent particles, written anew only if most of it is unused."""
     block, row = cloud.block[ancestors], cloud.row[ancestors]
     cloud = cloud._replace(block=block, row=row, log_total=cloud.log_total[ancestors])
     written = int(cloud.block.max(initial=0)) + 1
@@ -254,7 +254,7 @@ def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
 
 
 def _normalised(log_weight: Floats) -> tuple[Floats, float]:
-    """Log weights that sum to one, and the logarithm of what they summed to; hopeless weights become equal ones."""
+    """Normalised log weights of agent particles, and the logarithm of their former sum; hopeless ones become equal."""
     top = float(np.max(log_weight))
     if not np.isfinite(top):
         return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
@@ -263,5 +263,5 @@ def _normalised(log_weight: Floats) -> tuple[Floats, float]:
 
 
 def _root(covariance: Floats) -> Floats:
-    """Lower Cholesky factor, of a matrix that may be singular by a hair."""
+    """Lower Cholesky factor of a new landmark's covariance (3, 3), which may be singular by rounding."""
     return np.linalg.cholesky(covariance + 1e-12 * (np.trace(covariance) + 1e-12) * np.eye(3))

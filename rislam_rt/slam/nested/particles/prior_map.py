@@ -1,4 +1,4 @@
-"""Landmarks known beforehand: another run's map."""
+"""Prior map of the nested filter: landmarks known beforehand, from another run."""
 
 import numpy as np
 
@@ -14,9 +14,9 @@ def set_prior_map(
     belief: Nested, features: Floats, covariance: Floats, config: NestedConfig, engine: CloudEngine,
     *, rng: np.random.Generator,
 ) -> Nested:  # fmt: skip
-    """Particles given a prior map: F landmarks (F, 3) with a joint covariance (3F, 3F).
+    """Give the particles a prior map: landmarks (F, 3) [m] with a joint covariance (3F, 3F) [m^2].
 
-    What landmarks have in common is spread over the agent particles, the rest over their clouds.
+    Errors that landmarks have in common are spread over the agent particles, the rest over their clouds.
     """
     count = len(belief.log_weight)
     normal = agents.standardise(np.full(count, 1.0 / count), rng.standard_normal((count, features.size)))
@@ -31,7 +31,7 @@ def set_prior_map(
 
 
 def _own_part(covariance: Floats) -> Floats:
-    """Largest share of each prior landmark's own block that leaves a covariance."""
+    """Largest share of the diagonal blocks of a prior map's covariance that can be taken off and leave a covariance."""
     own = np.zeros_like(covariance)
     for row in range(0, len(covariance), 3):
         own[row : row + 3, row : row + 3] = covariance[row : row + 3, row : row + 3] + 1e-12 * np.eye(3)

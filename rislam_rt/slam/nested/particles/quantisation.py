@@ -12,24 +12,25 @@ import numpy.typing as npt
 from rislam_rt.arrays import Floats
 
 TOP = 2**20 - 1
-"""Largest number of steps."""
+"""Largest quantised coordinate, in steps."""
 WORDS = 2
-"""32-bit words of a point."""
+"""Number of 32-bit words of a quantised point."""
 LOW = 2**11 - 1
-"""The bits that x and y leave."""
+"""Mask of the 11 bits of a word that x and y leave to z."""
 FINEST = 1e-12
-"""Least step [m]."""
+"""Least quantisation step [m]."""
 
 Words = npt.NDArray[np.uint32]
+"""Arrays of 32-bit words."""
 
 
 class Quantisation(NamedTuple):
-    """Points of a cloud."""
+    """Quantised points of a landmark's cloud."""
 
     words: Any
     """Blocks of M points, two words each."""
     step: Floats
-    """(B,) [m] of each block."""
+    """Quantisation step (B,) [m] of each block."""
 
 
 def steps(reach: Floats) -> Floats:
@@ -51,10 +52,10 @@ def decode(words: Words, step: Floats) -> Floats:
 
 
 def join(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
-    """Two quantised words of three signed numbers of 21 bits, in arithmetic for numpy and Dr.Jit alike."""
+    """Pack three signed coordinates of 21 bits into two 32-bit words, in arithmetic for numpy and Dr.Jit alike."""
     return (x << 11) | ((z >> 10) & LOW), (y << 11) | ((z & 1023) << 1)
 
 
 def split(first: Any, second: Any) -> tuple[Any, Any, Any]:
-    """Three quantised numbers in the upper 21 bits of a word each; what is below goes by an arithmetic shift of 11."""
+    """Unpack two 32-bit words into three coordinates in the upper 21 bits of a word; a shift of 11 drops the rest."""
     return first, second, (first << 21) | ((second & LOW) << 10)

@@ -1,4 +1,4 @@
-"""Sightline of one return as the particles of one landmark see it: the formula that both engines share.
+"""Sightline of a return: length and cosines as functions of one landmark's particles, a formula that engines share.
 
 An agent particle sees a return over a Tx leg and an Rx leg. Of all features on these legs one, the owner, is a cloud;
 the others stand at the agent particle's own mean. Whatever lies before the owner on a leg is a fixed base, and whatever
@@ -14,50 +14,57 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, reflect
 
 
 class Leg(IntEnum):
-    """How a leg depends on the owner."""
+    """How a leg of a path depends on the landmark whose particles are weighed (the owner)."""
 
     FIXED = 0
+    """The leg misses the owner."""
     POINT = 1
+    """The leg ends in the owner, a point."""
     WALL = 2
+    """The leg is mirrored by the owner, a wall."""
     LINEAR = 3
     """The measurement is the offset owner minus agent itself: no room has it, but a Kalman filter is exact with it."""
 
 
 class Kind(NamedTuple):
-    """What the formula of a path is made of; engines compile one kernel for each tuple of returns."""
+    """Kinds of a path's Tx leg and Rx leg; engines compile one kernel for each tuple of returns."""
 
     tx: Leg
+    """Kind of the Tx leg."""
     rx: Leg
+    """Kind of the Rx leg."""
 
 
 Kinds = tuple[Kind, ...]
-"""Of every return."""
+"""Kinds of the legs of several returns."""
 
 
 class Sightline(NamedTuple):
-    """A path, and what each of N agent particles knows about it."""
+    """A return's path as constants of each of N agent particles, which give a landmark particle's predicted return."""
 
     kind: Kind
+    """Kinds of the two legs."""
     tx: Floats
-    """(N, 1) length of a fixed leg, (N, 3) offset of the cloud's centre from the device, or (N, 9) of a wall."""
+    """Constants [m] of the Tx leg: (N, 1) length if fixed, (N, 3) the cloud's centre off the Tx, (N, 9) of a wall."""
     rx: Floats
-    """(N, 3) what is seen of a fixed leg, its length left to the Tx side, or as `tx`."""
+    """Constants of the Rx leg: (N, 3) length [m] and cosines if fixed, else as `tx`."""
     axes: Floats
-    """(N, 6) the array's two axes, mirrored along with the device."""
+    """The array's two axes (N, 6), mirrored along with the device."""
 
 
 class Sighting(NamedTuple):
-    """A measurement, the path that made it, and the error that is expected of it."""
+    """A measured return, the path that made it, and the error that is expected of it."""
 
     line: Sightline
+    """Path that made the measurement."""
     seen: Floats
-    """(3,) length [m] and two cosines."""
+    """Measured length [m] and two cosines (3,)."""
     covariance: Floats
-    """(3, 3)."""
+    """Covariance (3, 3) of the measurement's expected error."""
     power: float = 1.0
     """Exponent of the likelihood."""
     log_factor: float = 0.0
@@ -65,20 +72,20 @@ class Sighting(NamedTuple):
 
 
 NUM_LEG = {Leg.FIXED: (1, 3), Leg.POINT: (3, 3), Leg.WALL: (9, 9), Leg.LINEAR: (0, 3)}
-"""Constants of a Tx leg and of an Rx leg."""
+"""Number of constants of a Tx leg and of an Rx leg, by kind."""
 NUM_AXES = 6
-"""Two axes of the array."""
+"""Number of constants of the array's two axes."""
 NUM_NOISE = 10
-"""Measurement (3), lower triangle of the whitening matrix (6), logarithm of the density's peak (1)."""
+"""Number of constants of a measurement: value (3), lower triangle of the whitening matrix (6), log peak density (1)."""
 
 
 def num_constants(kinds: Kinds) -> int:
-    """Constants an agent particle of some returns."""
+    """Number of constants that returns of these kinds need for each agent particle."""
     return sum(NUM_NOISE + NUM_LEG[kind.tx][0] + NUM_LEG[kind.rx][1] + NUM_AXES for kind in kinds)
 
 
 def pack(sightings: Sequence[Sighting], count: int) -> Floats:
-    """Constants (K, N) float32 of several returns of one owner, for `count` agent particles."""
+    """Constants (K, N) float32 of several returns over one landmark, for `count` agent particles."""
     columns = [np.zeros((count, 0))]
     for sighting in sightings:
         columns += [sighting.line.tx, sighting.line.rx, sighting.line.axes]
@@ -87,7 +94,7 @@ def pack(sightings: Sequence[Sighting], count: int) -> Floats:
 
 
 def _noise_constants(sighting: Sighting) -> Floats:
-    """`power` and `log_factor` go into the whitening matrix and the peak."""
+    """Constants (10,) of a measurement: value, whitening matrix and peak; `power` and `log_factor` are in these."""
     lower = np.linalg.cholesky(sighting.covariance)
     white = np.sqrt(sighting.power) * np.linalg.inv(lower)
     peak = -sighting.power * (np.sum(np.log(np.diag(lower))) + 1.5 * np.log(2.0 * np.pi)) + sighting.log_factor
@@ -97,7 +104,7 @@ def _noise_constants(sighting: Sighting) -> Floats:
 def log_likelihood(
     kinds: Kinds, constant: Callable[[int], Any], x: Any, y: Any, z: Any, rsqrt: Callable[[Any], Any]
 ) -> Any:
-    """Sum over the returns of the log likelihood of the owner's particles (x, y, z), relative to the cloud's centre.
+    """Log likelihood of returns, summed, for a landmark's particles at offsets (x, y, z) [m] from the cloud's centre.
 
     Written in plain arithmetic, so that it runs on numpy arrays and inside a Dr.Jit kernel alike.
 
@@ -121,7 +128,7 @@ def log_likelihood(
 
 
 def _predict(kind: Kind, take: Iterator[Any], x: Any, y: Any, z: Any, rsqrt: Callable[[Any], Any]) -> list[Any]:
-    """Length and two cosines of a landmark particle along its sightline."""
+    """Length [m] and two cosines of a return over a landmark particle along its sightline."""
     if kind.tx == Leg.LINEAR:
         offset = [next(take) for _ in range(3)]
         for _ in range(NUM_AXES):
@@ -165,7 +172,7 @@ def _offset(leg: Leg, take: Iterator[Any], x: Any, y: Any, z: Any) -> tuple[Any,
 def trace_sightline(
     returns: Returns, row: int, owner: int, features: Floats, anchor: Floats, poses: Poses
 ) -> Sightline:
-    """A return of the front end's enumeration as the cloud of feature `owner` sees it.
+    """Sightline of one return for the cloud of feature `owner`, all other features at their means.
 
     Parameters
     ----------
@@ -214,7 +221,7 @@ def _mirror(axes: Floats, normal: Floats) -> Floats:
 
 
 def linear_sightline(centre: Floats, agent: Floats) -> Sightline:
-    """Sightline of the offset (N, 3) from agent to landmark itself, for checks against theory."""
+    """Sightline whose measurement is the offset (N, 3) [m] from agent to landmark itself, for priors and for checks."""
     return Sightline(
         Kind(Leg.LINEAR, Leg.LINEAR), np.zeros((len(centre), 0)), centre - agent, np.zeros((len(centre), 6))
     )

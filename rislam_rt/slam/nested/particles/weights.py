@@ -1,4 +1,4 @@
-"""Weights of a cycle: each return goes to the landmark that it speaks of; points first, then the walls they show in."""
+"""Weights of the particles after a cycle: each return weighs one landmark's cloud; points first, then walls."""
 
 from typing import NamedTuple
 
@@ -10,34 +10,37 @@ from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine
 from rislam_rt.slam.nested.particles.particle_belief import Nested, absorb, gaussian, mean_covariances
 from rislam_rt.slam.nested.particles.sightline import Sighting, trace_sightline
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.returns import NONE, Returns, linearise, poses_of
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.predicted_returns import NONE, Returns, linearise, poses_of
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 TAIL = 4.0
 """Degrees of freedom of Student's t, by which a return far off its prediction counts for less."""
 FLOOR = np.array([5e-4, 2e-4, 2e-4])
 """Standard deviation [m, 1, 1] added to length and cosines: what the model leaves out."""
 FUSED = 3
-"""Most returns in one kernel."""
+"""Largest number of returns weighed in one kernel."""
 
 
 class Seen(NamedTuple):
-    """A returns that were seen."""
+    """The A observed returns of a cycle by which the particles are weighed."""
 
     returns: Returns
+    """Paths of the A returns over the map's features."""
     anchor: Floats
-    """(F, 3) [m]."""
+    """Anchors (F, 3) [m] of walls."""
     body: Body
+    """Places of Tx and Rx on the agent."""
     seen: Floats
-    """(A, 3)."""
+    """Measured lengths [m] and cosines (A, 3)."""
     noise: Floats
-    """(A, 3) variances."""
+    """Variances (A, 3) of the measurements."""
 
 
 class WeightUpdate(NamedTuple):
-    """The belief after a cycle's measurements."""
+    """Particles after a cycle's measurements, with their evidence."""
 
     belief: Nested
+    """The reweighted particles."""
     log_evidence: float
     """Log density of the measurements given all before, of those that the belief could explain."""
     nis: float
@@ -45,7 +48,7 @@ class WeightUpdate(NamedTuple):
 
 
 def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine) -> WeightUpdate:
-    """Particles weighed by all returns (eqs. `landmarkRenew`, `agentRenew`)."""
+    """Weigh the particles of agent and landmarks by a cycle's observed returns (eqs. `landmarkRenew`, `agentRenew`)."""
     if not len(seen.seen):
         return WeightUpdate(belief, 0.0, 0.0)
     mean, covariance = gaussian(belief)
@@ -71,7 +74,7 @@ def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine
 
 
 def _innovations(gap: Floats, by_state: Floats, covariance: Floats, noise: Floats) -> tuple[Floats, float]:
-    """Whitened innovation (A, 3) of each return by itself for the update, and the normalised square of all together."""
+    """Whitened innovation (A, 3) of each return by itself, and the normalised innovation squared of all together."""
     rows, flat = np.arange(len(gap)), by_state.reshape(-1, len(covariance))
     total = flat @ covariance @ flat.T + np.diag(noise.ravel())
     blocks = total.reshape(len(gap), 3, len(gap), 3)[rows, :, rows, :]
@@ -80,12 +83,12 @@ def _innovations(gap: Floats, by_state: Floats, covariance: Floats, noise: Float
 
 
 def trusted(noise: Floats, white: Floats) -> Floats:
-    """Variances (A, 3) that the update uses, larger where a return lies far off its prediction."""
+    """Variances (A, 3) for the update of weights, inflated where a return lies far off its prediction (Student's t)."""
     return noise * np.maximum(1.0, (TAIL + np.sum(white**2, axis=1)) / (TAIL + 3.0))[:, None]
 
 
 def owners(returns: Returns) -> Integers:
-    """(A,) landmark that a return updates: its point if it is direct, else the wall next to the point."""
+    """Row (A,) of the landmark whose cloud each return weighs: its point if direct, else the wall next to the point."""
     walls = returns.legs[:, 1]
     first = np.where(walls[returns.rx] != NONE, walls[returns.rx], walls[returns.tx])
     return np.where(first == NONE, returns.point, first)
@@ -94,8 +97,7 @@ def owners(returns: Returns) -> Integers:
 def _sightings(
     belief: Nested, owner: int, rows: Integers, seen: Seen, by_feature: Floats, config: NestedConfig
 ) -> list[Sighting]:
-    """Returns `rows` as the clouds of one landmark see them in the update, in the order of their kinds, so that kernels
-    recur.
+    """Returns `rows` as likelihoods for the clouds of one landmark, sorted by kind, so that kernels recur.
 
     Other features' errors, given the trajectory, are the same every cycle, and their share must not average out: what
     the n-th measurement of the owner carries of it counts n times.

@@ -4,6 +4,6 @@ Potential features, loopy data association. `init, predict, step, estimate` are 
 """
 
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
-from rislam_rt.slam.schemes.bp_slam.filter import BpSlamState, estimate, init, predict, step
+from rislam_rt.slam.schemes.bp_slam.filter import estimate, init, predict, step
 
-__all__ = ["BpSlamConfig", "BpSlamState", "estimate", "init", "predict", "step"]
+__all__ = ["BpSlamConfig", "estimate", "init", "predict", "step"]

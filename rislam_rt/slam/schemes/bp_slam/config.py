@@ -1,4 +1,4 @@
-"""Configuration of BP-SLAM by delays, both ends moving."""
+"""Configuration of BP-SLAM by delays alone, for an agent that carries both ends."""
 
 from dataclasses import dataclass
 
@@ -10,26 +10,26 @@ from rislam_rt.slam.setting_checks import check_counts, check_inside
 
 @dataclass(frozen=True, slots=True)
 class BpSlamConfig(DelayConfig):
-    """Model and effort. SI units."""
+    """Settings of BP-SLAM by delays alone: model and effort. SI units."""
 
     sigma_a: float = 0.0033
     """Standard deviation of the white acceleration [m/s^2]."""
     detection_probability: float = 0.7
-    """That a feature is measured; the panel's paths fade with its codes."""
+    """Probability that a feature is measured in a cycle; the panel's paths fade with its codes."""
     survival_probability: float = 0.999
-    """That a feature is still there after one step."""
+    """Probability that a feature is still there after one step."""
     initial_features: float = 6.0
-    """Features expected in the region before the first scan, Poisson."""
+    """Expected number of features in the region before the first scan, Poisson."""
     birth_mean: float = 0.01
-    """Features that appear in the region in one step, Poisson."""
+    """Expected number of features that appear in the region in one step, Poisson."""
     birth_threshold: float = 1e-3
-    """Probability above which a range starts a feature."""
+    """Existence probability above which a range starts a feature."""
     detection_threshold: float = 0.5
     """Existence probability above which a potential feature counts as detected."""
     pruning_threshold: float = 1e-4
     """Existence probability below which a potential feature is dropped."""
     max_features: int = 60
-    """Potential features that are kept, the most probable ones."""
+    """Largest number of potential features, of which the most probable ones are kept."""
 
     def __post_init__(self) -> None:
         name = "bp_slam"

@@ -1,4 +1,4 @@
-"""The filter of BP-SLAM for an agent that carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
+"""Filter of BP-SLAM by delays alone; the agent carries both ends: ranges `|p_T - a| + |a - p_R|`, heading known.
 
 Same functions, inputs and outputs as the package's own filter, so that a run can lead either. The panel and its code
 mean nothing to it, and angles of arrival are not used.
@@ -13,66 +13,69 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
-from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
-from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
-from rislam_rt.slam.schemes.shared.sums import (
+from rislam_rt.slam.schemes.shared.gaussian_sums import (
     PredictedRanges,
     Sums,
     born,
     carry,
     join,
     kinds_of,
-    look,
     no_sums,
+    predict_ranges,
     prune,
     range_moments,
 )
+from rislam_rt.slam.schemes.shared.loopy_association import Association
+from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
+from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 FEWEST_FALSE = 1e-3
-"""Mean number of false ranges a scan that is reckoned with at least, so that no range is ever held for certain."""
+"""Least mean number of false ranges in a scan, so that no range is ever held for certain."""
 FIRST_DETECTION = 0.95
-"""That a feature which stands in view for the first time is measured, as published."""
+"""Probability that a feature which comes into view for the first time is measured, as published."""
 STRAIN_RATE = 0.05
-"""Share of the latest cycle in that mean."""
+"""Weight of the latest cycle in the running mean of the NIS."""
 
 
 class BpSlamState(NamedTuple):
-    """All that the filter knows."""
+    """State of BP-SLAM by delays: the agent, and the features' Gaussian sums."""
 
     agent: DelayAgent
+    """The agent: trajectory, height, heading, body and receiver."""
     sums: Sums
+    """Potential features as Gaussian sums."""
     undetected: float
-    """Features that exist and were never seen, expected."""
+    """Expected number of features that exist and were never detected."""
     next_ident: int
+    """Number of the next new feature."""
 
 
 def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: BpSlamConfig, *,
     rng: np.random.Generator,
 ) -> BpSlamState:  # fmt: skip
-    """BP-SLAM's state at the start: the start prior, and no features. `ris` is not used; nothing is drawn."""
+    """State of BP-SLAM before the first cycle: the start prior, no features. `ris` is not used; nothing is drawn."""
     agent = begin_agent(start, int(config.axes.sum()), body, sensor)
     return BpSlamState(agent, no_sums(len(agent.course.mean)), config.initial_features, 0)
 
 
 def assumed_odds(config: BpSlamConfig, sensor: SensorModel) -> Odds:
-    """What BP-SLAM weighs a range against, with the false ranges that the agent is told of its receiver."""
+    """Detection probability and clutter density that BP-SLAM assumes, as the agent is told of its receiver."""
     rate = max(sensor.false_alarms, FEWEST_FALSE)
     return Odds(config.detection_probability, rate, SPEED_OF_LIGHT * sensor.window[1])
 
 
 def predict(state: BpSlamState, dt: float, config: BpSlamConfig) -> SlamEstimate:
-    """BP-SLAM's belief carried over `dt` [s] without noise."""
+    """Estimate of BP-SLAM predicted `dt` [s] ahead at constant velocity without noise."""
     return ahead_of(estimate(state, config), dt)
 
 
 def _move(state: BpSlamState, dt: float, config: BpSlamConfig) -> BpSlamState:
-    """BP-SLAM's agent and features after `dt` [s]; the past state of every `course_stride` cycles is kept."""
+    """Predict BP-SLAM's agent and features over `dt` [s]; the past state of every `course_stride` cycles is kept."""
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
@@ -99,7 +102,7 @@ def step(
     agent = state.agent._replace(heading=float(heading))
     rows, scan, strong, model = hear_ranges(agent, measurement, config)
     fresh = 1.0 + birth_ratio(scan.length, state.undetected, odds._replace(detection_probability=FIRST_DETECTION))
-    sight = look(state.sums, agent.course, agent.pose[0], model)
+    sight = predict_ranges(state.sums, agent.course, agent.pose[0], model)
     found = claims(state.sums, sight, agent.course, scan, fresh, odds)
     landmark = np.full(len(measurement), REMOVED)
     landmark[rows], nis = _claimed(state, sight, scan, found, config)
@@ -115,6 +118,7 @@ def step(
 def _give_birth(
     state: BpSlamState, scan: Scan, strong: Booleans, found: Association, fresh: Floats, config: BpSlamConfig
 ) -> BpSlamState:
+    """BP-SLAM's state with new features for ranges that none claims, and without improbable ones."""
     rows, existence = newborn(found, fresh, config.birth_threshold)
     sums = state.sums
     if len(rows):
@@ -129,7 +133,7 @@ def _give_birth(
 
 
 def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
-    """BP-SLAM's pose (mean, covariance, samples), and its detected features as points of the map."""
+    """Estimate of BP-SLAM: mean, covariance and samples of the pose, and its detected features as points of the map."""
     found = known_points(state.sums, config.detection_threshold)
     return reported(state.agent, found, config.num_samples)
 
@@ -137,8 +141,7 @@ def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
 def _claimed(
     state: BpSlamState, sight: PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
 ) -> tuple[Integers, float]:
-    """BP-SLAM's feature number of each range (`UNUSED` for none), and the NIS over those claimed, of the features'
-    mixtures."""
+    """BP-SLAM's feature number (M,) of each range, `UNUSED` for none, and the NIS over the ranges so claimed."""
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
     feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
     numbers[shown] = sums.ident[feature]

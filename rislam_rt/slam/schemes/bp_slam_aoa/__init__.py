@@ -4,6 +4,6 @@
 """
 
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
-from rislam_rt.slam.schemes.bp_slam_aoa.filter import BpSlamAoaState, estimate, init, predict, step
+from rislam_rt.slam.schemes.bp_slam_aoa.filter import estimate, init, predict, step
 
-__all__ = ["BpSlamAoaConfig", "BpSlamAoaState", "estimate", "init", "predict", "step"]
+__all__ = ["BpSlamAoaConfig", "estimate", "init", "predict", "step"]

@@ -10,48 +10,49 @@ from rislam_rt.slam.setting_checks import check_counts, check_inside, check_not_
 
 @dataclass(frozen=True, slots=True)
 class BpSlamAoaConfig:
-    """Model and effort. SI units; probabilities are a cycle's."""
+    """Settings of BP-SLAM by delays, angles and amplitudes: model and effort. SI units; probabilities are a cycle's."""
 
     sigma_a: float = 0.01
-    """Standard deviation of the white acceleration of a calm step [m/s^2]."""
+    """Standard deviation [m/s^2] of the white acceleration of a calm step."""
     lively_std: float = 0.5
-    """The same of a lively one [m/s^2]: a turn or a stop within a second."""
+    """Standard deviation [m/s^2] of the white acceleration of a lively step: a turn or a stop within a second."""
     calm_again: float = 0.1
     """Probability that a lively step is followed by a calm one; a tenth of it the other way round."""
     use_vt: bool = True
-    """Whether wall returns are features (walls), or set aside; as for the default filter, unless said otherwise."""
+    """Whether wall returns are features (walls), or set aside; unless given, as for the default filter."""
     specular_ratio: float = 0.35
-    """Amplitude over that of free space of the same length, above which a component that is set aside is one."""
+    """Amplitude over free space's at the same length above which a component is a wall return, where these are set
+    aside."""
     visible: float = 0.9
-    """Probability that a path which its amplitude makes audible is reported: things that stand in the way hide it."""
+    """Probability that a path which its amplitude makes detectable is reported: obstacles hide it."""
     survival_probability: float = 0.999
-    """That a feature is still there after one step."""
+    """Probability that a feature is still there after one step."""
     walls: float = 7.0
-    """Walls expected in the region before the first scan, Poisson."""
+    """Expected number of walls in the region before the first scan, Poisson."""
     points: float = 3.0
-    """Points that scatter, likewise."""
+    """Expected number of point scatterers in the region before the first scan, Poisson."""
     wanderers: float = 5.0
-    """Paths of no kind (over several walls, over walls and points), likewise."""
+    """Expected number of paths of no kind (over several walls, walls and points) before the first scan, Poisson."""
     birth_mean: float = 0.03
-    """Share of these that appears anew in a step."""
+    """Share of the features expected at first that appears anew in a step."""
     birth_threshold: float = 0.01
-    """Probability above which a component starts a feature."""
+    """Existence probability above which a component starts a feature."""
     region: float = 15.0
-    """Radius in which features are looked for [m]."""
+    """Radius [m] of the region in which features are looked for."""
     wall_ratio: float = -0.6
-    """Mean log amplitude reflection of a wall: concrete to plasterboard at 10 GHz, ITU-R P.2040..."""
+    """Mean log amplitude reflection of a wall: concrete to plasterboard at 10 GHz, ITU-R P.2040."""
     wall_ratio_std: float = 0.5
-    """...and its spread over building materials."""
+    """Standard deviation of a wall's log amplitude reflection over building materials."""
     strength: float = 0.15
-    """Median root of a point's cross-section [m]: a sphere of 0.08 m radius."""
+    """Median root [m] of a point's cross-section: a sphere of 0.08 m radius."""
     strength_std: float = 1.2
-    """Spread of its logarithm."""
+    """Standard deviation of the logarithm of the root of a point's cross-section."""
     fading: float = 0.3
-    """Spread of one log amplitude about its law: angle of incidence, neighbours."""
+    """Standard deviation of one log amplitude about its law: angle of incidence, neighbours."""
     lean: float = 0.01
-    """Standard deviation of an upright wall's lean [rad]: building tolerance."""
+    """Standard deviation [rad] of an upright wall's lean: building tolerance."""
     drift_std: float = 0.01
-    """Random walk of a wanderer in one step [m]."""
+    """Random walk [m] of a wandering feature in one step."""
     crowd: float = 9.0
     """Mean square of a residual in reported deviations, before any is seen: 1 + SNR of what a cell holds besides."""
     detection_threshold: float = 0.5
@@ -61,11 +62,11 @@ class BpSlamAoaConfig:
     share_threshold: float = 1e-3
     """Share below which a Gaussian of a feature is dropped."""
     max_features: int = 80
-    """Potential features that are kept, the most probable ones."""
+    """Largest number of potential features, of which the most probable ones are kept."""
     course_stride: int = 20
-    """Cycles from one past state of the agent that is kept to the next."""
+    """Number of cycles from one past state of the agent that is kept to the next."""
     num_samples: int = 32
-    """Positions handed to the phase design."""
+    """Number of equally likely positions handed to the phase design."""
 
     def __post_init__(self) -> None:
         name = "bp_slam_aoa"

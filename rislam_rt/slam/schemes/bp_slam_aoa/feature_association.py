@@ -1,4 +1,4 @@
-"""Which component a feature may have made, and how likely: loopy association of components to Gaussian sums.
+"""Loopy association of components to features' Gaussian sums, in BP-SLAM with angles: which may have made which.
 
 Source: Leitinger, Grebien and Witrisal, "Multipath-based SLAM exploiting AoA and amplitude information" (2019): delays,
 angles and amplitudes in the likelihood, a detection probability that follows from each feature's amplitude.
@@ -14,7 +14,7 @@ from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
-from rislam_rt.slam.schemes.bp_slam_aoa.merging import unresolved_neighbours
+from rislam_rt.slam.schemes.bp_slam_aoa.unresolved_returns import unresolved_neighbours
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 
@@ -23,7 +23,7 @@ GATE = 40.0
 
 
 SLACK = 0.1
-"""How far the agent may turn out to be from where it was expected for a pair still to be looked at [m]."""
+"""Distance [m] of the agent from where it was expected up to which a pair is still weighed."""
 
 
 HERMITE = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
@@ -31,29 +31,31 @@ HERMITE = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]
 
 
 class CandidatePairs(NamedTuple):
-    """N pairs of a Gaussian and a component that it may have made."""
+    """N pairs of a feature's Gaussian and a component that it may have made."""
 
     gaussian: Integers
-    """(N,)."""
+    """Row (N,) of the Gaussian."""
     component: Integers
-    """(N,)."""
+    """Row (N,) of the component."""
     noise: Floats
-    """(N, 3) variances of the component."""
+    """Variances (N, 3) of the component."""
     loudness: Floats
-    """(N,) variance of its log amplitude about the feature's."""
+    """Variance (N,) of the component's log amplitude about the feature's."""
     log_loudness: Floats
-    """(N,) log density of its amplitude, times the detection probability."""
+    """Log density (N,) of the component's amplitude, times the detection probability."""
 
 
 class View(NamedTuple):
-    """What is expected of a cycle before its components are assigned."""
+    """Predicted returns of a cycle, their detection probabilities and candidate pairs, before the association."""
 
     predicted: PredictedReturns
+    """Predicted returns, moved by the mean pull of neighbours."""
     detection: Floats
-    """(C,) probability that a Gaussian's return is reported by itself."""
+    """Probability (C,) that a Gaussian's return is reported by itself."""
     disturbance: Floats
-    """(C, 3, 3) covariance of the pull of returns that cannot be resolved from it."""
+    """Covariance (C, 3, 3) of the pull of returns that cannot be resolved from it."""
     pairs: CandidatePairs
+    """Candidate pairs of a Gaussian and a component."""
 
 
 def expect_scan(
@@ -63,7 +65,7 @@ def expect_scan(
     sensor: SensorModel,
     config: BpSlamAoaConfig,
 ) -> View:
-    """What association expects of features: detection probabilities, pulls of neighbours, pairs worth weighing."""
+    """Predicted returns of features' Gaussians for association: detection probabilities, pulls of neighbours, pairs."""
     variance = features.strength_variance + config.fading**2
     loud = predicted.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]
     snr = sensor.radio.integrated_snr(np.exp(np.clip(loud, -60.0, 5.0)))
@@ -92,8 +94,7 @@ def spread_of(predicted: PredictedReturns, course: AgentTrajectory) -> Floats:
 
 
 def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | None = None) -> Floats:
-    """Densities (N,) of the pairs to associate, times detection; `more` (3, 3) is added to the covariance of the
-    agent's position."""
+    """Likelihoods (N,) of candidate pairs, times detection; `more` (3, 3) [m^2] is added to the agent's covariance."""
     gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
     if more is not None:
@@ -105,7 +106,7 @@ def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | 
 
 
 def log_density(miss: Floats, precision: Floats) -> Floats:
-    """Log normal densities (N,) of the innovations (N, 3) of pairs to associate; none beyond the gate."""
+    """Log normal densities (N,) of pairs' innovations (N, 3) with precisions (N, 3, 3); -inf beyond the gate."""
     square = np.einsum("ni,nij,nj->n", miss, precision, miss)
     log = 0.5 * (np.log(np.maximum(np.linalg.det(precision), 1e-300)) - square - 3.0 * np.log(2.0 * np.pi))
     return np.asarray(np.where(square < GATE, log, -np.inf), dtype=np.float64)

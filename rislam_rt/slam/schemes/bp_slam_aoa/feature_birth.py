@@ -1,4 +1,4 @@
-"""Births: what a component may be the first sight of, how often, and where it would then be."""
+"""Feature birth in BP-SLAM with angles: what features a component may be the first of, how likely, and where."""
 
 from typing import NamedTuple
 
@@ -12,54 +12,54 @@ from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 NUDGE = 1e-6
 """Step of differences [m, rad]."""
 LEAST_VARIANCE = 1e-10
-"""Of a new feature's place along any axis [m^2]."""
+"""Least variance [m^2] of a new feature's place along any axis."""
 SLICES = 5
-"""Gaussians over the elevation of a path whose cosines do not tell it."""
+"""Number of Gaussians over the elevation of a path whose cosines do not tell it."""
 UPRIGHT, LEVEL = 0.7, 0.2
 """Shares of upright and of level surfaces; the rest slopes."""
 OTHER_RATIO, OTHER_RATIO_STD = -2.5, 1.2
-"""Log amplitude of a wanderer over that of free space of the same length, and its spread."""
+"""Mean log amplitude of a wandering feature over that of free space of the same length, and its deviation."""
 
 
 class ComponentScan(NamedTuple):
-    """What the receiver reported in one cycle, without what is no path of the room."""
+    """M components of one cycle that BP-SLAM with angles uses, without the direct path."""
 
     seen: Floats
-    """(M, 3) length [m] and two cosines."""
+    """Lengths [m] and two cosines (M, 3)."""
     std: Floats
-    """(M, 3)."""
+    """Standard deviations (M, 3) of length and cosines."""
     log_amplitude: Floats
-    """(M,)."""
+    """Log amplitudes (M,)."""
     log_std: Floats
-    """(M,)."""
+    """Standard deviations (M,) of the log amplitudes."""
     false: Floats
-    """(M,) false components expected per metre, unit of each cosine and e-fold, where each lies."""
+    """Density (M,) of false components per metre, unit of each cosine and e-fold of amplitude, at each one."""
 
 
 class BirthHypotheses(NamedTuple):
-    """G Gaussians that one component may be the first sight of."""
+    """G Gaussians of features of which one component may be the first detection."""
 
     kind: Integers
-    """(G,)."""
+    """Kind (G,) of the feature: WALL, POINT or WANDERER."""
     density: Floats
-    """(G,) expected ones per metre, unit of each cosine and e-fold of amplitude."""
+    """Expected number (G,) of them per metre, unit of each cosine and e-fold of amplitude."""
     polar: Floats
-    """(G, 3) length [m], azimuth and elevation of the arrival, room axes [rad]."""
+    """Length [m], azimuth and elevation [rad] of the arrival in room axes (G, 3)."""
     std: Floats
-    """(G, 3) their standard deviations."""
+    """Standard deviations (G, 3) of length, azimuth and elevation."""
     strength: Floats
-    """(G,) log amplitude above the law of the kind."""
+    """Log amplitude (G,) above the law of the kind."""
     strength_std: Floats
-    """(G,)."""
+    """Standard deviation (G,) of that log amplitude."""
 
 
 def log_normal(miss: Floats, variance: Floats) -> Floats:
-    """Logarithm of a scalar normal density, by which births are weighed."""
+    """Log density of a scalar normal, from the deviation from the mean and the variance."""
     return -0.5 * (miss**2 / variance + np.log(2.0 * np.pi * variance))
 
 
 def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
-    """Elevations (E,) [rad] that a feature may be born at, deviations, and each slice's weight by its likelihood.
+    """Elevations (E,) [rad] at which a feature may be born, their deviations, and the weight of each by its likelihood.
 
     The horizontal part of an arrival tells its elevation by the cosine: well from above, badly near the horizon.
     """
@@ -75,7 +75,7 @@ def elevations(radial: float, std: float) -> tuple[Floats, Floats, Floats]:
 def hypothesise(
     scan: ComponentScan, row: int, rotation: Floats, free: float, window: float, config: BpSlamAoaConfig
 ) -> BirthHypotheses:
-    """Hypotheses of what feature component `row` may be born of; `window` is the longest length reported [m]."""
+    """Birth hypotheses of component `row`: what features it may be the first of; `window` [m] is the longest length."""
     length, level = float(scan.seen[row, 0]), scan.seen[row, 1:]
     std, turn = float(scan.std[row, 1:].mean()), rotation[:2, :2] @ level
     radial = float(np.clip(np.hypot(*turn), min(std, 1.0), 1.0))
@@ -120,7 +120,7 @@ def born(
     first: int,
     config: BpSlamAoaConfig,
 ) -> GaussianFeatures:
-    """Features that are born, one for each set of hypotheses."""
+    """New features of BP-SLAM with angles as Gaussian sums, one feature for each set of birth hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
     parts = BirthHypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))
     place, by_agent, by_polar = _placed(parts.kind, parts.polar, course.mean[:3], ends)
@@ -138,7 +138,7 @@ def born(
 
 
 def _placed(kind: Integers, polar: Floats, agent: Floats, ends: Ends) -> tuple[Floats, Floats, Floats]:
-    """Places (G, 3) of features at birth, and derivatives (G, 3, 3) by agent, and by length, azimuth and elevation."""
+    """Places (G, 3) [m] of features at birth, derivatives (G, 3, 3) by the agent and by length, azimuth, elevation."""
     tx, rx, is_wall = agent + ends.tx, agent + ends.rx, (kind == WALL)[:, None]
     length, azimuth, elevation = (polar + NUDGE * np.concatenate([np.zeros((1, 3)), np.eye(3)])[:, None]).T
     flat = np.cos(elevation)

@@ -1,4 +1,4 @@
-"""Update of Gaussian sums by components: messages between features and the agent's course.
+"""Update of features' Gaussian sums and the agent's trajectory by components, in BP-SLAM with angles.
 
 Source: Leitinger, Grebien and Witrisal, "Multipath-based SLAM exploiting AoA and amplitude information" (2019), on the
 factor graph of Leitinger et al., arXiv 1801.04463: delays, angles and amplitudes in the likelihood, a detection
@@ -17,13 +17,13 @@ from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.loopy_association import Association
 
 NO_VARIANCE = 1e12
-"""Variance of a measurement that tells nothing, in units of what it is about."""
+"""Variance of a measurement that tells nothing, in units of the prediction's."""
 LEAST_WEIGHT = 1e-3
-"""Probability of a Gaussian below which it moves nothing but itself."""
+"""Probability of a Gaussian below which it does not correct the agent's trajectory."""
 SCATTER_RATE = 0.1
-"""Share of the latest residual in what is learnt of a feature's scatter."""
+"""Weight of the latest residual in what is learnt of a feature's scatter."""
 MOST_SCATTER = 9.0
-"""Largest logarithm of a scatter."""
+"""Largest logarithm of a feature's scatter, the mean square of its residuals in reported deviations."""
 
 
 def absorb(
@@ -34,7 +34,7 @@ def absorb(
     found: Association,
     fresh: Floats,
 ) -> tuple[GaussianFeatures, AgentTrajectory]:
-    """Update features and course by the components, feature by feature, the surest first."""
+    """Update features' Gaussian sums and the agent's trajectory by the components, one by one, the surest first."""
     ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
     pair_edges = np.searchsorted(view.pairs.gaussian, np.arange(len(features.owner) + 1))
@@ -83,34 +83,39 @@ def absorb(
 
 
 class Heard(NamedTuple):
-    """What one feature may have made."""
+    """Components that one feature may have made, with their messages."""
 
     view: View
+    """Predicted returns of the cycle."""
     scan: ComponentScan
+    """Components of the cycle."""
     part: slice
-    """Its Gaussians."""
+    """Rows of the feature's Gaussians."""
     pairs: slice
-    """Their pairs."""
+    """Rows of the candidate pairs of these Gaussians."""
     message: Floats
-    """(M,) of the components, over the density of anything else."""
+    """Messages (M,) of the components to the feature, over the density of anything else."""
 
 
 class Learnt(NamedTuple):
-    """What G Gaussians of a feature learn: one component in place of all that each may have made."""
+    """Update of G Gaussians of a feature: one equivalent component in place of all that each may have made."""
 
     miss: Floats
-    """(G, 3) innovation."""
+    """Innovation (G, 3) of the equivalent component."""
     noise: Floats
-    """(G, 3, 3) its covariance."""
+    """Covariance (G, 3, 3) of the equivalent component."""
     factor: Floats
-    """(G,) on the share."""
+    """Factor (G,) on the Gaussian's share."""
     strength: Floats
+    """Log amplitude (G,) above the law of the kind."""
     strength_variance: Floats
+    """Variance (G,) of that log amplitude."""
     log_scatter: Floats
+    """Logarithm (G,) of the feature's scatter."""
 
 
 def learn(heard: Heard, seen: Floats, spread: Floats, features: GaussianFeatures) -> Learnt:
-    """What the update makes of each Gaussian of a feature: moments over the components and "missed"."""
+    """Update of each Gaussian of one feature: moments over the components that it may have made and "missed"."""
     view, scan, part = heard.view, heard.scan, heard.part
     gaussian, component, noise, loudness, log_loudness = (column[heard.pairs] for column in view.pairs)
     mine = gaussian - part.start
@@ -140,13 +145,14 @@ def learn(heard: Heard, seen: Floats, spread: Floats, features: GaussianFeatures
 
 
 def _sum(row: Integers, values: Floats, count: int) -> Floats:
+    """Sums (count, ...) of the values (N, ...) of each row (N,)."""
     total = np.zeros((count, *values.shape[1:]))
     np.add.at(total, row, values)
     return total
 
 
 def _as_one(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats]:
-    """The one component, innovation (G, 3) and covariance (G, 3, 3), whose update takes `before` to these moments.
+    """Equivalent component, innovation (G, 3) and covariance (G, 3, 3), whose update takes `before` to these moments.
 
     Along axes in which components contradict each other, so that nothing is learnt, its variance is `NO_VARIANCE`.
     """
@@ -163,7 +169,7 @@ def _as_one(mean: Floats, after: Floats, before: Floats) -> tuple[Floats, Floats
 
 
 def _mix(course: AgentTrajectory, gain: Floats, spread: Floats, learnt: Learnt, weight: Floats) -> AgentTrajectory:
-    """Course updated by one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
+    """Agent's trajectory updated by one feature's message: moments over its Gaussians, the rest changing nothing."""
     rows = np.flatnonzero(weight > LEAST_WEIGHT)
     if not len(rows):
         return course

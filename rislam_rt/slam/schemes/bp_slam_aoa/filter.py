@@ -1,4 +1,4 @@
-"""BP-SLAM that hears what the default filter hears: delays, angles and amplitudes, both ends moving, heading known."""
+"""Filter of BP-SLAM by delays, angles and amplitudes, for an agent that carries both ends; heading known."""
 
 from typing import NamedTuple
 
@@ -17,23 +17,23 @@ from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
     Ends,
     GaussianFeatures,
     carry,
-    look,
     no_features,
+    predict_returns,
 )
 from rislam_rt.slam.schemes.bp_slam_aoa.pose_and_map import known_map, pose_moments
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
+from rislam_rt.slam.schemes.shared.gaussian_sums import join, prune
 from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
 from rislam_rt.slam.schemes.shared.sum_correction import is_strong
-from rislam_rt.slam.schemes.shared.sums import join, prune
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 LIVELY_STRIDE = 5
-"""The course's stride while steps are lively."""
+"""Cycles from one past state of the agent that is kept to the next, while steps are not calm."""
 LEAST_FALSE = 1e-12
-"""Density of false components that is reckoned with at least."""
+"""Least density of false components."""
 FAST = 4.0
 """Acceleration of a fast step over that of a lively one."""
 CALM_ENDS = 0.1
@@ -41,33 +41,38 @@ CALM_ENDS = 0.1
 CHANGE = 0.05
 """Probability that a step which is not calm is followed by one that is not calm in another way."""
 UNSEEN = 0.7
-"""Share of what is expected and not yet seen that stays unseen in a cycle."""
+"""Share of the features expected and not yet detected that stay undetected in a cycle."""
 RARE = 1e-6
-"""Density of first sights while motion modes are weighed: a surprise, but not an impossible one."""
+"""Density of new features' components while motion modes are weighed: a surprise, but not an impossible one."""
 VERTICAL_STD = 0.003
-"""White vertical acceleration of an agent on a level floor [m/s^2]."""
+"""Standard deviation [m/s^2] of the white vertical acceleration of an agent on a level floor."""
 STRAIN_RATE = 0.05
-"""Share of the latest cycle in that mean."""
+"""Weight of the latest cycle in the running mean of the NIS."""
 
 
 class BpSlamAoaState(NamedTuple):
-    """All that the filter knows."""
+    """State of BP-SLAM with angles: the agent's trajectory and motion mode, and the features' Gaussian sums."""
 
     course: AgentTrajectory
-    """Relative to the start [m]."""
+    """The agent's trajectory [m], relative to the start."""
     features: GaussianFeatures
+    """Potential features as Gaussian sums."""
     fresh: float
-    """Share of the features that were expected at the start, and were never seen."""
+    """Share of the features expected at the start that was never detected."""
     next_ident: int
+    """Number of the next new feature."""
     cycle: int
+    """Number of cycles so far."""
     motion_mode: Floats
-    """(4,) probabilities that the last step was calm, lively, fast, climbing."""
+    """Probabilities (4,) that the last step was calm, lively, fast, climbing."""
     heading: float
-    """[rad]."""
+    """Heading [rad]."""
     strain: float
     """Running mean of the NIS per degree of freedom: 1 when all is well."""
     start: StartPrior
+    """The start prior that the agent was told."""
     body: Body
+    """Places of Tx and Rx on the agent."""
     sensor: SensorModel
     """What the agent is told of its receiver."""
 
@@ -76,8 +81,7 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: BpSlamAoaConfig, *,
     rng: np.random.Generator,
 ) -> BpSlamAoaState:  # fmt: skip
-    """State of BP-SLAM with angles at the start: the start prior, and no features. `ris` is not used; nothing is
-    drawn."""
+    """State of BP-SLAM with angles before the first cycle: start prior, no features. `ris` not used, nothing drawn."""
     std = np.concatenate([np.zeros(3), start.velocity_std * np.array([1.0, 1.0, 0.0])])
     mean = np.concatenate([np.zeros(3), start.velocity])
     course = AgentTrajectory(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
@@ -88,7 +92,7 @@ def init(
 
 
 def predict(state: BpSlamAoaState, dt: float, config: BpSlamAoaConfig) -> SlamEstimate:
-    """Belief of BP-SLAM with angles carried over `dt` [s] without noise."""
+    """Estimate of BP-SLAM with angles predicted `dt` [s] ahead at constant velocity without noise."""
     return ahead_of(estimate(state, config), dt)
 
 
@@ -133,14 +137,14 @@ def step(
 
 
 def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
-    """Pose, samples of it, points and walls of the map by BP-SLAM with angles."""
+    """Estimate of BP-SLAM with angles: moments and samples of the pose, and points and walls of the map."""
     position, velocity, covariance, samples = pose_moments(state.course, state.start, config.num_samples)
     known = known_map(state.features, state.course, state.start, config.detection_threshold)
     return SlamEstimate(position, velocity, state.heading, covariance, samples, state.body, known)
 
 
 def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
-    """Components that BP-SLAM with angles uses (no direct path, no wall returns set aside), and their rows."""
+    """Components that BP-SLAM with angles uses (no direct path, no wall returns set aside), and their rows (M,)."""
     sensor = state.sensor
     observed = observations_of(measurement, sensor.radio)
     aside = is_los(observed, state.body) | is_strong(observed.ratio, None if config.use_vt else config.specular_ratio)
@@ -153,14 +157,14 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:
-    """(4, 3) acceleration deviations of BP-SLAM's motion modes: calm, lively, fast, climbing [m/s^2]."""
+    """Acceleration deviations (4, 3) [m/s^2] of BP-SLAM's motion modes: calm, lively, fast, climbing."""
     calm, lively, fast = config.sigma_a, config.lively_std, FAST * config.lively_std
     up = min(VERTICAL_STD, calm)
     return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
 
 
 def _mode_changes(config: BpSlamAoaConfig) -> Floats:
-    """(4, 4) probabilities of BP-SLAM's motion mode of a step after that of the step before."""
+    """Transition probabilities (4, 4) from BP-SLAM's motion mode of a step to that of the next."""
     calm = config.calm_again
     move = np.full((4, 4), CHANGE * (1.0 - calm))
     move[0], move[:, 0] = CALM_ENDS * calm / 3.0, calm
@@ -172,7 +176,7 @@ def _mode_changes(config: BpSlamAoaConfig) -> Floats:
 def _predict(
     state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
 ) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
-    """BP-SLAM's agent and features carried to this cycle, by the motion mode that explains best what is heard."""
+    """Predict BP-SLAM's agent and features to this cycle, by the motion mode that explains its components best."""
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
     ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
@@ -189,7 +193,7 @@ def _predict(
             )
             course, carried = advance(state.course, dt, levels[level], keep)
             moved = state._replace(course=course, features=_survive(state.features, carried, config))
-        predicted = look(moved.features, moved.course, ends, free)
+        predicted = predict_returns(moved.features, moved.course, ends, free)
         return moved, expect_scan(moved.features, predicted, scan, state.sensor, config)
 
     moved, view = ahead(0)
@@ -209,6 +213,7 @@ def _predict(
 
 
 def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig) -> GaussianFeatures:
+    """BP-SLAM's features given the trajectory after a time step, each less probable by the chance that it has gone."""
     moved = carry(features, carried, config.drift_std)
     return moved._replace(existence=config.survival_probability * moved.existence)
 
@@ -216,8 +221,7 @@ def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig)
 def _claimed(
     state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
-    """BP-SLAM's feature number of each component (`UNUSED` for none), and the NIS of those claimed, by the likeliest
-    Gaussian."""
+    """BP-SLAM's feature number (M,) of each component, `UNUSED` for none, and the NIS over components so claimed."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
     sure = (features.existence > config.detection_threshold)[:, None]
     for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):

@@ -1,4 +1,4 @@
-"""Potential features as Gaussian sums given the agent's course, and the returns that they predict.
+"""Potential features as Gaussian sums given the agent's trajectory, and the returns that they predict, with angles.
 
 Places are relative to the start: nothing that is measured tells where that was. A wall is the mirror image of the start
 in it, a point its place; a *wanderer* is a point that walks at random, which is what a path over several walls, or over
@@ -14,76 +14,76 @@ from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
 from rislam_rt.slam.schemes.shared.bistatic_ranges import length_of
 
 WALL, POINT, WANDERER = 0, 1, 2
-"""Kinds of feature."""
+"""Kinds of feature: a wall, a point scatterer, a path of no lasting place."""
 NUDGE = 1e-5
 """Step of central differences [m]."""
 NEAREST = 1e-3
-"""Shortest distance that is reckoned with [m]."""
+"""Shortest distance [m] to a feature in predictions."""
 AMPLITUDE_WALK = 0.02
 """Random walk of a feature's log amplitude in one step."""
 
 
 class Ends(NamedTuple):
-    """Where Tx and Rx are on the agent, and how it stands."""
+    """Places of Tx and Rx on the agent in room axes, and the agent's rotation."""
 
     tx: Floats
-    """(3,) [m] from the agent's position, room axes."""
+    """Tx (3,) [m] from the agent's position, in room axes."""
     rx: Floats
-    """(3,)."""
+    """Rx (3,) [m] from the agent's position, in room axes."""
     rotation: Floats
-    """(3, 3) from body to room axes."""
+    """Rotation (3, 3) from body to room axes."""
     upper: bool
     """Whether the array hears the upper half space alone."""
 
 
 class GaussianFeatures(NamedTuple):
-    """C Gaussians of K potential features, those of one feature side by side; the course has n numbers."""
+    """Gaussian sums of K potential features, C Gaussians in all, a feature's side by side; n numbers of trajectory."""
 
     existence: Floats
-    """(K,)."""
+    """Existence probability (K,)."""
     ident: Integers
-    """(K,) number for life."""
+    """Number (K,) of the feature, for life."""
     owner: Integers
-    """(C,) row of the feature, ascending."""
+    """Row (C,) of each Gaussian's feature, ascending."""
     kind: Integers
-    """(C,) WALL, POINT or WANDERER."""
+    """Kind (C,) of each Gaussian: WALL, POINT or WANDERER."""
     share: Floats
-    """(C,) shares of one feature sum to one."""
+    """Share (C,) of each Gaussian; those of one feature sum to one."""
     mean: Floats
-    """(C, 3) [m], with the course at its mean."""
+    """Mean place (C, 3) [m] from the start, with the trajectory at its mean."""
     slope: Floats
-    """(C, 3, n) by how much it moves with the course."""
+    """Derivative (C, 3, n) of the place by the trajectory."""
     covariance: Floats
-    """(C, 3, 3) given the course [m^2]."""
+    """Covariance (C, 3, 3) [m^2] given the trajectory."""
     strength: Floats
-    """(C,) log amplitude above the law of the kind."""
+    """Log amplitude (C,) above the law of the kind."""
     strength_variance: Floats
-    """(C,)."""
+    """Variance (C,) of that log amplitude."""
     log_scatter: Floats
-    """(C,) logarithm of the mean square of its residuals in reported deviations."""
+    """Logarithm (C,) of the mean square of the feature's residuals in reported deviations."""
 
 
 class PredictedReturns(NamedTuple):
-    """Returns that C Gaussians predict: length [m] and two cosines, to second order in the feature's place."""
+    """Returns that C Gaussians of features predict: length [m], two cosines, to second order in the feature's place."""
 
     seen: Floats
-    """(C, 3)."""
+    """Lengths [m] and cosines (C, 3), curvature included."""
     by_mean: Floats
-    """(C, 3, 3)."""
+    """Derivatives (C, 3, 3) of the returns by the feature's place."""
     by_place: Floats
-    """(C, 3, 3) through the agent's present position alone."""
+    """Derivatives (C, 3, 3) of the returns by the agent's present position alone."""
     by_course: Floats
-    """(C, 3, n) through the agent and through the feature."""
+    """Derivatives (C, 3, n) of the returns by the trajectory, through the agent and through the feature."""
     own: Floats
-    """(C, 3, 3) covariance given the course."""
+    """Covariances (C, 3, 3) of the returns given the trajectory."""
     log_amplitude: Floats
-    """(C,) mean."""
+    """Mean log amplitudes (C,)."""
     in_view: Floats
-    """(C,) 1 where it arrives from where the array hears, else 0."""
+    """Ones (C,) where the return arrives from where the array hears, else zeros."""
 
 
 def no_features(size: int) -> GaussianFeatures:
-    """No features yet of BP-SLAM with angles, of a course of `size` numbers."""
+    """Empty set of features' Gaussian sums of BP-SLAM with angles, for a trajectory of `size` numbers."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     return GaussianFeatures(
         none, whole, whole, whole, none, np.zeros((0, 3)), np.zeros((0, 3, size)), np.zeros((0, 3, 3)), none, none, none
@@ -91,7 +91,7 @@ def no_features(size: int) -> GaussianFeatures:
 
 
 def carry(features: GaussianFeatures, step: Step, drift: float) -> GaussianFeatures:
-    """Features' beliefs about a new course; wanderers widen by a standard deviation `drift` [m]."""
+    """Features' Gaussian sums given the trajectory after a time step; wanderers widen by a deviation `drift` [m]."""
     missed = features.slope[:, :, : len(step.residual)]
     covariance = features.covariance + missed @ step.residual @ missed.swapaxes(1, 2)
     covariance[features.kind == WANDERER] += drift**2 * np.eye(3)
@@ -103,7 +103,7 @@ def carry(features: GaussianFeatures, step: Step, drift: float) -> GaussianFeatu
 
 
 def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floats:
-    """Returns of Gaussian features (..., C, 5): length [m], two cosines, height cosine of arrival, log amplitude."""
+    """Returns (..., C, 5) of features: length [m], three direction cosines in the body frame, log amplitude by law."""
     tx, rx = agent + ends.tx, agent + ends.rx
     size = np.maximum(length_of(place), NEAREST)
     normal = place / size[..., None]
@@ -118,8 +118,8 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
     return np.stack([length, arrival[..., 0], arrival[..., 1], arrival[..., 2], law], axis=-1)
 
 
-def look(features: GaussianFeatures, course: AgentTrajectory, ends: Ends, free: float) -> PredictedReturns:
-    """Returns of all features' Gaussians from the mean position; `free` is the log amplitude of 1 m in free space."""
+def predict_returns(features: GaussianFeatures, course: AgentTrajectory, ends: Ends, free: float) -> PredictedReturns:
+    """Predicted returns of all features' Gaussians from the mean position; `free` is the log amplitude of 1 m."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
     spread = features.covariance + spread_over(features.slope, course)
     value, vector = np.linalg.eigh(spread)
@@ -140,10 +140,10 @@ def look(features: GaussianFeatures, course: AgentTrajectory, ends: Ends, free: 
 
 
 def through(rows: Floats, matrix: Floats) -> Floats:
-    """Rows (C, 3, n) times a matrix (n, m), as one product."""
+    """Products (C, 3, m) of rows (C, 3, n) and a matrix (n, m), as one product."""
     return np.asarray((rows.reshape(3 * len(rows), len(matrix)) @ matrix).reshape(len(rows), 3, matrix.shape[1]))
 
 
 def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
-    """Covariance (C, 3, 3) that features' rows (C, 3, n) make of the course's."""
+    """Covariances (C, 3, 3) that the trajectory's covariance makes through derivatives (C, 3, n)."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)

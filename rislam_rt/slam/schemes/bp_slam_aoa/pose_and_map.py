@@ -1,4 +1,4 @@
-"""Reported pose with the start's error back in it, points and walls of the map."""
+"""Reported pose and map of BP-SLAM with angles: the start's error put back in, points and walls."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ from rislam_rt.slam.start_prior import StartPrior
 
 
 def start_variance(start: StartPrior) -> Floats:
-    """(3, 3) [m^2] covariance of the start told, which a report adds to the pose; its height is exact."""
+    """Covariance (3, 3) [m^2] of the start that was told, which a report adds to the pose; its height is exact."""
     return start.position_std**2 * np.diag([1.0, 1.0, 0.0])
 
 
 def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Reported position (3,), velocity (3,), their covariance (6, 6), and `count` positions, equally likely."""
+    """Reported position (3,), velocity (3,), their covariance (6, 6), and `count` equally likely positions."""
     covariance = course.covariance[:6, :6].copy()
     covariance[:3, :3] += start_variance(start)
     covariance = 0.5 * (covariance + covariance.T)
@@ -25,7 +25,7 @@ def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tupl
 
 
 def known_map(features: GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float) -> MapEstimate:
-    """Reported map of the features that exist, each by its likeliest Gaussian; wanderers have no place."""
+    """Reported map of the features that exist, each by its likeliest Gaussian, as points and walls; no wanderers."""
     total = features.covariance + spread_over(features.slope, course)
     best = np.zeros(len(features.ident))
     np.maximum.at(best, features.owner, features.share)

@@ -1,4 +1,4 @@
-"""Channel-SLAM (Gentner et al., IEEE TWC 2016), delay only, for an agent that carries both ends.
+"""Channel-SLAM (Gentner et al., IEEE TWC 2016) by delays alone, for an agent that carries both ends.
 
 `init, predict, step, estimate` have the interface of the package's own filter.
 """

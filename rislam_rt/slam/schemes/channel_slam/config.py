@@ -1,4 +1,4 @@
-"""Configuration of Channel-SLAM."""
+"""Configuration of Channel-SLAM by delays alone."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from rislam_rt.slam.setting_checks import check_counts, check_inside
 
 @dataclass(frozen=True, slots=True)
 class ChannelSlamConfig(DelayConfig):
-    """Model and effort; features are virtual transmitters. SI units."""
+    """Settings of Channel-SLAM, whose features are virtual transmitters: model and effort. SI units."""
 
     max_paths: int = 32
-    """Virtual transmitters at a time; the paths that were confirmed first have them."""
+    """Largest number of virtual transmitters at a time; the paths that were confirmed first have them."""
     outlier_probability: float = 0.01
     """Probability that a tracked range has nothing to do with its virtual transmitter, as after a swap of labels."""
     gate: float = 9.0
@@ -22,9 +22,9 @@ class ChannelSlamConfig(DelayConfig):
     range_acceleration: float = 0.03
     """Standard deviation of the drift of a track's range rate [m/s^2]."""
     confirm_hits: int = 5
-    """Ranges that a track needs before a virtual transmitter is born of it."""
+    """Number of ranges that a track needs before a virtual transmitter is born of it."""
     max_misses: int = 5
-    """Cycles without a range after which a track, and its virtual transmitter, is given up."""
+    """Number of cycles without a range after which a track, and its virtual transmitter, is given up."""
     strain_limit: float = 4.0
     """Running mean of a path's squared normalised innovation above which its virtual transmitter starts anew."""
     shown_std: float = 0.5
@@ -41,5 +41,5 @@ class ChannelSlamConfig(DelayConfig):
 
     @property
     def odds(self) -> Odds:
-        """A tracked range either belongs to its transmitter or not: the odds of `outlier_probability`, over a metre."""
+        """Odds that a tracked range belongs to its virtual transmitter, by `outlier_probability`, over a metre."""
         return Odds(0.5, self.outlier_probability / (1.0 - self.outlier_probability), 1.0)

@@ -1,11 +1,11 @@
-"""The filter of Channel-SLAM, delay only: a tracker's labels, and a virtual transmitter a path.
+"""Filter of Channel-SLAM by delays alone: a tracker labels the ranges, and each label has a virtual transmitter.
 
 Source: Gentner et al., "Multipath assisted positioning with simultaneous localization and mapping", IEEE TWC 2016. As
 there, labels are taken as known, there is no model of detection, and a path that ends takes its virtual transmitter
 with it. Unlike there, no transmitter stands in the room: both ends move with the agent, so that a virtual transmitter
 is a point `a` at range `|p_T - a| + |a - p_R|`. Gaussian sums stand in for the particles of a virtual transmitter
-(Ulmschneider, Gentner, Jost and Dammann, 2018), and a Gaussian over the course for those of the agent: a hundred
-particles, resampled, keep one course and forget what delays never told (see `shared.gauge`).
+(Ulmschneider, Gentner, Jost and Dammann, 2018), and a Gaussian over the trajectory for those of the agent: a hundred
+particles, resampled, keep one trajectory and forget what delays never told (see `shared.gauge`).
 """
 
 from typing import NamedTuple
@@ -20,53 +20,56 @@ from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, fol
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
-from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Scan
-from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
-from rislam_rt.slam.schemes.shared.sum_correction import absorb
-from rislam_rt.slam.schemes.shared.sums import (
+from rislam_rt.slam.schemes.shared.gaussian_sums import (
     PredictedRanges,
     Sums,
     born,
     carry,
     join,
     kinds_of,
-    look,
     no_sums,
+    predict_ranges,
     prune,
     range_moments,
 )
+from rislam_rt.slam.schemes.shared.loopy_association import Association
+from rislam_rt.slam.schemes.shared.range_scan import Scan
+from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
+from rislam_rt.slam.schemes.shared.sum_correction import absorb
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1
-"""Share of the latest cycle in the running means of squared innovations."""
+"""Weight of the latest cycle in the running means of squared innovations."""
 
 
 class ChannelSlamState(NamedTuple):
-    """All that the filter knows."""
+    """State of Channel-SLAM: the agent, the tracks of ranges, and the virtual transmitters."""
 
     agent: DelayAgent
+    """The agent: trajectory, height, heading, body and receiver."""
     sums: Sums
-    """Virtual transmitters; `ident` is the label of the path."""
+    """Gaussian sums of the virtual transmitters; `ident` is the label of the path."""
     tracks: RangeTracks
+    """Tracks of ranges by label."""
     strains: dict[int, float]
-    """Running mean of the squared innovation of every virtual transmitter, by label."""
+    """Running mean of the squared normalised innovation of every virtual transmitter, by label."""
     next_label: int
+    """Label of the next new track."""
 
 
 def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: ChannelSlamConfig, *,
     rng: np.random.Generator,
 ) -> ChannelSlamState:  # fmt: skip
-    """Channel-SLAM's state at the start: the start prior, and no paths. `ris` is not used; nothing is drawn."""
+    """State of Channel-SLAM before the first cycle: the start prior, no paths. `ris` is not used; nothing is drawn."""
     agent = begin_agent(start, int(config.axes.sum()), body, sensor)
     return ChannelSlamState(agent, no_sums(len(agent.course.mean)), no_tracks(), {}, 0)
 
 
 def predict(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> SlamEstimate:
-    """Channel-SLAM's belief carried over `dt` [s] without noise."""
+    """Estimate of Channel-SLAM predicted `dt` [s] ahead at constant velocity without noise."""
     return ahead_of(estimate(state, config), dt)
 
 
@@ -98,15 +101,14 @@ def step(
 
 
 def estimate(state: ChannelSlamState, config: ChannelSlamConfig) -> SlamEstimate:
-    """Channel-SLAM's pose (mean, covariance, samples), and its virtual transmitters whose place is known."""
+    """Estimate of Channel-SLAM: moments and samples of the pose, and virtual transmitters whose place is known."""
     found = known_points(state.sums, 0.5)
     clear = np.trace(found.covariance, axis1=1, axis2=2) < config.shown_std**2
     return reported(state.agent, found.keep(clear), config.num_samples)
 
 
 def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> ChannelSlamState:
-    """Channel-SLAM's agent and virtual transmitters after `dt` [s]; the past state of every `course_stride` cycles is
-    kept."""
+    """Predict Channel-SLAM's agent and virtual transmitters over `dt` [s]; every `course_stride`-th state is kept."""
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
@@ -116,7 +118,7 @@ def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> Chan
 def _label(
     state: ChannelSlamState, scan: Scan, dt: float, config: ChannelSlamConfig
 ) -> tuple[ChannelSlamState, Integers]:
-    """Channel-SLAM's tracks after this cycle's ranges, and each range's label (M,); ended tracks' transmitters go."""
+    """Channel-SLAM's state with tracks after a scan, without transmitters of ended ones, and ranges' labels (M,)."""
     tracks = tracker.advance(state.tracks, dt, config.range_acceleration)
     found = assign(tracks, scan.length, scan.std, config.gate)
     speed = float(np.linalg.norm(state.agent.pose[1]))
@@ -140,9 +142,9 @@ def _keep(state: ChannelSlamState, rows: Booleans, config: ChannelSlamConfig) ->
 def _correct(
     state: ChannelSlamState, label: Integers, scan: Scan, model: Bistatic, config: ChannelSlamConfig
 ) -> tuple[ChannelSlamState, Floats]:
-    """Channel-SLAM's course and virtual transmitters after their ranges; those that do not fit for long are dropped."""
+    """Channel-SLAM's state and squared innovations after a scan's ranges; transmitters that long misfit are dropped."""
     agent = state.agent
-    sight = look(state.sums, agent.course, agent.pose[0], model)
+    sight = predict_ranges(state.sums, agent.course, agent.pose[0], model)
     own = (state.sums.ident[:, None] == label).astype(float)
     hit, shown = np.nonzero(own)
     squares = _squares(state.sums, sight, agent.course, scan, hit, shown)
@@ -159,7 +161,7 @@ def _correct(
 def _squares(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
 ) -> Floats:  # fmt: skip
-    """Squared normalised innovations of Channel-SLAM's virtual transmitters that were seen, each of its whole sum."""
+    """Squared normalised innovations of those virtual transmitters of Channel-SLAM whose ranges were measured."""
     mean, variance = range_moments(sums, sight, course)
     return (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
 
@@ -167,7 +169,7 @@ def _squares(
 def _give_birth(
     state: ChannelSlamState, label: Integers, scan: Scan, strong: Booleans, config: ChannelSlamConfig
 ) -> ChannelSlamState:
-    """Channel-SLAM's new virtual transmitters, for confirmed tracks seen now that have none, up to `max_paths`."""
+    """Channel-SLAM's state with new virtual transmitters for confirmed tracks seen now, at most `max_paths` in all."""
     ready = state.tracks.label[(state.tracks.hits >= config.confirm_hits) & (state.tracks.misses == 0)]
     rows = np.flatnonzero(np.isin(label, ready) & ~np.isin(label, state.sums.ident))
     rows = rows[np.argsort(label[rows])][: config.max_paths - len(state.sums.ident)]

@@ -1,4 +1,4 @@
-"""The tracker in front of Channel-SLAM: ranges of one path over time, under one label.
+"""Tracker of ranges in front of Channel-SLAM: it keeps the ranges of one path over time under one label.
 
 In the publication a Kalman enhanced super resolution tracker (KEST) follows the paths in the signal itself. Here the
 receiver's ranges are given, and a Kalman filter of range and rate a path, with one assignment a cycle, labels them.
@@ -16,32 +16,32 @@ UNLABELLED = -1
 
 
 class RangeTracks(NamedTuple):
-    """T tracks."""
+    """T tracks of ranges over time, each a Kalman filter of range and range rate."""
 
     mean: Floats
-    """(T, 2) range [m] and its rate [m/s]."""
+    """Mean (T, 2) of range [m] and range rate [m/s]."""
     covariance: Floats
-    """(T, 2, 2)."""
+    """Covariance (T, 2, 2) of range and range rate."""
     label: Integers
-    """(T,) number for life."""
+    """Label (T,), a number for life."""
     hits: Integers
-    """(T,) ranges so far."""
+    """Number (T,) of ranges so far."""
     misses: Integers
-    """(T,) cycles since the last range."""
+    """Number (T,) of cycles since the last range."""
 
     def keep(self, rows: Booleans) -> "RangeTracks":
-        """Some of the tracks."""
+        """Some of the tracks of ranges, by a mask (T,)."""
         return RangeTracks._make(column[rows] for column in self)
 
 
 def no_tracks() -> RangeTracks:
-    """No tracks of ranges yet."""
+    """Empty set of range tracks."""
     whole = np.zeros(0, dtype=np.int64)
     return RangeTracks(np.zeros((0, 2)), np.zeros((0, 2, 2)), whole, whole, whole)
 
 
 def advance(tracks: RangeTracks, dt: float, acceleration: float) -> RangeTracks:
-    """Range tracks over `dt` [s], the rate drifting with white acceleration of standard deviation [m/s^2]."""
+    """Predict range tracks over `dt` [s], the rate drifting by white acceleration of a standard deviation [m/s^2]."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     noise = acceleration**2 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
     covariance = transition @ tracks.covariance @ transition.T + noise
@@ -49,7 +49,7 @@ def advance(tracks: RangeTracks, dt: float, acceleration: float) -> RangeTracks:
 
 
 def assign(tracks: RangeTracks, length: Floats, std: Floats, gate: float) -> Integers:
-    """Track row (M,) that each range continues, -1 for none: the cheapest one-to-one assignment within the gate."""
+    """Row (M,) of the track that each range continues, -1 for none: cheapest one-to-one assignment within the gate."""
     variance = tracks.covariance[:, 0, 0][:, None] + std**2
     square = (length - tracks.mean[:, :1]) ** 2 / variance
     gain = np.where(square < gate, gate - square, 0.0)
@@ -63,7 +63,7 @@ def assign(tracks: RangeTracks, length: Floats, std: Floats, gate: float) -> Int
 def follow(
     tracks: RangeTracks, found: Integers, length: Floats, std: Floats, rate_std: float, first: int
 ) -> tuple[RangeTracks, Integers]:
-    """Tracks after their ranges, with new ones (labels from `first`) for ranges that continue none, and labels (M,)."""
+    """Range tracks corrected by their ranges, with new ones (labels from `first`) for others, and all labels (M,)."""
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     hit = np.flatnonzero(found != UNLABELLED)
     rows = found[hit]

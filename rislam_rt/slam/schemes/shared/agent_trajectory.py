@@ -1,7 +1,7 @@
-"""The agent's course: present position and velocity and, every few cycles, past ones, as one Gaussian.
+"""The agent's trajectory: present position and velocity and, every few cycles, past ones, as one Gaussian.
 
-Given the course, what different features tell is independent; given the present state alone it is not, and a filter
-that takes it so makes up knowledge of directions that nothing measures (start; turn of map and course about it).
+Given the trajectory, what different features tell is independent; given the present state alone it is not, and a filter
+that takes it so makes up knowledge of directions that nothing measures (start; turn of map and trajectory about it).
 """
 
 from typing import NamedTuple
@@ -15,22 +15,23 @@ RIDGE = 1e-10
 
 
 class AgentTrajectory(NamedTuple):
-    """A Gaussian over W states of 2A numbers, A axes: position [m] and velocity [m/s]; the present one first."""
+    """Gaussian over W states of the agent, position [m] and velocity [m/s] along A axes each; the present one first."""
 
     mean: Floats
-    """(2A W,)."""
+    """Mean (2A W,) of the states."""
     covariance: Floats
-    """(2A W, 2A W)."""
+    """Covariance (2A W, 2A W) of the states."""
     nominal: Floats
-    """(2A W,) the mean as it would be had nothing been measured."""
+    """Mean (2A W,) of the states as it would be had nothing been measured."""
     axes: int
+    """Number A of axes, 2 or 3."""
     blind: Floats
-    """(2A, 2A) covariance of the present state as it would be had nothing been measured."""
+    """Covariance (2A, 2A) of the present state as it would be had nothing been measured."""
     start_variance: float
-    """Of the position that was told at the start, per axis [m^2]."""
+    """Variance [m^2] per axis of the position that was told at the start."""
 
     def turn(self) -> Floats:
-        """(2A W,) unit vector: how the states change as all turn about the start, as reckoned before any range.
+        """Unit vector (2A W,) along which the trajectory's states change as all turn about the start, before any range.
 
         Ranges to unknown places tell nothing of such a turn. Linearised now here and now there, they seem to (Huang,
         Mourikis and Roumeliotis, 2010): whatever a range seems to tell of this one direction is taken off it.
@@ -44,21 +45,21 @@ class AgentTrajectory(NamedTuple):
 
     @property
     def width(self) -> int:
-        """2A."""
+        """Number 2A of coordinates of one state."""
         return 2 * self.axes
 
 
 class Step(NamedTuple):
-    """What of the former course is known when the new one is: a regression with an error."""
+    """Regression of the agent's former trajectory on the one after a time step, with its error."""
 
     transfer: Floats
-    """(n, n') of deviations of the former course on those of the new one."""
+    """Regression matrix (n, n'): deviations of the former trajectory per deviation of the new one."""
     residual: Floats
-    """(2A, 2A) covariance of what the regression misses of the former present state."""
+    """Covariance (2A, 2A) of what the regression misses of the former present state."""
 
 
 def begin(position: Floats, velocity: Floats, position_std: float, velocity_std: float) -> AgentTrajectory:
-    """The agent's trajectory at its start: the start prior; position and velocity (A,)."""
+    """Gaussian trajectory of the agent at its start, from the prior of position (A,) [m] and velocity (A,) [m/s]."""
     std = np.concatenate([np.full(len(position), position_std), np.full(len(velocity), velocity_std)])
     mean = np.concatenate([position, velocity])
     return AgentTrajectory(mean, np.diag(std**2), mean, len(position), np.diag(std**2), position_std**2)
@@ -90,7 +91,7 @@ def advance(course: AgentTrajectory, dt: float, accelerate: Floats, keep: bool) 
 
 
 def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
-    """The agent's former trajectory regressed on the new one, where the former present state is left out."""
+    """Regression of the agent's former trajectory on the new one, where the former present state is left out."""
     width, size = course.width, len(course.mean)
     scale = np.sqrt(np.maximum(np.diag(course.covariance), 1e-18))
     scaled = course.covariance / np.outer(scale, scale)
@@ -107,7 +108,7 @@ def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Inverse of a positive semidefinite matrix, on what is not rounding."""
+    """Pseudo-inverse of a positive semidefinite matrix (D, D), directions of mere rounding left out."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-24))
     unit = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(matrix / unit, rcond=1e-9, hermitian=True)) / unit

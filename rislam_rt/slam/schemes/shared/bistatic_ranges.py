@@ -1,4 +1,4 @@
-"""Ranges of a feature that the agent hears over two ends, which it carries."""
+"""Bistatic ranges of a feature: lengths from Tx over the feature to Rx, which the agent carries both."""
 
 from typing import NamedTuple
 
@@ -8,12 +8,12 @@ from rislam_rt.arrays import Floats
 
 
 class Bistatic(NamedTuple):
-    """The range of a feature `a` is `|p_T - a| + |a - p_R|`, both ends carried by the agent."""
+    """Model of a feature's range, `|p_T - a| + |a - p_R|` of a feature at `a`, both ends carried by the agent."""
 
     tx: Floats
-    """(3,) [m] Tx from the agent's position, turned by the heading."""
+    """Tx (3,) [m] from the agent's position, turned by the heading."""
     rx: Floats
-    """(3,) [m]."""
+    """Rx (3,) [m] from the agent's position, turned by the heading."""
 
 
 def length_of(vector: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What the filters that hear delays alone have in common: the agent, what they are told of it, and its ranges."""
+"""The agent as the rival filters by delay alone hold it: its trajectory, what it is told, the ranges it measures."""
 
 from typing import NamedTuple
 
@@ -19,39 +19,42 @@ from rislam_rt.slam.start_prior import StartPrior
 
 
 class DelayAgent(NamedTuple):
-    """The agent as a filter of delays knows it."""
+    """State of the agent in a rival filter by delay alone: trajectory, height, heading, body and receiver."""
 
     course: AgentTrajectory
+    """The agent's trajectory."""
     height: Floats
-    """(2,) height [m] and vertical velocity [m/s], where they are known."""
+    """Height [m] and vertical velocity [m/s] (2,), where they are known."""
     heading: float
-    """[rad]."""
+    """Heading [rad]."""
     body: Body
+    """Places of Tx and Rx on the agent."""
     sensor: SensorModel
     """What the agent is told of its receiver."""
     cycle: int = 0
+    """Number of cycles with a time step so far."""
     strain: float = 1.0
     """Running mean of the NIS per degree of freedom: 1 when all is well."""
 
     @property
     def pose(self) -> Floats:
-        """(2, 3) position [m] and velocity [m/s] of the agent that the filter of delays works at."""
+        """Mean position [m] and velocity [m/s] (2, 3) of the agent in a filter by delay alone."""
         return lift(self.course.mean[: self.course.width], self.height)
 
     def strained(self, nis: float, dof: int, rate: float) -> "DelayAgent":
-        """The agent after a cycle of that NIS, which has the share `rate` in the running mean."""
+        """Agent whose running mean of the NIS per degree of freedom has taken in a cycle's, of the weight `rate`."""
         return self._replace(strain=self.strain + rate * (nis / dof - self.strain)) if dof else self
 
 
 def begin_agent(start: StartPrior, axes: int, body: Body, sensor: SensorModel) -> DelayAgent:
-    """The agent at its start, of which 2 or 3 axes are filtered."""
+    """Agent of a filter by delay alone before the first cycle, from the start prior; 2 or 3 axes are filtered."""
     course = begin(start.position[:axes], start.velocity[:axes], start.position_std, start.velocity_std)
     height = np.array([start.position[2], start.velocity[2]])
     return DelayAgent(course, height, float(start.heading), body, sensor)
 
 
 def move_agent(agent: DelayAgent, dt: float, sigma_a: float, stride: int) -> tuple[DelayAgent, Step]:
-    """The agent after `dt` [s] of white acceleration; its past state of every `stride` cycles is kept."""
+    """Agent of a filter by delay alone after `dt` [s] of white acceleration; every `stride` cycles a state is kept."""
     keep = len(agent.course.mean) == agent.course.width or agent.cycle % stride == 0
     course, step = advance(agent.course, dt, np.full(agent.course.axes, sigma_a), keep)
     height = agent.height + np.array([dt * agent.height[1], 0.0])
@@ -61,7 +64,7 @@ def move_agent(agent: DelayAgent, dt: float, sigma_a: float, stride: int) -> tup
 def hear_ranges(
     agent: DelayAgent, measurement: Measurement, config: DelayConfig
 ) -> tuple[Integers, Scan, Booleans, Bistatic]:
-    """Rows (M,) of a measurement that the agent uses, their ranges, which are wall returns, and how ranges come about.
+    """Rows (M,) of the components that the agent uses, their ranges, which are wall returns, and the range model.
 
     The direct path is left out; wall returns too, with `config.planes` False.
     """
@@ -74,7 +77,7 @@ def hear_ranges(
 
 
 def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimate:
-    """The estimate of a filter of delays: mean and covariance of the pose, samples of it, and the map."""
+    """SLAM estimate of a filter by delay alone: mean, covariance and samples of the pose, and features as the map."""
     belief, axes = over_all_turns(agent.course), agent.course.axes
     position, velocity = lift(belief.mean, agent.height)
     rows = np.r_[0:axes, 3 : 3 + axes]
@@ -86,6 +89,7 @@ def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimat
 
 
 def _map(points: Points) -> MapEstimate:
+    """Map of a SLAM estimate that holds points alone, none of them a panel, and no walls."""
     count = len(points.ident)
     return MapEstimate(
         points.ident, points.mean, points.covariance, np.full(count, -1), np.zeros(count), np.zeros(count),

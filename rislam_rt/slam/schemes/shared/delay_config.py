@@ -1,4 +1,4 @@
-"""Configuration that all filters of delays alone share."""
+"""Configuration that all filters by delay alone share."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from rislam_rt.slam.setting_checks import check_counts, check_inside, check_name
 
 @dataclass(frozen=True, slots=True)
 class DelayConfig:
-    """Agent, features (of Channel-SLAM: virtual transmitters) and their ranges. SI units."""
+    """Settings of the agent, the features and their ranges in the rival filters by delay alone. SI units."""
 
     sigma_a: float = 0.01
     """Standard deviation of the white acceleration [m/s^2]."""
@@ -25,22 +25,22 @@ class DelayConfig:
     smallest_std: float = 0.003
     """Smallest standard deviation of a range that is believed [m]."""
     birth_turns: int = 6
-    """Gaussians of a new feature over the turn about the walk, from horizontal to horizontal."""
+    """Number of Gaussians of a new feature over its angle about the direction of motion, from horizon to horizon."""
     wanderers: float = 0.5
-    """Probability that a new weak feature is not a point that stays."""
+    """Probability that a new weak feature is no static point but one that wanders."""
     drift_length_std: float = 0.003
-    """Random walk of a wandering feature's distance in one step [m]."""
+    """Random walk [m] of a wandering feature's distance in one step."""
     drift_angle_std: float = 0.01
-    """Random walk of the cosine of its angle off the walk in one step."""
+    """Random walk, in one step, of the cosine of a wandering feature's angle off the direction of motion."""
     share_threshold: float = 1e-3
     """Share below which a Gaussian of a feature is dropped."""
     course_stride: int = 40
-    """Cycles from one past state of the agent that is kept to the next."""
+    """Number of cycles from one past state of the agent that is kept to the next."""
     num_samples: int = 32
-    """Positions handed to the phase design."""
+    """Number of equally likely positions handed to the phase design."""
 
     def check(self, name: str) -> None:
-        """Check the settings that filters of delays share, in the section `name`."""
+        """Check the settings that filters by delay alone share, of the section `name`; ConfigError for a bad one."""
         check_counts(name, self, ("birth_turns", "course_stride", "num_samples"))
         check_inside(name, self, ("sigma_a", "smallest_std"), np.inf, "a positive number")
         check_inside(name, self, ("specular_ratio",), np.inf, "a positive number, or none")
@@ -52,10 +52,10 @@ class DelayConfig:
 
     @property
     def axes(self) -> Floats:
-        """(3,) ones for the axes that are filtered."""
+        """Ones (3,) for the position's axes that are estimated, zero for a known height."""
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
     @property
     def wander(self) -> Floats:
-        """(3,) standard deviations by which a wanderer's distance, cosine and turn walk in one step."""
+        """Standard deviations (3,) by which a wandering feature's distance, cosine and turn walk in one step."""
         return np.array([self.drift_length_std, self.drift_angle_std, 0.0])

@@ -1,13 +1,14 @@
-"""The gauge, what delays cannot tell of the agent and leave as it was told: the belief that is reported.
+"""Gauge freedom of ranges: what delays cannot tell of the agent, and the belief that is reported over all of it.
 
-Ranges to places that nobody knows are the same for every course and map that are moved, turned about the vertical or
-mirrored in a vertical plane together. (With both ends at one point they are exactly so; a baseline b adds b^2 / 4r.)
-So they tell the *shape* of the course, its length and speed, while place, direction and the side to which it bends keep
-the distribution that start and motion gave them. As that is symmetric about the direction told, so is the posterior:
-its mean lies on the line told, whatever the ranges were, and its spread across is that of dead reckoning.
+Ranges to places that nobody knows are the same for every trajectory and map that are moved, turned about the vertical
+or mirrored in a vertical plane together. (With both ends at one point they are exactly so; a baseline b adds b^2 / 4r.)
+So they tell the *shape* of the trajectory, its length and speed, while place, direction and the side to which it bends
+keep the distribution that start and motion gave them. As that is symmetric about the direction told, so is the
+posterior: its mean lies on the line told, whatever the ranges were, and its spread across is that of dead reckoning.
 
 A filter with one Gaussian cannot hold a distribution that is the same on a whole arc. It works at one of the equivalent
-courses, as good as any other (the gauge), and this module turns what it knows there into mean and covariance over all.
+trajectories, as good as any other (the gauge), and this module turns what it knows there into mean and covariance over
+all.
 """
 
 from typing import NamedTuple
@@ -18,20 +19,20 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 
 LEAST_WAY = 1e-6
-"""Displacement [m] or speed [m/s] below which there is no direction to speak of."""
+"""Displacement [m] or speed [m/s] below which there is no direction of motion."""
 
 
 class Reported(NamedTuple):
-    """Moments of the present state over all courses that the ranges cannot tell apart."""
+    """Mean and covariance of the agent's present state over all trajectories that ranges cannot tell apart."""
 
     mean: Floats
-    """(2A,) position [m] and velocity [m/s]."""
+    """Mean (2A,) of position [m] and velocity [m/s]."""
     covariance: Floats
-    """(2A, 2A)."""
+    """Covariance (2A, 2A) of position and velocity."""
 
 
 def over_all_turns(course: AgentTrajectory) -> Reported:
-    """Moments of the course over what ranges leave free (the gauge): turns and mirror images about the start.
+    """Mean and covariance of the agent's present state over the gauge of ranges: turns and mirrors about the start.
 
     The displacement is `L (cos t, sin t)` off the direction told, `L` as filtered, `t` normal with zero mean and the
     standard deviation that dead reckoning gives: `E cos t = exp(-v / 2)`, `var cos t = (1 - exp(-v))^2 / 2`. The
@@ -63,15 +64,14 @@ def over_all_turns(course: AgentTrajectory) -> Reported:
 
 
 def _frame(ahead: Floats, axes: int) -> Floats:
-    """(2A, 2A) turn of the gauge's axes: from room axes to along, across (and up), for position and velocity."""
+    """Rotation (2A, 2A) of position and velocity from room axes to along and across the direction `ahead` (and up)."""
     turn = np.eye(axes)
     turn[:2, :2] = [[ahead[0], ahead[1]], [-ahead[1], ahead[0]]]
     return np.asarray(np.kron(np.eye(2), turn), dtype=np.float64)
 
 
 def _of_shape(course: AgentTrajectory, along: Floats, ahead: Floats) -> Floats:
-    """Covariance (2A, 2A) of what the gauge leaves: distance and speed in the places of "along", heights; zeros
-    across."""
+    """Covariance (2A, 2A) of what ranges tell: distance and speed in the places of "along", heights; zeros across."""
     axes, width = course.axes, course.width
     rows = np.zeros((width, len(course.mean)))
     rows[0, :2] = along

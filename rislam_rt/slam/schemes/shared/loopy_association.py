@@ -15,17 +15,17 @@ class Association(NamedTuple):
     """Messages and marginals of K legacy features and M measurements."""
 
     to_feature: Floats
-    """(K, M) message of every measurement to every feature, relative to that of "missed"."""
+    """Message (K, M) of every measurement to every feature, relative to that of "missed"."""
     feature: Floats
-    """(K, M+1) probability that the feature made measurement m; last column: none."""
+    """Probability (K, M+1) that a feature made measurement m; last column: none."""
     unclaimed: Floats
-    """(M,) probability that no legacy feature made the measurement."""
+    """Probability (M,) that no legacy feature made the measurement."""
     rounds: int
     """Rounds until the messages stood still."""
 
 
 def associate(missed: Floats, pair: Floats, fresh: Floats, iterations: int, tolerance: float) -> Association:
-    """Approximate marginals of the one-to-one association.
+    """Approximate marginals of the one-to-one association of features with measurements, by loopy belief propagation.
 
     Parameters
     ----------

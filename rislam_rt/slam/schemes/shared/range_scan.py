@@ -1,4 +1,4 @@
-"""A scan, the ranges of one step, and how likely each is the first of a feature never seen."""
+"""Scan of ranges measured in one cycle, and how likely each range is a new feature's first."""
 
 from typing import NamedTuple
 
@@ -8,23 +8,23 @@ from rislam_rt.arrays import Floats
 
 
 class Scan(NamedTuple):
-    """What the receiver measured in a step."""
+    """Ranges that the receiver measured in one cycle."""
 
     length: Floats
-    """(M,) ranges [m], in no particular order."""
+    """Ranges (M,) [m], in no particular order."""
     std: Floats
-    """(M,) standard deviations [m]."""
+    """Standard deviations (M,) [m] of the ranges."""
 
 
 class Odds(NamedTuple):
-    """What a range is weighed against."""
+    """Detection probability of features and density of false ranges, against which a range is weighed."""
 
     detection_probability: float
-    """That a feature makes a range."""
+    """Probability that a feature makes a range in a cycle."""
     clutter_mean: float
-    """False ranges a scan, Poisson..."""
+    """Mean number of false ranges in a scan, Poisson."""
     max_range: float
-    """...uniform on (0, max_range] [m]."""
+    """Largest range [m]: false ones are uniform on (0, max_range]."""
 
     @property
     def clutter_density(self) -> float:
@@ -33,7 +33,7 @@ class Odds(NamedTuple):
 
 
 def birth_ratio(length: Floats, undetected: float, odds: Odds) -> Floats:
-    """(M,) expected density of first detections over that of clutter, for ranges (M,) [m].
+    """Expected density (M,) of new features' first detections over that of clutter, at ranges (M,) [m].
 
     `undetected` features are uniform over the sphere of `odds.max_range`, or half of it; a range has its shell's share.
     """

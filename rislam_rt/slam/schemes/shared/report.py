@@ -1,4 +1,4 @@
-"""What both rivals report: the pose over all turns and mirror images, and their features as points of a map."""
+"""Report of the rival filters: the outcome of a cycle, the pose and its samples, and features as points of a map."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import SlamEstimate
-from rislam_rt.slam.schemes.shared.sums import POINT, Sums, unit_of
+from rislam_rt.slam.schemes.shared.gaussian_sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
 
 STEP = 1e-6
@@ -15,11 +15,11 @@ STEP = 1e-6
 
 
 NIS_LIMIT = 3.0
-"""Running mean of the NIS per degree of freedom above which a filter says that it has diverged."""
+"""Running mean of the NIS per degree of freedom above which a rival filter says that it has diverged."""
 
 
 def outcome_of(num_measurements: int, num_features: int, strain: float) -> StepOutcome:
-    """Reported outcome of a cycle; `strain` is the running mean of the NIS per degree of freedom."""
+    """Reported outcome of a rival filter's cycle; `strain` is the running mean of the NIS per degree of freedom."""
     if num_measurements == 0:
         return StepOutcome.NO_MEASUREMENTS
     if num_features == 0:
@@ -28,29 +28,28 @@ def outcome_of(num_measurements: int, num_features: int, strain: float) -> StepO
 
 
 class Points(NamedTuple):
-    """V features that are points, where the filter works."""
+    """V features that a rival filter reports as points of its map."""
 
     ident: Integers
-    """(V,)."""
+    """Number (V,) of each feature, for life."""
     mean: Floats
-    """(V, 3) [m]."""
+    """Mean positions (V, 3) [m]."""
     covariance: Floats
-    """(V, 3, 3) [m^2]."""
+    """Covariances (V, 3, 3) [m^2] of the positions."""
 
     def keep(self, rows: Booleans) -> "Points":
-        """Some of the points to report."""
+        """Some of the points to report, by a mask (V,)."""
         return Points._make(column[rows] for column in self)
 
 
 def lift(known: Floats, height: Floats) -> Floats:
-    """Pose to report, (2, 3) position and velocity, of the numbers (4,) or (6,) that are filtered, and `height` (2,) if
-    they lack it."""
+    """Reported position and velocity (2, 3) from filtered coordinates (4,) or (6,), with `height` (2,) if lacking."""
     known = known.reshape(2, -1)
     return known if known.shape[1] == 3 else np.concatenate([known, height[:, None]], axis=1)
 
 
 def position_errors(covariance: Floats, count: int) -> Floats:
-    """(count, 3) [m] errors to report as samples, from the covariance (6, 6) of position and velocity.
+    """Reported samples (count, 3) [m] of the position's error, from the covariance (6, 6) of position and velocity.
 
     The same draws in every cycle: the samples move smoothly, and nothing depends on who drew before.
     """
@@ -60,7 +59,7 @@ def position_errors(covariance: Floats, count: int) -> Floats:
 
 
 def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
-    """An estimate carried over `dt` [s] without noise, as it is reported to the designer."""
+    """SLAM estimate predicted `dt` [s] ahead at constant velocity without noise, as reported to the phase design."""
     move, way = np.eye(6), dt * now.velocity
     move[:3, 3:] = dt * np.eye(3)
     covariance = move @ now.covariance @ move.T
@@ -68,7 +67,7 @@ def ahead_of(now: SlamEstimate, dt: float) -> SlamEstimate:
 
 
 def known_points(sums: Sums, threshold: float) -> Points:
-    """Features to report as points of the map: those that exist and are rather points than walls or wanderers."""
+    """Features of Gaussian sums to report as points of the map: those that exist and are rather points than others."""
     count, point = len(sums.ident), sums.kind == POINT
     held = np.bincount(sums.owner[point], sums.share[point], minlength=count)
     shown = np.flatnonzero((sums.existence > threshold) & (held > 0.5))

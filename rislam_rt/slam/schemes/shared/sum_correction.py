@@ -1,4 +1,4 @@
-"""Correction by loopy association of ranges to Gaussian sums, and messages between features and the agent's course.
+"""Correction of features' Gaussian sums and the agent's trajectory by ranges, after their loopy association.
 
 Source: Leitinger et al., arXiv 1801.04463, section V, with messages as Gaussian sums. A feature's message to the agent
 is a mixture over its Gaussians, over the ranges that it may have made, over "missed" and "does not exist"; it is
@@ -11,33 +11,33 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
+from rislam_rt.slam.schemes.shared.gaussian_sums import PredictedRanges, Sums, spread_of
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan
-from rislam_rt.slam.schemes.shared.sums import PredictedRanges, Sums, spread_of
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
 
 
 ROUNDS, TOLERANCE = 30, 1e-3
-"""Loopy association ends at this many rounds, or as messages change by less: finer than the sums that it weighs."""
+"""Largest number of rounds of loopy association, and the change of messages at which it ends: finer than the sums."""
 
 
 class Pull(NamedTuple):
-    """One range in place of all that a Gaussian may have made: same mean and variance of the predicted range after."""
+    """Equivalent single range of C Gaussians of a feature, in place of all ranges that each may have made."""
 
     miss: Floats
-    """(C,) innovation [m]."""
+    """Innovation (C,) [m] of the equivalent range."""
     variance: Floats
-    """(C,) [m^2]; `NO_VARIANCE` where ranges contradict each other, or there is none."""
+    """Variance (C,) [m^2] of the equivalent range; `NO_VARIANCE` where ranges contradict each other, or none is."""
     log_factor: Floats
-    """(C,) logarithm of the factor on the Gaussian's share."""
+    """Logarithm (C,) of the factor on the Gaussian's share."""
 
 
 def claims(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, fresh: Floats, odds: Odds
 ) -> Association:
-    """Marginals of the association of K features with M ranges, by which all are corrected."""
+    """Marginal probabilities of the association of K features with M ranges, by loopy belief propagation."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
     np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
     missed = 1.0 - sums.existence * odds.detection_probability
@@ -55,7 +55,7 @@ def _ratios(length: Floats, spread: Floats, scan: Scan, odds: Odds) -> Floats:
 def absorb(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, found: Association, odds: Odds
 ) -> tuple[Sums, AgentTrajectory]:
-    """Features and course corrected by the ranges, feature by feature, the surest first."""
+    """Correct features' Gaussian sums and the agent's trajectory by a scan of ranges, one by one, the surest first."""
     ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))
     existence, share = sums.existence.copy(), sums.share.copy()
     pulls = np.zeros((2, len(sums.owner)))
@@ -92,7 +92,7 @@ def absorb(
 
 
 def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> Pull:
-    """Correction of C Gaussians of one feature: moments over the ranges and "missed", as one range."""
+    """Equivalent single range of C Gaussians of one feature: moments of the correction over the ranges and "missed"."""
     ratio = _ratios(seen, spread, scan, odds) * message
     none = 1.0 - odds.detection_probability
     total = none + ratio.sum(axis=1)
@@ -109,7 +109,7 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
 
 
 def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:
-    """Course corrected by one feature's message: moments over its Gaussians; the rest of the weight changes nothing."""
+    """Agent's trajectory corrected by one feature's message: moments over its Gaussians, the rest changing nothing."""
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):
         return course
@@ -122,12 +122,12 @@ def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, 
 
 
 def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[Integers, Floats]:
-    """Rows of the ranges that no feature claims and that start one, and its probability of existing."""
+    """Rows of a scan's ranges that no feature claims and that start new ones, and their existence probabilities."""
     alive = found.unclaimed * (fresh - 1.0) / fresh
     rows = np.flatnonzero(alive >= birth_threshold)
     return rows, alive[rows]
 
 
 def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
-    """(M,) whether a range is of a component as strong as only a wall return is."""
+    """Whether a component (M,) is as strong as only a wall return is, by its amplitude over that of free space."""
     return ratio > (np.inf if specular_ratio is None else specular_ratio)

@@ -7,45 +7,47 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.returns import TX, Poses, linearise
+from rislam_rt.slam.predicted_returns import TX, Poses, linearise
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
-from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, judge, wanted
+from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
-from rislam_rt.slam.window.landmarks.landmark_update import seed
+from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.measurement_prediction import UnresolvedClusters
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED, MOST, NEAR, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
 def births(context: WindowState, view: CycleAssociation) -> WindowState:
-    """Examine the tracks that are due: those explained by known features are associated with them, and of the others
-    the shortest whose decision is clear adds a feature to the map."""
+    """Examine the tracks that are due for a birth: those that known features explain are associated with these, and of
+    the others the shortest with a clear decision adds a feature to the map."""
     rows = tracks.due(context.tracks, context.cycle)
     if not len(rows) or (context.cycle % STRIDE and context.cycle > 12):
         return context
     names = context.tracks.ident[rows]
-    ats = [((context.log.track == name) & ~context.log.explained).nonzero()[0] for name in names]
-    full = [place for place, at in enumerate(ats) if len(at) >= 5]
+    track_rows = [((context.log.track == name) & ~context.log.explained).nonzero()[0] for name in names]
+    full = [place for place, at in enumerate(track_rows) if len(at) >= 5]
     if not full:
         return context
-    rows, ats = rows[full], [ats[place] for place in full]
+    rows, track_rows = rows[full], [track_rows[place] for place in full]
     mean, covariance = window_gaussian.now(context.window)
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
-    histories = summarise_tracks(context, ats)
+    histories = summarise_tracks(context, track_rows)
     told = explanations(context, rows, histories, view, mean, covariance)
     panels = context.landmarks.panels
     lonely = _missing_legs(context, rows, mean)
-    beside = np.zeros(len(rows)) if context.scene.use_vt else _company(context, rows, ats, histories, mean)
+    beside = (
+        np.zeros(len(rows)) if context.scene.use_vt else _log_same_direction(context, rows, track_rows, histories, mean)
+    )
     over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
             for row, value, forms, _ in told]  # fmt: skip
-    verdicts, shares = judge(context, ats, histories, known, over, lonely, beside)
+    decisions, shares = decide_tracks(context, track_rows, histories, known, over, lonely, beside)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms, column), share in zip(told, shares, strict=True):
@@ -54,23 +56,23 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
                 gone[rows[row]] = True
                 continue
             named = idents(context.landmarks, forms)
-            if not _taken(context, ats[row], named[0]):
+            if not _taken(context, track_rows[row], named[0]):
                 part = float(view.groups.share[column])
-                context = _assign(context, ats[row], named, histories.scatter[row], part)
+                context = _assign(context, track_rows[row], named, histories.scatter[row], part)
                 gone[rows[row]] = True
     born = -1
-    for row, verdict in enumerate(verdicts):
+    for row, decision in enumerate(decisions):
         if gone[rows[row]]:
             continue
-        if not returns and verdict.is_return:
+        if not returns and decision.is_return:
             looked[rows[row]] = context.tracks.hits[rows[row]]
             continue
-        if born < 0 and wanted(verdict):
-            context, fine = _enter(context, ats[row], verdict, histories, row)
+        if born < 0 and is_clear(decision):
+            context, fine = _enter(context, track_rows[row], decision, histories, row)
             if fine:
                 born, gone[rows[row]] = row, True
                 continue
-        elif born >= 0 and wanted(verdict):
+        elif born >= 0 and is_clear(decision):
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
@@ -111,11 +113,11 @@ def _bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> 
     return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
 
 
-def _company(
-    context: WindowState, rows: Integers, ats: list[Integers], histories: TrackSummary, mean: Floats
+def _log_same_direction(
+    context: WindowState, rows: Integers, track_rows: list[Integers], histories: TrackSummary, mean: Floats
 ) -> Floats:
-    """Log odds (T,) by which a shorter path from the same direction speaks for each track being a path over unknown
-    walls on the Tx leg, and against all else.
+    """Log odds (T,) that tracks are paths over unknown walls on the Tx leg, against all else, as a shorter path arrives
+    from the same direction.
 
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
@@ -131,7 +133,7 @@ def _company(
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]
     log_odds += np.log(np.maximum(ray[:, 2], 0.1))[:, None]  # against any direction of the half sphere
-    over_panel = np.array([bool((context.log.side[at] >= PANEL).all()) for at in ats])
+    over_panel = np.array([bool((context.log.side[at] >= PANEL).all()) for at in track_rows])
     shorter = (reach < length[:, None] - CONSTANTS.depth) & (panel | ~over_panel[:, None])
     odds = np.where(shorter, np.exp(np.minimum(log_odds, 20.0)), 0.0).sum(axis=1)
     return np.asarray(np.log1p(ALIGNED * (odds - 1.0)))
@@ -219,20 +221,20 @@ def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats
 
 
 def _enter(
-    context: WindowState, at: Integers, verdict: TrackDecision, histories: TrackSummary, row: int
+    context: WindowState, at: Integers, decision: TrackDecision, histories: TrackSummary, row: int
 ) -> tuple[WindowState, bool]:
-    """Add a new feature with its track's history to the map and solve the window again; returns the state as it was,
-    and False, if they do not fit."""
+    """Add a new feature with its track's history to the map and solve the window again; if they do not fit, return the
+    state as it was, and False."""
     new = len(context.landmarks.ident)
-    holds = verdict.holds._replace(feature=np.full(len(verdict.holds.std), new))
-    window = window_gaussian.add_feature(context.window, verdict.place, holds)
-    landmarks = enter(context.landmarks, verdict.is_wall, histories.middle, len(at), 5.0, verdict.identity)
+    holds = decision.holds._replace(feature=np.full(len(decision.holds.std), new))
+    window = window_gaussian.add_feature(context.window, decision.place, holds)
+    landmarks = enter(context.landmarks, decision.is_wall, histories.middle, len(at), 5.0, decision.identity)
     forms = np.full((2, 5), UNKNOWN)
-    forms[0] = [new if part == NEW else part for part in verdict.form]
-    if verdict.kind == BESIDE:
-        forms[1] = [*forms[0][:4], verdict.known]
+    forms[0] = [new if part == NEW else part for part in decision.form]
+    if decision.kind == BESIDE:
+        forms[1] = [*forms[0][:4], decision.known]
     grown = context._replace(window=window, landmarks=landmarks)
-    share = min(max(verdict.share, 0.0), 1.0)
+    share = min(max(decision.share, 0.0), 1.0)
     grown = _assign(grown, at, idents(landmarks, forms), histories.scatter[row], share)
     window, left = resolve(grown, 3)
     if not np.isfinite(window.head).all():
@@ -241,5 +243,5 @@ def _enter(
     if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
-    grown = grown._replace(window=window, visibility=seed(context.visibility, forms[:1], landmarks, square))
+    grown = grown._replace(window=window, visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))
     return grown, True

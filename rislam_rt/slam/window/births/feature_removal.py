@@ -4,12 +4,12 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE
+from rislam_rt.slam.predicted_returns import NONE
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals
-from rislam_rt.slam.window.relinearisation import renew
+from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
@@ -17,16 +17,16 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
-    """Solve the whole window again by so many re-linearised Gauss-Newton steps; returns it and the residuals of the
-    last one."""
+    """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns it and the last step's
+    residuals."""
     for _ in range(steps):
-        window, left = renew(context, 0)
+        window, left = relinearise(context, 0)
         context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
     return context.window, left
 
 
-def release(context: WindowState, keep: Booleans) -> WindowState:
-    """Remove the features not marked in `keep` (F,) from the map; the measurements that they explained go on as
+def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
+    """Remove features (those not marked in `keep`) from the map; the measurements that they explained go on as
     tracks."""
     if keep.all():
         return context
@@ -42,7 +42,7 @@ def release(context: WindowState, keep: Booleans) -> WindowState:
 
 
 def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
-    """Begin a track for each path among the rows `lost` of the log that was detected lately."""
+    """Begin a track for each recently detected path among the rows `lost` of the measurement log."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
     fresh: list[tuple[object, ...]] = []
@@ -71,8 +71,8 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
     return WindowTracks._make([*joined, ident]), log._replace(track=track)
 
 
-def condemned(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
-    """Which features (F,) to remove: those that probably do not exist, and those that their measurements' residuals
+def features_to_remove(landmarks: WindowTable, left: Residuals, log: Log) -> Booleans:
+    """Which features (F,) of the map to remove: those that probably do not exist, and those that their residuals
     contradict."""
     gone = landmarks.log_odds < np.log(CONSTANTS.dead / (1.0 - CONSTANTS.dead))
     form = log.form[left.row, 0]

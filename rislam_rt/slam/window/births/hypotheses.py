@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.gaussian_draws import square_roots
-from rislam_rt.slam.returns import AXES, NONE, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -56,9 +56,10 @@ class Hypotheses(NamedTuple):
     over: Integers
     """(H,) row of a second known wall, on the path of a known point's image, -1 for none."""
     trials: Trials
+    """Inputs of the fits."""
 
     def take(self, rows: Any) -> "Hypotheses":
-        """Only some of the hypotheses."""
+        """Only some of the hypotheses of what caused a track."""
         trials = Trials._make(field[rows] for field in self.trials)
         return Hypotheses(self.kind[rows], self.known[rows], self.over[rows], trials)
 
@@ -81,11 +82,11 @@ def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, mid
     return KnownFeatures(place, square_roots(blocks), turn, shift)
 
 
-def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
-    """Every kind of hypothesis for every track with an initial value of its new feature; images of known points stand
-    in `image_hypotheses`."""
-    (seen, tx, rx), ray, count = digest.mean, digest.direction, len(digest.seen)
-    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, digest.middle
+def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
+    """Hypotheses of every kind of what caused each track, with initial values of the new feature; images of known
+    points in new walls stand in `image_hypotheses`."""
+    (seen, tx, rx), ray, count = summary.mean, summary.direction, len(summary.seen)
+    length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, summary.middle
     walls, once = landmarks.walls, np.array([NONE])
     turn, shift = known.turn[walls], known.shift[walls, None]
 
@@ -128,14 +129,13 @@ def hypotheses(digest: TrackSummary, known: KnownFeatures, landmarks: WindowTabl
 
 
 def _every(kinds: list[Any], column: int, shape: tuple[int, ...]) -> Any:
-    """One column of the table of kinds, broadcast to that shape for each of their known walls."""
+    """One column of the table of hypothesis kinds, broadcast to a shape for each of their known walls."""
     return np.concatenate([np.broadcast_to(kind[column], (len(kind[1]), *shape)) for kind in kinds])
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
-    """Linear parts (N, T, 2, 3, 3), translations (N, T, 2, 3) and error roots (N, T, 2, 3, 3) of the reflections in the
-    known walls that N kinds have on either leg (N, 2), `NONE` for none, at about the places (N, 2, T, 3) of T
-    tracks."""
+    """Linear parts (N, T, 2, 3, 3), translations (N, T, 2, 3) and error roots (N, T, 2, 3, 3) of the reflections in
+    known walls on either leg (N, 2) of N hypotheses, `NONE` for none, at about the places (N, 2, T, 3) of T tracks."""
     count, nowhere = spots.shape[2], (middle + 1.0, np.zeros((3, 3)), AXES, np.zeros(3))
     place, root, turn, shift = (np.concatenate([field, none[None]]) for field, none in zip(known, nowhere, strict=True))
     slope = by_wall(spots, place[legs][:, :, None], middle)
@@ -145,8 +145,8 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
 
 
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
-    """Linear part and translation (H, 3, 4) of the reflections in known walls beside whose edges new walls are sought;
-    zero elsewhere."""
+    """Linear part and translation (H, 3, 4) of the reflection in the known wall of hypotheses of a new wall whose
+    return is unresolved from its edge with that one; zero elsewhere."""
     found, rows = np.zeros((len(kind), 3, 4)), (kind == BESIDE).nonzero()[0]
     if len(rows):
         found[rows, :, :3], found[rows, :, 3] = known.turn[walled[rows]], known.shift[walled[rows]]
@@ -168,7 +168,7 @@ def _pairs(ray: Floats) -> Floats:
 
 
 def place_on_ray(ray: Floats, length: Floats, tx: Floats, rx: Floats) -> Floats:
-    """Points (..., 3) on arrival rays (..., 3) from Rx, over which the path from (mirrored) Tx positions (..., 3) has
+    """Points (..., 3) on arrival rays (..., 3) from Rx at which a path from Tx positions (..., 3), mirrored or not, has
     the given length."""
     base = tx - rx
     reach = (length**2 - np.vecdot(base, base)) / np.maximum(2.0 * (length - np.vecdot(base, ray)), 1e-3)

@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, NONE, TX
+from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     ALIGNED_TURN,
     BESIDE,
@@ -47,8 +47,8 @@ more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
-    """Log prior (H,) of the hypotheses' kinds: each wall on the path costs power, and kinds over known features are
-    shared among all of these."""
+    """Log prior (H,) of the kinds of hypotheses: each wall on the path costs power, and kinds over a known feature
+    share their probability among all such features."""
     rivals = np.where(table.known >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
     rivals[IS_IMAGE[table.kind]] = np.log(max(len(landmarks.points), 1))
     rivals += np.where(table.over >= 0, np.log(max(len(landmarks.walls), 1)), 0.0)
@@ -68,21 +68,21 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
     )
 
 
-def log_beside(table: Hypotheses, digest: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """Log probability (H,) that a new wall's return is resolved from, or comes out as one with, the return over its
-    edge with a known level or upright wall.
+def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
+    """Log probability (H,) that a new wall's return is resolved from the return over its edge with a known level or
+    upright wall, or is unresolved from it, as the hypothesis has it.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
     so does its edge.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
-    length, cell = digest.mean[0][track, 0], float(scene.sensor.cell_length[0])
+    length, cell = summary.mean[0][track, 0], float(scene.sensor.cell_length[0])
     aligned = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > ALIGNED_TURN]
     forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in aligned], dtype=np.int64).reshape(-1, 5)
     heard, _ = recall_forms(context.visibility, forms, np.ones(len(aligned), dtype=np.int64), landmarks)
     for wall, clear in zip(aligned, heard, strict=True):
-        rise = float(np.linalg.norm(known.place[wall] - digest.middle))
+        rise = float(np.linalg.norm(known.place[wall] - summary.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
@@ -94,7 +94,7 @@ def log_shared(
     table: Hypotheses, fits: Fits, evidence: Floats, none: Floats, explained: list[tuple[int, float]], middle: Floats,
     concurrent: Booleans,
 ) -> Floats:  # fmt: skip
-    """Gain (H,) in log evidence of hypotheses whose new feature other tracks ask for as well.
+    """Gain (H,) in log evidence of hypotheses whose new feature other tracks' hypotheses ask for as well.
 
     A second track that the same feature explains has nothing free left: instead of a density over the volume it counts
     that of one place given the other, against all else that it may be.
@@ -129,22 +129,22 @@ def log_shared(
     return gain
 
 
-def concurrent(context: WindowState, ats: list[Integers]) -> Booleans:
-    """Whether each two of T tracks (T, T), rows of the log each, were detected in a common cycle."""
+def concurrent(context: WindowState, track_rows: list[Integers]) -> Booleans:
+    """Whether each pair of T tracks (T, T), given as rows of the log, were detected in a common cycle."""
     cycle = context.log.cycle - context.log.cycle.min()
-    heard = np.zeros((len(ats), cycle.max() + 1))
-    for row, at in enumerate(ats):
+    heard = np.zeros((len(track_rows), cycle.max() + 1))
+    for row, at in enumerate(track_rows):
         heard[row, cycle[at]] = 1.0
     return np.asarray(heard @ heard.T > 0.0)
 
 
 def log_amplitudes(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
+    table: Hypotheses, fits: Fits, summary: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
     """Log density (H,) of the tracks' mean amplitudes under their hypotheses, given walls' reflectivity and points'
     strengths."""
     radio, track = scene.radio, table.trials.track
-    level, seen, rx = digest.log_amplitude[track], digest.mean[0][track], digest.mean[2][track]
+    level, seen, rx = summary.log_amplitude[track], summary.mean[0][track], summary.mean[2][track]
     free = np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * seen[:, 0]))
     has = (table.known >= 0) & (table.kind != BESIDE)
     ratio = np.where(has, landmarks.ratio[table.known], 0.0) if len(landmarks.ident) else np.zeros(len(track))
@@ -166,26 +166,26 @@ def log_amplitudes(
     double, wide = free + 2.0 * CONSTANTS.wall_ratio, 2.0 * CONSTANTS.wall_ratio_std**2 + CONSTANTS.fading**2
     pair = -0.5 * (level - double) ** 2 / wide - 0.5 * np.log(wide) - 20.0 * surplus**2
     amplitude = np.where(table.trials.is_wall, wall, np.where(table.trials.is_pair, pair, point))
-    rows, image = image_amplitudes(table, digest, landmarks, scene.radio)
+    rows, image = image_amplitudes(table, summary, landmarks, scene.radio)
     amplitude[rows] = image
     return amplitude
 
 
 def log_opacity(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
+    table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """Log prior (H,) of a new feature behind known walls, or of a new wall before known features: what stands between
-    occludes.
+    """Log prior (H,) of occlusion: against new features behind known walls, and against new walls in front of known
+    features.
 
     With wall returns a new wall that is heard over a known one stands where its path meets it.
     """
-    middle, walls, wall = digest.middle, landmarks.walls, table.trials.is_wall
-    pair, tx = table.trials.is_pair[:, None], digest.mean[1][table.trials.track]
+    middle, walls, wall = summary.middle, landmarks.walls, table.trials.is_wall
+    pair, tx = table.trials.is_pair[:, None], summary.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
     # the last of two walls is somewhere on the ray to the image of both: as far as a single wall would be
     foot = np.where(wall[:, None], 0.5 * (fits.place + middle), np.where(pair, 0.5 * (image + middle), fits.place))
     if use_vt:
-        rows, spot = bounces(table, fits.place, digest, known)
+        rows, spot = bounces(table, fits.place, summary, known)
         foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
     total, small = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
@@ -210,10 +210,10 @@ LEVEL_RISE, UPRIGHT_RISE = 0.9, 0.35
 
 
 def direction_beliefs(
-    place: Floats, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable
+    place: Floats, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> DirectionPriors:
     """Direction priors of a new wall at `place` (3,): upright, at right angles to a known wall, or level."""
-    span = place - digest.middle
+    span = place - summary.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
@@ -224,13 +224,13 @@ def direction_beliefs(
     elif rise < UPRIGHT_RISE:
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        rows, along = _square_axes(span[None], known.place[landmarks.walls] - digest.middle)
+        rows, along = _square_axes(span[None], known.place[landmarks.walls] - summary.middle)
         axes += list(along)
         log_odds += [float(_log_square(np.asarray(reach)))] * len(rows)
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
     return DirectionPriors(
-        np.zeros(count, dtype=np.int64), axis, axis @ digest.middle, np.full(count, std), np.array(log_odds),
+        np.zeros(count, dtype=np.int64), axis, axis @ summary.middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip
 
@@ -271,20 +271,20 @@ class HeldWalls(NamedTuple):
 
 
 def log_upright(
-    table: Hypotheses, fits: Fits, digest: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
+    table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> HeldWalls:
-    """Gain in evidence by the directions that walls have beforehand (upright, level, at right angles to another, or
-    any), and the new walls' places given these.
+    """Gain in log evidence of new walls by the directions that walls have beforehand (upright, level, at right angles
+    to another, or any), and their places given these.
 
     Without wall returns, where single walls are never born, what slants counts as the rest does, and level is asked
     along each axis: rivals that are rarer let ghosts of points through.
     """
     trials, pair, spread = table.trials, table.trials.is_pair, fits.covariance
     held = HeldWalls(np.zeros(len(pair)), fits.place.copy(), spread.copy(), np.full(len(pair), -np.inf))
-    turn, tx = trials.turn[:, 0], digest.mean[1][trials.track]
+    turn, tx = trials.turn[:, 0], summary.mean[1][trials.track]
     # what two walls do together goes across them both; an edge under the ceiling: any elevation
     mirror = (turn @ tx[..., None])[..., 0] - tx
-    span = fits.place - digest.middle + np.where(pair[:, None], digest.middle + mirror, 0.0)
+    span = fits.place - summary.middle + np.where(pair[:, None], summary.middle + mirror, 0.0)
     asked = np.isfinite(fits.cost) & np.where(pair, turn[:, 2, 2] >= 0.0, trials.is_wall)
     reach = np.maximum(np.sqrt(np.vecdot(span, span)), 0.1)
     rise, width = np.abs(span[:, 2]) / reach, np.log(reach)
@@ -310,7 +310,7 @@ def log_upright(
         held.covariance[rows] -= pull @ across
         held.log_odds[rows] = each[own, 0]
     rows = (upright & ~(pair & (turn[:, 0, 0] < 0.0))).nonzero()[0]
-    square, axis = _square_axes(span[rows], known.place[landmarks.walls] - digest.middle)
+    square, axis = _square_axes(span[rows], known.place[landmarks.walls] - summary.middle)
     rows = rows[square]
     variance = np.vecdot(axis, (spread[rows] @ axis[..., None])[..., 0]) + noise[rows]
     each = _log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)
@@ -319,6 +319,6 @@ def log_upright(
 
 
 def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
-    """Posterior log odds that a direction prior holds, from the prior ones and the wall image's offset [m] from it with
-    that variance [m^2]."""
+    """Posterior log odds that a direction prior holds of a wall, from the prior ones and the offset [m] of the wall's
+    image with its variance [m^2]."""
     return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))

@@ -13,14 +13,14 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES
+from rislam_rt.slam.predicted_returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.solver_limits import ASTRAY, HOPELESS, RIDGE, STEPS
 
 
 class Trials(NamedTuple):
-    """Inputs of the fits of H hypotheses: initial value of the new feature, and affine maps of the known walls on the
-    path."""
+    """Inputs of the fits of H hypotheses of what caused a track: initial value of the new feature, affine maps of known
+    walls."""
 
     track: Integers
     """(H,) row of the track summary."""
@@ -52,7 +52,8 @@ class Trials(NamedTuple):
 
 
 class Fits(NamedTuple):
-    """Fitted hypotheses, H of them: place of the new feature, its covariance, cost and log evidence."""
+    """Fitted hypotheses of what caused a track, H of them: place of the new feature, covariance, cost and log
+    evidence."""
 
     place: Floats
     """(H, 3) [m] of the new feature."""
@@ -69,18 +70,18 @@ class Fits(NamedTuple):
     track share."""
 
 
-def try_all(trials: Trials, digest: TrackSummary) -> Fits:
-    """Fit all hypotheses to their tracks by Gauss-Newton; those hopelessly behind after the first step are dropped, at
-    infinite cost."""
+def try_all(trials: Trials, summary: TrackSummary) -> Fits:
+    """Fit all hypotheses of what caused the tracks by Gauss-Newton; those hopelessly behind after the first step are
+    dropped, at infinite cost."""
     count = len(trials.track)
     active = np.arange(count)
     cost, log_det = np.full(count, np.inf), np.zeros(count)
     covariance, held = np.tile(AXES, (count, 1, 1)), np.tile(AXES, (count, 1, 1))
-    trust = np.ones((count, digest.seen.shape[1]))
-    common = COMMON + digest.twist.shape[-1]
+    trust = np.ones((count, summary.seen.shape[1]))
+    common = COMMON + summary.twist.shape[-1]
     place, error = trials.start.copy(), np.zeros((count, common))
     for turn in range(STEPS + 1):
-        now = _equations(trials, digest, active, place[active], error[active], trust[active])
+        now = _equations(trials, summary, active, place[active], error[active], trust[active])
         cost[active] = now.cost
         if turn == STEPS:
             covariance[active] = np.linalg.inv(now.normal)[:, common:, common:]
@@ -97,7 +98,7 @@ def try_all(trials: Trials, digest: TrackSummary) -> Fits:
         place[active] += short * step[:, common:]
         error[active] += short * step[:, :common]
         if turn == 1:
-            best = np.full(len(digest.seen), np.inf)
+            best = np.full(len(summary.seen), np.inf)
             np.minimum.at(best, trials.track, cost)
             active = (cost < best[trials.track] + 2.0 * HOPELESS).nonzero()[0]
             lost = np.ones(count, dtype=np.bool_)
@@ -125,20 +126,20 @@ class _Equations(NamedTuple):
 
 
 def _equations(
-    trials: Trials, digest: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
+    trials: Trials, summary: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
 ) -> _Equations:
-    """Normal equations of the next Gauss-Newton step of the hypotheses `rows`, at places (H, 3) and errors of all else
-    (H, E), and their costs."""
+    """Normal equations of the next Gauss-Newton step of hypotheses `rows`, at places (H, 3) and errors (H, E) of poses
+    and maps, with their costs."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
-    tx, rx = digest.tx[track], digest.rx[track]
+    tx, rx = summary.tx[track], summary.rx[track]
     turn, shift = trials.turn[rows], trials.shift[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
-    span = place - digest.middle
+    span = place - summary.middle
     scaled = span / np.maximum(np.vecdot(span, span), 1e-9)[:, None]
     inner = tx @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
-    depth = np.vecdot(scaled[:, None], inner - 0.5 * (place + digest.middle)[:, None])
+    depth = np.vecdot(scaled[:, None], inner - 0.5 * (place + summary.middle)[:, None])
     mirrored = inner - 2.0 * depth[..., None] * span[:, None]
     out, fixed = trials.far[rows][:, None, None], trials.fixed[rows][:, None, None]
     base = np.where(wall[:, None, None], mirrored, place[:, None] + np.where(pair[:, None, None], inner, 0.0))
@@ -168,15 +169,15 @@ def _equations(
     maps = _by_maps(trials, rows, by_image, toward, flip)
     split = _mix(trials, rows, rx, image, error, (second, inside, by_tx), (seen, new, pose))
     wide = np.concatenate(
-        [digest.twist[track], pose @ digest.uncertainty[track], *maps, split, new], axis=-1
+        [summary.twist[track], pose @ summary.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
-    weight = digest.weight[track] * np.sqrt(trust)[..., None]
+    weight = summary.weight[track] * np.sqrt(trust)[..., None]
     wide *= weight[..., None]
     # the share stands in the prediction itself, the other errors are linear
     size = wide.shape[-1]
     flat = wide.reshape(len(rows), -1, size)
     told = flat[..., : error.shape[1] - 1] @ error[:, :-1, None]
-    left = (digest.seen[track] - seen) * weight - told.reshape(seen.shape)
+    left = (summary.seen[track] - seen) * weight - told.reshape(seen.shape)
     squared = np.vecdot(left, left) / trust
     normal = np.swapaxes(flat, 1, 2) @ flat
     slope = (np.swapaxes(flat, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
@@ -191,8 +192,8 @@ def _equations(
 
 
 def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
-    """Slopes (H, B, 3, 3) of the predictions by the errors of the map on the new feature's near side, and of the map
-    behind it.
+    """Slopes (H, B, 3, 3) of predicted measurements by the errors of the known walls' affine maps before and behind the
+    new feature.
 
     What is seen moves by `by_image` (H, B, 3, 3) with the image that the Rx hears, its length by `toward` (H, B, 3)
     with what the Tx sees; `flip` (H, 3, 3) mirrors.
@@ -218,8 +219,8 @@ def _mix(
     trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, maps: tuple[Floats, Floats, Floats],
     seen: tuple[Floats, Floats, Floats],
 ) -> Floats:  # fmt: skip
-    """Move predictions, and their slopes by place and pose, towards the reflection in a known wall from which they are
-    unresolved, `seen` in place; returns the slope (H, B, 3, 1) by the share's error."""
+    """Move predictions, and their slopes by place and pose, in place towards the reflection in a known wall from which
+    they are unresolved; returns the slope (H, B, 3, 1) by the share's error."""
     (second, inside, by_tx), (value, new, pose) = maps, seen
     split = np.zeros((*value.shape, 1))
     both = trials.mixed[rows].nonzero()[0]
@@ -242,30 +243,30 @@ def _mix(
 
 
 def _by_image(arrival: Floats, reach: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of length and cosines by the apparent place from which a ray arrives."""
+    """Derivatives (..., 3, 3) of a path's length and cosines by the apparent place from which its ray arrives."""
     found = np.empty((*reach.shape, 3, 3))
     found[..., 0, :] = arrival
     found[..., 1:, :] = (AXES[:2] - arrival[..., :2, None] * arrival[..., None, :]) / reach[..., None, None]
     return found
 
 
-def smooth_paths(digest: TrackSummary) -> tuple[Floats, Floats]:
+def smooth_paths(summary: TrackSummary) -> tuple[Floats, Floats]:
     """Log evidence (T,) and cost (T,) of tracks as paths of none of the listed kinds, whose length and cosines change
     smoothly.
 
     Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place
     counts with a density 1 over length and cosines.
     """
-    count = len(digest.seen)
-    reach = np.maximum(digest.mean[0][:, 0], 0.3)
-    speed = np.sqrt(2.0) * digest.speed
+    count = len(summary.seen)
+    reach = np.maximum(summary.mean[0][:, 0], 0.3)
+    speed = np.sqrt(2.0) * summary.speed
     rate = speed * np.stack([np.ones(count), 1.0 / reach, 1.0 / reach], axis=1)
     bend = speed**2 * np.stack([1.0 / reach, reach**-2.0, reach**-2.0], axis=1) + 0.1 * rate
-    time = digest.time - digest.time.mean(axis=1, keepdims=True)
+    time = summary.time - summary.time.mean(axis=1, keepdims=True)
     rows = np.stack([np.ones(time.shape), time, 0.5 * time**2], axis=-1)[:, None]
     tail = CONSTANTS.tail
     trust = np.ones(time.shape)
-    value, weight = np.swapaxes(digest.seen, 1, 2), np.swapaxes(digest.weight, 1, 2)
+    value, weight = np.swapaxes(summary.seen, 1, 2), np.swapaxes(summary.weight, 1, 2)
     spread = np.stack([rate, bend], axis=-1)
     for _ in range(3):
         heavy = rows * (weight**2 * trust[:, None])[..., None]

@@ -10,7 +10,7 @@ import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.predicted_returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.path_forms import crossing, margins, planes
@@ -23,7 +23,7 @@ def over_known(table: Hypotheses) -> Booleans:
 
 
 def log_possible(
-    table: Hypotheses, place: Floats, spread: Floats, digest: TrackSummary, known: KnownFeatures
+    table: Hypotheses, place: Floats, spread: Floats, summary: TrackSummary, known: KnownFeatures
 ) -> Floats:
     """Log probability (H,) that the path over a known and a new wall is geometrically possible, over that beforehand,
     with new walls at `place` (H, 3) [m] within covariances `spread` (H, 3, 3) [m^2], known ones as uncertain as they
@@ -32,7 +32,7 @@ def log_possible(
     if not len(rows):
         return found
     track, wall = table.trials.track[rows], table.known[rows]
-    _, tx, rx = (field[track] for field in digest.mean)
+    _, tx, rx = (field[track] for field in summary.mean)
     first = (table.kind[rows] == WALL_KNOWN)[:, None]
     value, vector = np.linalg.eigh(spread[rows])
     roots = vector * np.sqrt(np.maximum(value, 0.0))[:, None, :]
@@ -41,18 +41,18 @@ def log_possible(
     new[1:4] += np.moveaxis(roots, 2, 0)
     old[4:] += np.moveaxis(known.root[wall], 2, 0)
     inner, outer = (np.where(first, one, two).reshape(-1, 3) for one, two in ((new, old), (old, new)))
-    margin, *moved = _margins(np.tile(tx, (7, 1)), np.tile(rx, (7, 1)), inner, outer, digest.middle).reshape(7, -1, 3)
+    margin, *moved = _margins(np.tile(tx, (7, 1)), np.tile(rx, (7, 1)), inner, outer, summary.middle).reshape(7, -1, 3)
     std = np.sqrt(((np.array(moved) - margin) ** 2).sum(axis=0) + STEP**2)
     found[rows] = np.log(2.0) + scipy.special.log_ndtr(margin / std).sum(axis=1)
     return found
 
 
-def bounces(table: Hypotheses, place: Floats, digest: TrackSummary, known: KnownFeatures) -> tuple[Integers, Floats]:
+def bounces(table: Hypotheses, place: Floats, summary: TrackSummary, known: KnownFeatures) -> tuple[Integers, Floats]:
     """Rows (N,) of the hypotheses over a known and a new wall, and the points (N, 3) [m] where their paths meet the new
     wall at `place`."""
     rows = over_known(table).nonzero()[0]
-    track, wall, middle = table.trials.track[rows], table.known[rows], digest.middle
-    _, tx, rx = (field[track] for field in digest.mean)
+    track, wall, middle = table.trials.track[rows], table.known[rows], summary.middle
+    _, tx, rx = (field[track] for field in summary.mean)
     first = (table.kind[rows] == WALL_KNOWN)[:, None]
     inner, outer = np.where(first, place[rows], known.place[wall]), np.where(first, known.place[wall], place[rows])
     image = reflect(tx, inner, middle)
@@ -61,7 +61,7 @@ def bounces(table: Hypotheses, place: Floats, digest: TrackSummary, known: Known
 
 
 def _met(start: Floats, stop: Floats, wall: Floats, middle: Floats) -> Floats:
-    """Points (N, 3) where the segments between places (N, 3) meet walls (N, 3), given as images of `middle`."""
+    """Points (N, 3) where segments between places (N, 3) meet walls (N, 3), given as mirror images of `middle`."""
     normal, offset = planes(wall, middle)
     return crossing(start, stop, *(np.vecdot(spot, normal) - offset for spot in (start, stop)))
 

@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.returns import poses_of
+from rislam_rt.slam.predicted_returns import poses_of
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -42,11 +42,13 @@ class Identified(NamedTuple):
     none."""
 
 
-def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats) -> Identified:
-    """Weigh every point that a track may be as RIS panel and as scatterer, by the components `ats` (rows of the log) of
-    each track, and return the gain in evidence."""
+def identify(
+    context: WindowState, track_rows: list[Integers], table: Hypotheses, fits: Fits, evidence: Floats
+) -> Identified:
+    """Weigh every point that a track may be as RIS panel and as scatterer, by each track's components (`track_rows` of
+    the log), and return the gain in evidence."""
     scene, landmarks, panels = context.scene, context.landmarks, context.scene.num_panels
-    elsewhere = np.full((len(ats), panels), -CERTAIN)
+    elsewhere = np.full((len(track_rows), panels), -CERTAIN)
     found = Identified(np.zeros(len(evidence)), unknown(len(evidence), panels), elsewhere)
     if scene.ris is None:
         found.identity.log_ris[:] = -np.inf
@@ -55,7 +57,7 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
     taken = -np.logaddexp.reduce(
         np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
     )  # but one
-    for track, at in enumerate(ats):
+    for track, at in enumerate(track_rows):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
             found.identity.log_ris[rows] = -CERTAIN
@@ -69,12 +71,12 @@ def identify(context: WindowState, ats: list[Integers], table: Hypotheses, fits:
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
     found.identity.hidden[table.kind != POINT] = 1.0
-    return found._replace(identity=found.identity.converged())
+    return found._replace(identity=found.identity.clipped())
 
 
 def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:
-    """Panel identities of the points of hypotheses `rows` (R,) after a track's whole history, its components being the
-    log's rows `at`.
+    """Panel identities (scatterer or RIS panel) of the points of a track's hypotheses `rows` (R,) after its whole
+    history, its components being the log's rows `at`.
 
     The last row stands for a panel anywhere else: amplitudes scatter as they do.
     """
@@ -112,8 +114,8 @@ LOOKS = 60
 
 
 def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
-    """Slots of the window from the first on, in blocks of at most so many, within which a code is told for all or for
-    none."""
+    """Cycles of the window from `first` on, in blocks of at most `most` cycles within which a phase code is told for
+    all or for none."""
     slots = list(range(first, len(told)))
     while slots:
         count = next((at for at, slot in enumerate(slots) if told[slot] != told[slots[0]]), len(slots))
@@ -129,7 +131,7 @@ def _codes(codes: list[RisCode | None], count: int) -> RisCode | None:
 
 
 def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:
-    """Share (R,) of the amplitude that the known walls on hypotheses' paths leave."""
+    """Share (R,) of the amplitude that known walls on the paths of hypotheses `rows` leave."""
     if not len(landmarks.ident):
         return np.ones(len(rows))
     known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, NONE, TX
+from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.births.hypotheses import (
     IS_IMAGE,
     TWO_WALLS,
@@ -45,6 +45,7 @@ class TrackDecision(NamedTuple):
     kind: int
     """Number in `hypotheses.KINDS`; -1: a path of no kind there."""
     probability: float
+    """Posterior probability of the hypothesis, with all others that put the same feature in the same place."""
     known: int
     """Row of the known wall or point, -1 for none."""
     over: int
@@ -100,50 +101,50 @@ _TEMPLATES = (
 
 
 def _weigh(
-    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures, lonely: Floats
+    context: WindowState, track_rows: list[Integers], summary: TrackSummary, known: KnownFeatures, lonely: Floats
 ) -> tuple[Hypotheses, Fits, Floats, Floats]:
-    """Fit all hypotheses of what caused T tracks, and return them, their fits, log evidences (H,), and path lengths
-    (H,) [m]: as heard, or whole periods of the sounding more."""
-    landmarks, scene, near = context.landmarks, context.scene, len(digest.seen)
+    """Fit all hypotheses of what caused T tracks; returns them, fits, log evidences (H,), and path lengths (H,) [m]: as
+    heard, or whole periods of the sounding more."""
+    landmarks, scene, near = context.landmarks, context.scene, len(summary.seen)
     owner = np.arange(near)
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
-        digest, owner = digest.farther(scene.sensor)
-    table = hypotheses(digest, known, landmarks)
+        summary, owner = summary.farther(scene.sensor)
+    table = hypotheses(summary, known, landmarks)
     if len(owner) > near:
         table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
     if not scene.use_vt:  # wall returns tell no walls
-        table = with_images(table, digest, known, landmarks)
-    fits = try_all(table.trials, digest)
+        table = with_images(table, summary, known, landmarks)
+    fits = try_all(table.trials, summary)
     track = table.trials.track
-    evidence = fits.log_evidence + log_place(table, fits.place, digest.middle)
+    evidence = fits.log_evidence + log_place(table, fits.place, summary.middle)
     evidence += log_kind(table, landmarks)
     # of what is heard too early, single returns may lie beyond the window
     evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track]], 0.0)
-    evidence += log_amplitudes(table, fits, digest, landmarks, scene) + log_opacity(
-        table, fits, digest, known, landmarks, scene.use_vt
+    evidence += log_amplitudes(table, fits, summary, landmarks, scene) + log_opacity(
+        table, fits, summary, known, landmarks, scene.use_vt
     )
-    evidence += log_beside(table, digest, known, context)
+    evidence += log_beside(table, summary, known, context)
     best = np.full(near, -np.inf)
     np.maximum.at(best, owner[track], np.where(np.isfinite(fits.cost), evidence, -np.inf))
     # so far behind nothing counts any more, whatever else speaks for it
     fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * HOPELESS, np.inf, fits.cost))
-    held = log_upright(table, fits, digest, known, landmarks, scene.use_vt)
+    held = log_upright(table, fits, summary, known, landmarks, scene.use_vt)
     evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
     if scene.use_vt:
-        right = held.log_odds + log_possible(table, held.place, held.covariance, digest, known)
-        free = log_possible(table, fits.place, fits.covariance, digest, known)
+        right = held.log_odds + log_possible(table, held.place, held.covariance, summary, known)
+        free = log_possible(table, fits.place, fits.covariance, summary, known)
         evidence += np.logaddexp(right, free) - np.logaddexp(held.log_odds, 0.0)
         upright = held.log_odds > 0.0
         place = np.where(upright[:, None], held.place, fits.place)
         spread = np.where(upright[:, None, None], held.covariance, fits.covariance)
-        evidence += log_unheard(context, table, ats, owner, evidence, place, spread, digest)
+        evidence += log_unheard(context, table, track_rows, owner, evidence, place, spread, summary)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     own = table._replace(trials=table.trials._replace(track=owner[track]))
-    return own, fits, evidence, digest.mean[0][track, 0]
+    return own, fits, evidence, summary.mean[0][track, 0]
 
 
-def judge(
-    context: WindowState, ats: list[Integers], digest: TrackSummary, known: KnownFeatures,
+def decide_tracks(
+    context: WindowState, track_rows: list[Integers], summary: TrackSummary, known: KnownFeatures,
     told: list[tuple[int, float, int]],
     lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
@@ -152,26 +153,26 @@ def judge(
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
-    `ats` are the tracks' rows of the log; `lonely` (T,) is the log probability that so few single-bounce returns are
-    heard beside a return over two unknown walls, `beside` (T,) the log odds that its direction speaks for a path over
-    unknown walls.
+    `track_rows` are the tracks' rows of the log; `lonely` (T,) is the log probability that so few single-bounce returns
+    are heard beside a return over two unknown walls, `beside` (T,) the log odds that its direction speaks for a path
+    over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table, fits, evidence, length = _weigh(context, ats, digest, known, lonely)
+    table, fits, evidence, length = _weigh(context, track_rows, summary, known, lonely)
     track = table.trials.track
-    over = identify(context, ats, table, fits, evidence)
+    over = identify(context, track_rows, table, fits, evidence)
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
             evidence += np.where(IS_IMAGE[table.kind] & (table.known == panel), over.elsewhere[track, number], 0.0)
-    smooth, _ = smooth_paths(digest)
-    none = smooth + log_no_kind(digest.mean[0], scene.use_vt) + beside
+    smooth, _ = smooth_paths(summary)
+    none = smooth + log_no_kind(summary.mean[0], scene.use_vt) + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
-    evidence += log_shared(table, fits, evidence, none, explained, digest.middle, concurrent(context, ats))
-    verdicts, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
-    for row in range(len(digest.seen)):
+    evidence += log_shared(table, fits, evidence, none, explained, summary.middle, concurrent(context, track_rows))
+    decisions, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
+    for row in range(len(summary.seen)):
         own = (track == row).nonzero()[0]
         own_told = [i for i, (which, _) in enumerate(explained) if which == row]
         weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in own_told]])
@@ -182,26 +183,27 @@ def judge(
         weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
         probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
         if best == 0:
-            verdicts.append(
+            decisions.append(
                 TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody, 0.0)
             )
             continue
         at = own[best - 1]
-        count = int((digest.weight[row, :, 0] > 0.0).sum())
+        count = int((summary.weight[row, :, 0] > 0.0).sum())
         misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
-        verdicts.append(
+        decisions.append(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
-                direction_beliefs(fits.place[at], digest, known, landmarks) if table.trials.is_wall[at] else no_holds(),
+                direction_beliefs(fits.place[at], summary, known, landmarks)
+                if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]),
             )
         )  # fmt: skip
-    return verdicts, shares
+    return decisions, shares
 
 
 def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
-    """Log prior density (T,) of tracks as paths of none of the listed kinds, from length [m] and two cosines (T, 3).
+    """Log prior density (T,) that tracks are paths of none of the listed kinds, from length [m] and two cosines (T, 3).
 
     They seem to come from anywhere in the ball of places, half as far off as they are long. With wall returns they run
     over walls that the map lacks; without, where most walls stay unknown, they are as frequent as points.
@@ -212,9 +214,8 @@ def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
 
 
 def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
-    """Which other hypotheses `own` of a track put the same kind of feature where hypothesis `at` has it: in question is
-    only over which known wall it is heard (before or after, where two stand at right angles), not whether it is
-    there."""
+    """Which of a track's other hypotheses `own` put the same kind of feature where hypothesis `at` has it, so that only
+    the known wall on the path is in question (before or after, where two stand at right angles)."""
     wall, pair = table.trials.is_wall, table.trials.is_pair | table.trials.far
     if pair[at]:
         return np.zeros(len(own), dtype=np.bool_)
@@ -228,14 +229,14 @@ COST_MEAN, COST_STD = 3.56, 2.17
 with 3 degrees of freedom."""
 
 
-def wanted(verdict: TrackDecision) -> bool:
+def is_clear(decision: TrackDecision) -> bool:
     """Whether a decision is clear enough for its feature to enter the map: likely, a fit, and located well enough to be
     linearised."""
-    if verdict.kind < 0 or verdict.kind == TWO_WALLS:
+    if decision.kind < 0 or decision.kind == TWO_WALLS:
         return False
-    holds = verdict.holds
-    information = np.linalg.inv(verdict.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
+    holds = decision.holds
+    information = np.linalg.inv(decision.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
     return bool(
-        verdict.probability > CONSTANTS.born and verdict.misfit < CONSTANTS.fit and worst < 0.1 * verdict.length
+        decision.probability > CONSTANTS.born and decision.misfit < CONSTANTS.fit and worst < 0.1 * decision.length
     )

@@ -16,8 +16,8 @@ from rislam_rt.model import SensorModel
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, free_space
-from rislam_rt.slam.returns import poses_of
-from rislam_rt.slam.window.smoother.steps import TURN
+from rislam_rt.slam.predicted_returns import poses_of
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
 from rislam_rt.slam.window.solver_limits import PERIODS, POINTS, STRENGTHS
 from rislam_rt.slam.window.state import WindowState
@@ -63,8 +63,8 @@ class TrackSummary(_Points):
         return self._replace(**per_track)
 
     def farther(self, sensor: SensorModel) -> tuple["TrackSummary", Integers]:
-        """Summaries with a row more for every path that a track may be whole periods of the sounding longer, as far as
-        a perfect mirror would be as loud, and the track (T + E,) of each row."""
+        """Summaries with more rows for the longer paths that tracks may be, whole periods of the sounding ambiguous, as
+        far as a perfect mirror would be as loud; and the track (T + E,) of each row."""
         period, count = SPEED_OF_LIGHT * sensor.period, len(self.seen)
         longest = np.exp(free_space(sensor.radio) - self.log_amplitude)
         more = np.clip(np.floor((longest - self.mean[0][:, 0]) / period), 0.0, PERIODS).astype(np.int64)
@@ -162,7 +162,8 @@ def _turned(seen: Floats, heading: Floats) -> Floats:
 
 
 def expected_scatter(shown: Floats, free: Floats, snr: Floats) -> Floats:
-    """Mean square (T, 3) to expect of tracks' residuals, in reported deviations, at a linear SNR `snr` (T, 1).
+    """Mean square (T, 3) to expect of tracks' residuals, in reported deviations, given what they have shown and their
+    linear SNR (T, 1).
 
     `shown` (T, 3) is the mean square that the tracks have shown over so many independent residuals `free` (T, 1).
 

@@ -10,7 +10,7 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
-from rislam_rt.slam.returns import poses_of, reflect
+from rislam_rt.slam.predicted_returns import poses_of, reflect
 from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known
@@ -21,16 +21,17 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def log_unheard(
-    context: WindowState, table: Hypotheses, ats: list[Integers], owner: Integers, evidence: Floats, place: Floats,
-    spread: Floats, digest: TrackSummary,
+    context: WindowState, table: Hypotheses, track_rows: list[Integers], owner: Integers, evidence: Floats,
+    place: Floats, spread: Floats, summary: TrackSummary,
 ) -> Floats:  # fmt: skip
     """Log probability (H,) that the single-bounce returns of new walls at `place` (H, 3) [m], within covariances
     `spread` (H, 3, 3) [m^2], are detected no oftener than they are; 0 for hypotheses not over a known wall.
 
-    `ats` are the tracks' rows of the log, `owner` the track of each row of the digest, `evidence` (H,) without this.
+    `track_rows` are the tracks' rows of the log, `owner` the track of each row of the summary, `evidence` (H,) without
+    this.
     """
     found, track = np.zeros(len(table.kind)), owner[table.trials.track]
-    best = np.full(len(ats), -np.inf)
+    best = np.full(len(track_rows), -np.inf)
     np.maximum.at(best, track, evidence)
     rows = (over_known(table) & (evidence > best[track] - ASIDE)).nonzero()[0]
     if not len(rows):
@@ -41,7 +42,7 @@ def log_unheard(
     seen = log.seen.copy()
     seen[:, 1:] = (rotation_z(ends.heading[slot]) @ rays(log.seen, 0.0)[..., None])[:, :2, 0]
     for row in rows.tolist():
-        out = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), digest.middle) - ends.rx
+        out = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), summary.middle) - ends.rx
         length = np.linalg.norm(out, axis=1)
         due = np.concatenate([length[:, None], out[:, :2] / length[:, None]], axis=1)
         off = seen - due[slot]
@@ -50,18 +51,18 @@ def log_unheard(
         near = scene.sensor.cell_length + doubt * np.array([1.0, 1.0 / length[-1], 1.0 / length[-1]])
         present = np.zeros(len(where), dtype=np.bool_)
         present[slot[(np.abs(off) < near).all(axis=1)]] = True
-        shows = _shows(context, table, row, length, digest) * (out[:, 2] > -CONSTANTS.dip * length)
-        mine = slot[ats[track[row]]]
+        shows = _shows(context, table, row, length, summary) * (out[:, 2] > -CONSTANTS.dip * length)
+        mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
         found[row] = log_silence(shows[span], present[span])
     return found
 
 
-def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, digest: TrackSummary) -> Floats:
+def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, summary: TrackSummary) -> Floats:
     """Detection probability (K,) of single-bounce returns of lengths (K,) [m] over the wall of hypothesis `row`, whose
     reflectivity follows from the track's amplitude."""
     radio, track, wall = context.scene.radio, table.trials.track[row], table.known[row]
-    told = digest.log_amplitude[track] - free_space(radio) + np.log(digest.mean[0][track, 0])
+    told = summary.log_amplitude[track] - free_space(radio) + np.log(summary.mean[0][track, 0])
     noise = context.landmarks.ratio_variance[wall] + CONSTANTS.fading**2
     gain = CONSTANTS.wall_ratio_std**2 / (CONSTANTS.wall_ratio_std**2 + noise)
     ratio = CONSTANTS.wall_ratio + gain * (told - context.landmarks.ratio[wall] - CONSTANTS.wall_ratio)

@@ -17,8 +17,8 @@ from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.factor import inverse
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.cholesky import inverse
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
 
@@ -64,7 +64,7 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
     found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
-    by = egomotion.agreed(found)
+    by = egomotion.agreed_velocity(found)
     return by if float(by @ by) > CELL**2 else np.zeros(3)
 
 
@@ -74,8 +74,8 @@ def log_jump() -> float:
 
 
 def shifted(window: Window, by: Floats) -> Window:
-    """Window with its last position moved by `by` (3,) [m] and its velocity kept: for a trial association, not for a
-    solution."""
+    """Sliding window with its last position moved by `by` (3,) [m] and its velocity kept: for a trial association, not
+    for a solution."""
     accel, dt = window.accel.copy(), window.step[-2:]
     # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
@@ -84,9 +84,9 @@ def shifted(window: Window, by: Floats) -> Window:
     return window._replace(accel=accel)
 
 
-def landed(window: Window, by: Floats) -> Window:
-    """Window after a jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk; velocity and map as they
-    were."""
+def after_jump(window: Window, by: Floats) -> Window:
+    """Sliding window after the agent's jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk;
+    velocity and map as they were."""
     while window.num_poses > 1:
         window = window_gaussian.slide(window)
     head, size = window.head.copy(), len(window.head)
@@ -100,7 +100,7 @@ def landed(window: Window, by: Floats) -> Window:
     return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
 
 
-def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
+def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
     """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
@@ -113,7 +113,7 @@ def ask_tracks(window: Window, log: Log, heading: Floats, baseline: float) -> eg
     return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 
-def ask_picture(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
+def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
     """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
     from the rates at which path lengths changed.
 
@@ -137,8 +137,8 @@ PAST = 10
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
-    """Window with another horizontal velocity at its start, before any birth, within `std` [m/s] or the told deviation,
-    whichever is larger."""
+    """Sliding window with another horizontal velocity at its start, before any birth, within `std` [m/s] or the told
+    deviation, whichever is larger."""
     head, hessian = window.head.copy(), window.prior.hessian.copy()
     # the tracks will be asked again, as features: their word is not to count twice
     head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], np.minimum(hessian[[3, 4], [3, 4]], std**-2.0)
@@ -146,8 +146,8 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
 
 
 def with_free_compass(window: Window, std: float) -> Window:
-    """Window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the least rate
-    of turn."""
+    """Sliding window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the
+    least rate of turn."""
     hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
@@ -156,7 +156,7 @@ def with_free_compass(window: Window, std: float) -> Window:
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
-    """Window with another head and Hessian of its prior, solved anew."""
+    """Sliding window with another head and Hessian of its prior, solved anew."""
     return window_gaussian.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
 
 

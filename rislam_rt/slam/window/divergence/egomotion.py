@@ -25,7 +25,7 @@ FEWEST = 5
 
 
 class Rates(NamedTuple):
-    """Rates of length of T tracks or explained paths, with their directions of arrival."""
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival."""
 
     toward: Floats
     """(T, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
@@ -94,8 +94,8 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
 
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
-    """Evidence of the told velocity (3,) [m/s] within `std` (3,), against any other velocity and against the told one
-    turned by a wrong compass."""
+    """Log evidence of the told velocity (3,) [m/s] within `std` (3,), from the rates of path lengths, against any other
+    velocity and against the told one turned by a wrong compass."""
     near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + CONSTANTS.walk**2)
     # the told velocity has a maximum of its own near it, which others, if louder, would draw to themselves
     starts = _starts(found, told)
@@ -119,8 +119,8 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
     )  # fmt: skip
 
 
-def agreed(found: Rates) -> Floats:
-    """Horizontal velocity (3,), or displacement, on which most of the rates agree; near zero if it may be."""
+def agreed_velocity(found: Rates) -> Floats:
+    """Horizontal velocity (3,), or displacement, on which most rates of path length agree; near zero if it may be."""
     every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), CONSTANTS.walk**2 * np.eye(2))
     return np.append(every.velocity[int(np.argmax(every.evidence))], 0.0)
 
@@ -162,8 +162,8 @@ NEAR, MOST = 0.01, 8
 
 
 def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
-    """Log likelihoods (S, T) of the rates of tracks under horizontal velocities (S, 2), and the weights (S, T) with
-    which they agree."""
+    """Log likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and the weights (S, T)
+    with which they agree."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length

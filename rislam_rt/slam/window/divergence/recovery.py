@@ -10,30 +10,30 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
 
-def ask(state: WindowState) -> tuple[WindowState, bool]:
-    """Check the motion against the rates of path lengths: before any birth a wrong start is corrected, later the odds
-    of being lost are updated; also returns whether it was corrected."""
+def check_motion(state: WindowState) -> tuple[WindowState, bool]:
+    """Check the agent's motion against the rates of path lengths: before any birth a wrong start is corrected, later
+    the odds of being lost are updated; also returns whether the start was corrected."""
     if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
         return state, False
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
     if len(state.landmarks.ident):
         if state.cycle % divergence_monitor.PAST == 0:
             lively = float(np.sqrt(motion.expected_variance(state.level[0])))
-            odds = divergence_monitor.ask_picture(state.window, state.log, state.heading, baseline, lively)
+            odds = divergence_monitor.log_other_motion(state.window, state.log, state.heading, baseline, lively)
             state = state._replace(
                 lost_log_odds=float(np.clip(state.lost_log_odds + odds, CONSTANTS.log_lost, -CONSTANTS.log_lost))
             )
         return state, False
-    if state.asked or len(state.heading) > divergence_monitor.PAST + 1:  # by then the speed may be another
+    if state.start_was_wrong or len(state.heading) > divergence_monitor.PAST + 1:  # by then the speed may be another
         return state, False
-    told = divergence_monitor.ask_tracks(state.window, state.log, state.heading, baseline)
+    told = divergence_monitor.check_start(state.window, state.log, state.heading, baseline)
     if told is None or told.log_odds <= 0.0:
         return state, False
-    state = state._replace(asked=True)
+    state = state._replace(start_was_wrong=True)
     if not told.is_compass:
         return state._replace(window=divergence_monitor.with_velocity(state.window, told.velocity, told.std)), True
     # a compass that was wrong is not trusted: its offset is estimated from now on
@@ -46,8 +46,8 @@ def ask(state: WindowState) -> tuple[WindowState, bool]:
 
 
 def restart(state: WindowState) -> WindowState:
-    """State after a restart with an empty map: the pose is kept, its position's deviation grown by `walk` beside the
-    Gaussian."""
+    """State of the window filter restarted with an empty map: the pose is kept, its position's deviation grown by
+    `walk` beside the Gaussian."""
     window = state.window
     mean, covariance = window_gaussian.now(window)
     lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
@@ -63,16 +63,16 @@ def restart(state: WindowState) -> WindowState:
         window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
         motion_mode=state.level,
-        heading=state.heading[-1:], shift=shift, lost_log_odds=0.0, asked=False,
+        heading=state.heading[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip
 
 
-def landed(state: WindowState, by: Floats) -> WindowState:
-    """State after a jump by `by` (3,) [m]: the last pose alone, with the map, and even odds of being lost until the
-    next cycle."""
+def after_jump(state: WindowState, by: Floats) -> WindowState:
+    """State of the window filter after the agent's jump by `by` (3,) [m]: the last pose alone, with the map, and even
+    odds of being lost until the next cycle."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
-        window=divergence_monitor.landed(state.window, by), motion_mode=state.level, heading=state.heading[-1:],
+        window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level, heading=state.heading[-1:],
         codes=state.codes[-1:], passed=passed, lost_log_odds=0.0,
     )  # fmt: skip

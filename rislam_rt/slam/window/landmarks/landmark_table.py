@@ -36,6 +36,7 @@ class WindowTable(NamedTuple):
     hidden: Floats
     """(F, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
     next_ident: int
+    """Number of the next feature."""
 
     @property
     def points(self) -> Integers:
@@ -70,7 +71,7 @@ class WindowTable(NamedTuple):
         return found[0], found[1]
 
     def rows(self, idents: Integers) -> Integers:
-        """Rows of features with the given idents; negative ones (`TX`, `NONE`) stay as they are."""
+        """Rows of the landmark table for features of given idents; negative ones (`TX`, `NONE`) stay as they are."""
         place = np.searchsorted(self.ident, idents)
         return np.where(idents < 0, idents, place)
 

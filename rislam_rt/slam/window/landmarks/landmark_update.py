@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
-from rislam_rt.slam.returns import TX, Poses
+from rislam_rt.slam.predicted_returns import TX, Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
@@ -17,7 +17,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     UnresolvedClusters,
 )
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 
@@ -34,12 +34,12 @@ class VisibilityObservations(NamedTuple):
 
 
 def no_observations() -> VisibilityObservations:
-    """Visibility observations of no path."""
+    """Empty record of paths' occlusion and scatter."""
     return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
 
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
-    """One number (R,) for each of the forms (R, 5) of feature rows, by idents."""
+    """One integer (R,) that encodes each of the forms (R, 5) of feature rows, by idents."""
     return np.asarray((idents(landmarks, forms) + 1) @ DIGITS)
 
 
@@ -70,17 +70,17 @@ def recall_forms(
     return np.asarray(first * (1.0 - CONSTANTS.rare) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
-def seed(
+def add_clear_paths(
     visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
 ) -> VisibilityObservations:
-    """Visibility observations with the paths (N, 5) by which a new feature was found: not occluded, and of mean squared
-    residual `scatter`."""
+    """Record of paths' occlusion and scatter with the forms (N, 5) by which a new feature was found: not occluded, and
+    of mean squared residual `scatter`."""
     count = len(forms)
     return _joined(visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter)))
 
 
 def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
-    """Visibility observations with others appended, sorted by code."""
+    """Two records of paths' occlusion and scatter as one, sorted by code."""
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
     return VisibilityObservations._make(field[order] for field in every)
@@ -93,7 +93,7 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
     )
 
 
-def learn(
+def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
     groups: UnresolvedClusters, clear: Floats, scatter: Floats, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
@@ -185,5 +185,5 @@ def _identities(
         np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).converged()
+    fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).clipped()
     return landmarks._replace(**landmarks.identity.put(points, fresh)._asdict())

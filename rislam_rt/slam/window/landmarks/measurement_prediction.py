@@ -14,10 +14,10 @@ from rislam_rt.model.sensor import detection_probability as detection_probabilit
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import EDGE, FAINT
 
 PANEL_STD = float(np.pi / np.sqrt(24.0))
@@ -29,11 +29,17 @@ class KnownEnvironment(NamedTuple):
     """What the filter is told beside its map: body, radio, sensor model, panels, and which paths to look for."""
 
     body: Body
+    """Offsets of Tx and Rx from the agent's position."""
     radio: RadioConfig
+    """Carrier, bandwidth, powers and noise."""
     sensor: SensorModel
+    """Resolution, window and detection threshold of the receiver."""
     ris: DataSheet | None
+    """Data sheet of the panels, None without any."""
     max_bounces: int
+    """Most walls on a predicted path."""
     use_vt: bool
+    """Whether wall returns, paths over walls alone, update the belief."""
 
     @property
     def num_panels(self) -> int:
@@ -167,7 +173,7 @@ ROOT_STEP = 2e-3
 
 @lru_cache(maxsize=4)
 def _detection_curve(threshold: float) -> Floats:
-    """Table of detection probabilities at square roots of the SNR from 0 on, close enough for 1e-6 in between."""
+    """Table of the detection probability at square roots of the SNR from 0 on, close enough for 1e-6 in between."""
     return detection_probability_of(np.arange(0.0, np.sqrt(threshold) + 7.0, ROOT_STEP) ** 2, threshold)
 
 

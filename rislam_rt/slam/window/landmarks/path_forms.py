@@ -3,7 +3,7 @@ leg.
 
 A form is five feature rows: the base (a point, or `TX` where the Tx itself is mirrored), two walls on the Tx leg and
 two on the Rx leg, the one next to the base first, `NONE` where there is none. What a form looks like from a pose, and
-how that moves with pose and features, is `slam.returns`.
+how that moves with pose and features, is `slam.predicted_returns`.
 """
 
 from functools import lru_cache
@@ -13,7 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns
 from rislam_rt.slam.window.solver_limits import STEP
 
 UNKNOWN = -9
@@ -21,13 +21,13 @@ UNKNOWN = -9
 
 
 def forms_apart(forms: Integers) -> Returns:
-    """Paths, `Returns`, of the forms (R, 5), with legs stored for each path separately, shared or not."""
+    """Returns of the forms (R, 5), with legs stored for each return separately, shared or not."""
     count = np.arange(len(forms))
     return Returns(np.concatenate([forms[:, :3], forms[:, [0, 3, 4]]]), count, len(forms) + count)
 
 
 def compile_forms(forms: Integers) -> Returns:
-    """Paths, `Returns`, of the forms (R, 5), with each distinct leg stored once."""
+    """Returns of the forms (R, 5), with each distinct leg stored once."""
     legs, tx, rx = forms_apart(forms)
     base = int(legs.max(initial=0)) + 3
     code = ((legs[:, 0] + 1) * base + legs[:, 1] + 1) * base + legs[:, 2] + 1
@@ -36,14 +36,14 @@ def compile_forms(forms: Integers) -> Returns:
 
 
 def forms_of(returns: Returns) -> Integers:
-    """Forms (R, 5) of the paths in `Returns`."""
+    """Forms (R, 5), base and walls on either leg, of some returns."""
     return np.concatenate([returns.legs[returns.tx], returns.legs[returns.rx][:, 1:]], axis=1)
 
 
 @lru_cache(maxsize=64)
 def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces: int) -> tuple[Returns, Integers]:
-    """All paths over points and walls of the map with up to `max_bounces` wall reflections, as `Returns` that share
-    legs, and the number of walls (R,) on each."""
+    """All returns over points and walls of the map with up to `max_bounces` walls, over legs that they share, and the
+    number of walls (R,) on each."""
     single = [(w, NONE) for w in walls] if max_bounces >= 1 else []
     double = [(a, b) for a, b in product(walls, walls) if a != b] if max_bounces >= 2 else []
     ways = [(NONE, NONE), *single, *double]
@@ -61,7 +61,8 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
 
 
 def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: Floats, poses: Poses) -> Booleans:
-    """(G,) whether each bounce of a leg (G, 3) has both its neighbours on one side of its wall; poses of one cycle.
+    """Whether each leg (G, 3) of a path is geometrically possible: every bounce has both its neighbours on one side of
+    its wall, at the poses of one cycle.
 
     Two walls at right angles throw a path back in one order or the other: the ray meets both near their edge, and which
     comes first hangs on the baseline between Tx and Rx, and on angles of which the features (F, 3) know no more than

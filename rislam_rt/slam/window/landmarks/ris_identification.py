@@ -52,7 +52,7 @@ class PanelIdentity(NamedTuple):
             field[rows] = value
         return PanelIdentity(*fields)
 
-    def converged(self) -> "PanelIdentity":
+    def clipped(self) -> "PanelIdentity":
         """Panel identities with log odds clipped (`CERTAIN`), so that new evidence can still turn them."""
         return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
 

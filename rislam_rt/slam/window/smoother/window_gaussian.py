@@ -21,9 +21,20 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.factor import inverse, solution
-from rislam_rt.slam.window.smoother.steps import FIRST, HEAD, ONE, POSE, TURN, TWO, basis, carry_on, latest, starts
+from rislam_rt.slam.window.smoother.motion_basis import (
+    FIRST,
+    HEAD,
+    ONE,
+    POSE,
+    TURN,
+    TWO,
+    basis,
+    head_order,
+    last_pose_matrix,
+    step_transition,
+)
 
 
 class Quadratic(NamedTuple):
@@ -42,7 +53,7 @@ class Quadratic(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Gaussian belief over the last K poses and F features, relative to the run's start."""
+    """Gaussian belief of the sliding window: the last K poses and F features, relative to the run's start."""
 
     head: Floats
     """(7 + 3F,) first position, its velocity, compass offset, and features."""
@@ -66,6 +77,7 @@ class Window(NamedTuple):
     covariance: Floats
     """(D, D) of head and accelerations, at the last solution."""
     holds: DirectionPriors
+    """Direction priors of the walls."""
 
     @property
     def num_poses(self) -> int:
@@ -84,8 +96,8 @@ class Window(NamedTuple):
 
 
 def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = False) -> Window:
-    """Window of one pose without features; `std` (7,) are the standard deviations of the head's numbers, 0 for what is
-    held fixed."""
+    """Belief of the sliding window with one pose and no features; `std` (7,) of the head's numbers, 0 for what is held
+    fixed."""
     head = np.concatenate([position, velocity, [0.0]])
     information = np.diag(np.maximum(std, 1e-6) ** -2.0)
     prior = Quadratic(information, np.zeros(HEAD), head)
@@ -100,7 +112,7 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
 def begin_with(
     position: Floats, velocity: Floats, std: Floats, features: Floats, covariance: Floats, *, turns: bool
 ) -> Window:
-    """Window of one pose, and of features (3F,) known beforehand with a covariance (3F, 3F)."""
+    """Belief of the sliding window with one pose, and features (3F,) known beforehand with a covariance (3F, 3F)."""
     alone, count = begin(position, velocity, std, turns=turns), len(features)
     spread = scipy.linalg.block_diag(alone.covariance, covariance)
     information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
@@ -113,7 +125,7 @@ def begin_with(
 
 
 def _basis(window: Window) -> Floats:
-    """Matrices (A, K, K + 1) that give the window's poses from its head and accelerations (see `steps.basis`)."""
+    """Matrices (A, K, K + 1) that give the window's poses from head and accelerations (see `motion_basis.basis`)."""
     return basis(window.step.tobytes(), window.turns)
 
 
@@ -128,14 +140,15 @@ def poses(window: Window) -> Floats:
 
 
 def _carried(window: Window, rows: Floats) -> Floats:
-    """Last pose, velocity and compass offset (7, ...), mapped linearly from rows (D, ...) of all the window's
-    unknowns."""
-    size, design = len(window.head), latest(window.step.tobytes(), window.turns)
+    """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
+    its unknowns."""
+    size, design = len(window.head), last_pose_matrix(window.step.tobytes(), window.turns)
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
 def now(window: Window) -> tuple[Floats, Floats]:
-    """Mean (7 + 3F,) and covariance of the last pose, its velocity, the compass offset, and the features."""
+    """Mean (7 + 3F,) and covariance of the sliding window's last pose, its velocity, the compass offset, and the
+    features."""
     return now_with_excess(window)[:2]
 
 
@@ -174,8 +187,8 @@ def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] 
 
 
 def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
-    """Window with the last slot's quadratic made from the present cycle's innovations (A, 3), in standard deviations,
-    and their jacobian (A, 3, 7 + 3F), all at full weight."""
+    """Sliding window with the last slot's quadratic made from the present cycle's innovations (A, 3), in standard
+    deviations, and their jacobian (A, 3, 7 + 3F), all at full weight."""
     spot = np.concatenate([poses(window)[-1], window.head[HEAD:]])
     # what is seen does not hang on the velocity
     flat = np.concatenate([jacobian[..., :3], jacobian[..., 6:]], axis=2).reshape(-1, len(spot))
@@ -185,7 +198,7 @@ def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
 
 
 def pose_covariance(window: Window, axis: int) -> Floats:
-    """Covariance (K, K) of all poses of the window along one axis."""
+    """Covariance (K, K) of all poses of the sliding window along one axis."""
     along, size, free = _basis(window)[axis], len(window.head), window.accel.shape[1]
     rate = [] if axis == TURN else [3 + axis]
     rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
@@ -194,8 +207,8 @@ def pose_covariance(window: Window, axis: int) -> Floats:
 
 
 def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:
-    """Append a pose to the window, `dt` [s] after the last, with prior precisions (A,) of the step's acceleration, and
-    their `surplus` (A,)."""
+    """Append a pose to the sliding window, `dt` [s] after the last, with prior precisions (A,) of the step's
+    acceleration, and their `surplus` (A,)."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -213,7 +226,7 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
 
 
 def slide(window: Window) -> Window:
-    """Marginalise the oldest pose of the window at the present estimate."""
+    """Marginalise the oldest pose of the sliding window at the present estimate."""
     size, free = len(window.head), window.accel.shape[1]
     first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
@@ -223,7 +236,7 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = float(window.step[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = carry_on(-dt, free)
+    back = step_transition(-dt, free)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
@@ -232,7 +245,7 @@ def slide(window: Window) -> Window:
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(window.surplus[0])
-    carry = carry_on(dt, free)
+    carry = step_transition(dt, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -249,21 +262,21 @@ def slide(window: Window) -> Window:
         surplus=window.surplus[1:],
         step=window.step[1:],
         prior=prior,
-        noise=_without(shaken, size, gain),
+        noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=covariance,
     )
 
 
-def _without(noise: Floats, size: int, gain: Floats) -> Floats:
-    """Covariance (size, size) of the gradient that is left when the other unknowns are eliminated by `gain`."""
+def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
+    """Covariance (size, size) of the cost's gradient that is left when the other unknowns are eliminated by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
 
 
 def solve(window: Window, *, spread: bool = True) -> Window:
-    """One Gauss-Newton step of the window on its present quadratics, and the covariance there (the old one, without
-    `spread`)."""
+    """One Gauss-Newton step of the sliding window on its present quadratics, and the covariance there (the old one,
+    without `spread`)."""
     size = len(window.head)
     hessian, gradient = _normal(window)
     if spread:
@@ -280,14 +293,15 @@ def solve(window: Window, *, spread: bool = True) -> Window:
 
 
 def _normal(window: Window) -> tuple[Floats, Floats]:
-    """Hessian and gradient of the window's whole cost (priors and measurements) by the head and the accelerations."""
+    """Hessian and gradient of the sliding window's whole cost (priors and measurements) by the head and the
+    accelerations."""
     size, (steps, free) = len(window.head), window.accel.shape
     place = poses(window)
     spot = np.concatenate([place, np.broadcast_to(window.head[HEAD:], (len(place), size - HEAD))], axis=1)
     slope, slots = window.slots.slope(spot), window.slots.hessian
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
-    along, start, edge = _basis(window), starts(free), 2 * free
+    along, start, edge = _basis(window), head_order(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
@@ -316,7 +330,7 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
 
 
 def weigh_holds(window: Window) -> Window:
-    """Window with each direction prior's posterior probability, from what all else tells of its wall."""
+    """Sliding window with each direction prior's posterior probability, from what all else tells of its wall."""
     holds = window.holds
     if not len(holds.feature):
         return window
@@ -326,8 +340,8 @@ def weigh_holds(window: Window) -> Window:
 
 
 def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: float = 1e-6) -> Window:
-    """Window with one more feature at `place` (3,), known by its direction priors `holds` and otherwise by next to
-    nothing (`ridge` [1/m^2])."""
+    """Sliding window with one more feature at `place` (3,), known by its direction priors `holds` and otherwise by next
+    to nothing (`ridge` [1/m^2])."""
     size = len(window.head)
     hessian = np.zeros((size + 3, size + 3))
     hessian[:size, :size], hessian[size:, size:] = window.prior.hessian, ridge * np.eye(3)
@@ -353,8 +367,8 @@ def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: fl
 
 
 def drop_features(window: Window, keep: Booleans) -> Window:
-    """Window without the features not marked in `keep` (F,): marginalised from what left the window, deleted from the
-    slots, which have to be re-linearised."""
+    """Sliding window without the features not marked in `keep` (F,): marginalised from what left the window, deleted
+    from the slots, which have to be re-linearised."""
     size = len(window.head)
     stays = np.concatenate([np.ones(HEAD, dtype=np.bool_), np.repeat(keep, 3)])
     inside, out = np.flatnonzero(stays), np.flatnonzero(~stays)
@@ -375,7 +389,7 @@ def drop_features(window: Window, keep: Booleans) -> Window:
         holds=holds,
         head=window.head[inside],
         prior=prior,
-        noise=_without(window.noise[np.ix_(order, order)], len(inside), gain),
+        noise=_eliminated_noise(window.noise[np.ix_(order, order)], len(inside), gain),
         slots=slots,
         covariance=window.covariance[np.ix_(kept, kept)],
     )

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rislam_rt.slam.returns import NONE, TX
-from rislam_rt.slam.window.births.feature_removal import condemned
+from rislam_rt.slam.predicted_returns import NONE, TX
+from rislam_rt.slam.window.births.feature_removal import features_to_remove
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.solver_limits import FEWEST
@@ -22,7 +22,7 @@ def _judged(residual, log_odds=(5.0, 5.0), count=FEWEST):
     form[count:, 0, 3] = 1
     left = np.zeros((2 * count, 3))
     left[:count, 0] = residual
-    return condemned(landmarks, SimpleNamespace(row=rows, left=left), SimpleNamespace(form=form))
+    return features_to_remove(landmarks, SimpleNamespace(row=rows, left=left), SimpleNamespace(form=form))
 
 
 def test_what_fits_stays_wherever_it_stands():

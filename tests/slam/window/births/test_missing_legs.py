@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.births.births import _missing_legs
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 CORNER = np.array([1.2, 1.6])
 """[m] from the agent to two upright walls at right angles."""

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import reflect
+from rislam_rt.slam.predicted_returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL, WALL_KNOWN
 from rislam_rt.slam.window.births.hypothesis_evidence import log_upright
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
@@ -31,8 +31,8 @@ def _case(kind, known):
         known=np.zeros(count, dtype=np.int64),
         trials=SimpleNamespace(track=np.zeros(count, dtype=np.int64)),
     )
-    digest = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
-    return table, digest, SimpleNamespace(place=known[None], root=np.zeros((1, 3, 3)))
+    summary = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
+    return table, summary, SimpleNamespace(place=known[None], root=np.zeros((1, 3, 3)))
 
 
 def test_of_a_wall_and_its_mirror_image_in_the_known_one_only_one_can_throw_the_path():
@@ -42,11 +42,11 @@ def test_of_a_wall_and_its_mirror_image_in_the_known_one_only_one_can_throw_the_
         # the mirror image of a plane: of two of the points that it mirrors into each other
         agent, image = reflect(np.stack([MIDDLE, new]), known, MIDDLE)
         twin = reflect(MIDDLE, image, agent)
-        table, digest, walls = _case([KNOWN_WALL, WALL_KNOWN], known)
+        table, summary, walls = _case([KNOWN_WALL, WALL_KNOWN], known)
         place = np.stack([new, twin])
         heard = [reflect(reflect(TX, first, MIDDLE), then, MIDDLE) for first, then in ((known, new), (twin, known))]
         assert np.allclose(*heard)
-        found = np.exp(log_possible(table, place, np.zeros((2, 3, 3)), digest, walls))
+        found = np.exp(log_possible(table, place, np.zeros((2, 3, 3)), summary, walls))
         # twice its probability, as beforehand either can be
         assert found.sum() < 2.0 + 1e-6
         decided += found.max() > 1.98
@@ -56,14 +56,14 @@ def test_of_a_wall_and_its_mirror_image_in_the_known_one_only_one_can_throw_the_
 def test_a_path_over_the_floor_arrives_from_below_and_is_not_heard():
     upright, spread = np.stack(2 * [_image([1.0, 0.3, 0.0], 4.0)]), np.tile(1e-6 * np.eye(3), (2, 1, 1))
     for rise, heard in ((-0.8, False), (2.2, True)):
-        table, digest, walls = _case([KNOWN_WALL, WALL_KNOWN], MIDDLE + 2.0 * rise * np.eye(3)[2])
-        assert (np.exp(log_possible(table, upright, spread, digest, walls)).max() > 1.98) == heard
+        table, summary, walls = _case([KNOWN_WALL, WALL_KNOWN], MIDDLE + 2.0 * rise * np.eye(3)[2])
+        assert (np.exp(log_possible(table, upright, spread, summary, walls)).max() > 1.98) == heard
 
 
 def test_the_path_meets_the_new_wall_in_that_wall():
     known, new = _image([1.0, 0.0, 0.0], 3.0), _image([0.2, 1.0, 0.0], 2.0)
-    table, digest, walls = _case([KNOWN_WALL, WALL], known)
-    rows, spot = bounces(table, np.stack([new, new]), digest, walls)
+    table, summary, walls = _case([KNOWN_WALL, WALL], known)
+    rows, spot = bounces(table, np.stack([new, new]), summary, walls)
     assert rows.tolist() == [0]
     assert np.isclose((spot[0] - 0.5 * (new + MIDDLE)) @ (new - MIDDLE), 0.0, atol=1e-12)
     # of one length in and out: straight on to the image of the Tx
@@ -89,11 +89,11 @@ def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other():
     flag, turn = np.zeros(3, dtype=bool), np.tile(np.eye(3), (3, 2, 1, 1))
     trials = SimpleNamespace(is_wall=~flag, is_pair=flag, turn=turn, track=np.zeros(3, dtype=np.int64))
     fits = Fits(place, spread, spread, cost, np.zeros(3), np.zeros(3))
-    digest = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
+    summary = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
     known = SimpleNamespace(place=np.zeros((0, 3)))
-    held = log_upright(SimpleNamespace(trials=trials), fits, digest, known, empty_table(), True)
+    held = log_upright(SimpleNamespace(trials=trials), fits, summary, known, empty_table(), True)
     assert np.allclose(held.gain[:2], np.log(1.0 - CONSTANTS.upright), atol=1e-6)
     assert held.gain[2] > 0.0
     assert held.log_odds[2] > CONSTANTS.log_born > held.log_odds[1]
-    alone = log_upright(SimpleNamespace(trials=trials), fits, digest, known, empty_table(), False)
+    alone = log_upright(SimpleNamespace(trials=trials), fits, summary, known, empty_table(), False)
     assert alone.gain[0] == 0.0

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.observations import OTHER, PANEL
-from rislam_rt.slam.window.births.births import _company
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.births.births import _log_same_direction
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED
 
 HEADING = 0.7
@@ -31,7 +31,7 @@ def _odds(points=NOWHERE, rows=ALL, panel=-1):
     )  # fmt: skip
     histories = SimpleNamespace(weight=np.full((4, 2, 3), 100.0))
     mean = np.concatenate([np.zeros(HEAD), np.ravel(points)])
-    return _company(context, np.arange(4), [np.array([row]) for row in range(4)], histories, mean)
+    return _log_same_direction(context, np.arange(4), [np.array([row]) for row in range(4)], histories, mean)
 
 
 def test_a_longer_way_from_the_same_direction_goes_over_a_wall():

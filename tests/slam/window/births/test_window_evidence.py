@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.model import Body
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, NONE, TX, Poses, linearise, poses_of, reflect
+from rislam_rt.slam.predicted_returns import AXES, NONE, TX, Poses, linearise, poses_of, reflect
 from rislam_rt.slam.window.births import hypothesis_fits
 from rislam_rt.slam.window.births.hypothesis_fits import COMMON, Trials, smooth_paths, try_all
 from rislam_rt.slam.window.births.track_summary import TrackSummary, scatter_of
@@ -40,24 +40,24 @@ def _mirror(middle, wall):
     return turn, reflect(np.zeros(3), wall, middle)
 
 
-def _trials(kind, digest, rng):
+def _trials(kind, summary, rng):
     """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one), or an
     image of a known point on the Rx leg: `image`, `image of image` (over a known wall first), `over` (over it last),
     `both legs` (over it on the Tx leg); on the Tx leg: `far`, `far over` (the Rx hears it over a known wall)."""
     turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
-    known = _mirror(digest.middle, digest.middle + np.array([-3.0, 1.0, 0.5]))
+    known = _mirror(summary.middle, summary.middle + np.array([-3.0, 1.0, 0.5]))
     if kind == "edge":
-        start = _wall(digest.middle)
+        start = _wall(summary.middle)
     elif kind in IMAGES:
         turn[0, 0], shift[0, 0] = 0.0, SPOT
         if kind == "image of image":
             shift[0, 0] = known[0] @ SPOT + known[1]
         if kind in ("over", "far over"):
             turn[0, 1], shift[0, 1] = known
-        start = _wall(digest.middle)
+        start = _wall(summary.middle)
     elif kind == "wall":
         turn[0, 1], shift[0, 1] = known
-        start = _wall(digest.middle)
+        start = _wall(summary.middle)
     elif kind == "point":
         turn[0, 0], shift[0, 0] = known
         start = np.array([1.5, -1.0, 2.0])
@@ -70,7 +70,7 @@ def _trials(kind, digest, rng):
     flags = np.array([kind in ("wall", "edge", *IMAGES)]), np.array([kind == "pair"])
     mixed = np.array([kind == "edge"])
     beyond = np.zeros((1, 3, 4))
-    beyond[0, :, :3], beyond[0, :, 3] = _mirror(digest.middle, digest.middle + np.array([0.2, 0.0, 3.0]))
+    beyond[0, :, :3], beyond[0, :, 3] = _mirror(summary.middle, summary.middle + np.array([0.2, 0.0, 3.0]))
     return Trials(
         np.zeros(1, dtype=np.int64),
         *flags,
@@ -87,28 +87,28 @@ def _trials(kind, digest, rng):
     )
 
 
-def _left(trials, digest, place, error):
+def _left(trials, summary, place, error):
     """Residuals of one hypothesis, through its cost's own slope: computed at `place` and `error`."""
     rows = np.zeros(1, dtype=np.int64)
-    count = digest.seen.shape[1]
-    return hypothesis_fits._equations(trials, digest, rows, place[None], error[None], np.ones((1, count)))
+    count = summary.seen.shape[1]
+    return hypothesis_fits._equations(trials, summary, rows, place[None], error[None], np.ones((1, count)))
 
 
 def test_slopes_are_those_of_the_cost():
     rng = np.random.default_rng(1)
     for kind in ("wall", "point", "pair", "edge", *IMAGES):
         # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
-        digest = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
-        trials = _trials(kind, digest, rng)
+        summary = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
+        trials = _trials(kind, summary, rng)
         step, numeric, error = 1e-4, np.zeros(COMMON + 3), np.zeros(COMMON)
         for axis in range(COMMON + 3):
             change = step * np.eye(COMMON + 3)[axis]
             high, low = (
-                _left(trials, digest, trials.start[0] + sign * change[COMMON:], sign * change[:COMMON]).cost[0]
+                _left(trials, summary, trials.start[0] + sign * change[COMMON:], sign * change[:COMMON]).cost[0]
                 for sign in (1.0, -1.0)
             )
             numeric[axis] = (high - low) / (2.0 * step)
-        found = _left(trials, digest, trials.start[0], error).slope[0]
+        found = _left(trials, summary, trials.start[0], error).slope[0]
         # the cost is (4 + 3) log(1 + r^2 / 4): 7/4 of r^2 where residuals are small, and counts twice; ridge 1e-3 apart
         np.testing.assert_allclose(found[COMMON:], -0.5 * numeric[COMMON:] * 4.0 / 7.0, rtol=1e-3, atol=1e-8)
         np.testing.assert_allclose(found[:COMMON], -0.5 * numeric[:COMMON] * 4.0 / 7.0, rtol=1e-3, atol=1e-8)
@@ -117,9 +117,9 @@ def test_slopes_are_those_of_the_cost():
 def test_the_kernel_sees_what_the_measurement_library_sees():
     """Two ways to one prediction: affine maps here, legs over features there."""
     rng = np.random.default_rng(2)
-    digest = _digest(5, rng=rng)
-    middle = digest.middle
-    poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
+    summary = _digest(5, rng=rng)
+    middle = summary.middle
+    poses = Poses(summary.tx[0], summary.rx[0], np.zeros(summary.tx.shape[1]))  # cosines in the room's axes
     known, new = middle + np.array([-3.0, 1.0, 0.5]), _wall(middle)
     anchors = np.stack([middle, middle, middle])
     for kind, form, start in (
@@ -132,28 +132,28 @@ def test_the_kernel_sees_what_the_measurement_library_sees():
         ("far", (2, 1, NONE, NONE, NONE), new),
         ("far over", (2, 1, NONE, 0, NONE), new),
     ):
-        trials = _trials(kind, digest, rng)
+        trials = _trials(kind, summary, rng)
         features = np.stack([known, start, SPOT])
         wanted = linearise(compile_forms(np.array([form])), features, anchors, poses).seen[:, 0]
-        found = digest._replace(seen=wanted[None], weight=np.ones(digest.weight.shape))
+        found = summary._replace(seen=wanted[None], weight=np.ones(summary.weight.shape))
         # at the very place the cost is that of residuals of zero
         assert _left(trials, found, start, np.zeros(COMMON)).cost[0] < 1e-20
 
 
 def test_evidence_is_the_integral_of_the_likelihood():
     rng = np.random.default_rng(7)
-    digest = _digest(8, std=0.02, rng=rng)
-    trials = _trials("point", digest, rng)
+    summary = _digest(8, std=0.02, rng=rng)
+    trials = _trials("point", summary, rng)
     trials = trials._replace(
         turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), uncertainty=np.zeros((1, 2, 3, 3))
     )
-    digest = digest._replace(uncertainty=np.zeros(digest.uncertainty.shape))
+    summary = summary._replace(uncertainty=np.zeros(summary.uncertainty.shape))
     truth = trials.start[0]
-    poses = Poses(digest.tx[0], digest.rx[0], np.zeros(digest.tx.shape[1]))  # cosines in the room's axes
+    poses = Poses(summary.tx[0], summary.rx[0], np.zeros(summary.tx.shape[1]))  # cosines in the room's axes
     form = np.array([(0, NONE, NONE, NONE, NONE)])
     exact = linearise(compile_forms(form), truth[None], np.zeros((1, 3)), poses).seen[:, 0]
-    digest = digest._replace(seen=(exact + 0.01 * rng.standard_normal(exact.shape))[None])
-    fits = try_all(trials._replace(start=truth[None] + 0.05), digest)
+    summary = summary._replace(seen=(exact + 0.01 * rng.standard_normal(exact.shape))[None])
+    fits = try_all(trials._replace(start=truth[None] + 0.05), summary)
     # quadrature over a cube of 6 deviations about the fit, in its own axes
     value, vector = np.linalg.eigh(fits.held[0])
     nodes = np.linspace(-6.0, 6.0, 41)
@@ -165,7 +165,7 @@ def test_evidence_is_the_integral_of_the_likelihood():
     )  # fmt: skip
     rows = np.arange(len(places))
     cost = hypothesis_fits._equations(
-        every, digest, rows, places, np.zeros((len(places), COMMON)), np.ones((len(places), 8))
+        every, summary, rows, places, np.zeros((len(places), COMMON)), np.ones((len(places), 8))
     ).cost  # fmt: skip
     cell = np.prod(np.sqrt(value)) * (nodes[1] - nodes[0]) ** 3
     integral = np.logaddexp.reduce(-0.5 * cost) + np.log(cell)
@@ -175,13 +175,13 @@ def test_evidence_is_the_integral_of_the_likelihood():
 
 def test_a_smooth_path_fits_what_moves_smoothly():
     rng = np.random.default_rng(8)
-    digest = _digest(8, std=0.01, rng=rng)
-    time = digest.time[0]
+    summary = _digest(8, std=0.01, rng=rng)
+    time = summary.time[0]
     seen = np.stack([5.0 + 0.3 * time, 0.2 - 0.05 * time, 0.1 + 0.02 * time], axis=1)
-    _, smooth = smooth_paths(digest._replace(seen=seen[None]))
+    _, smooth = smooth_paths(summary._replace(seen=seen[None]))
     broken = seen.copy()
     broken[4:, 0] += 0.5
-    _, rough = smooth_paths(digest._replace(seen=broken[None]))
+    _, rough = smooth_paths(summary._replace(seen=broken[None]))
     assert smooth[0] < 5.0 < rough[0]
 
 

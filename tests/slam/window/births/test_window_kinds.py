@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import NONE, TX
+from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
 from rislam_rt.slam.window.births.hypotheses import BESIDE, KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN, known_features
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
@@ -104,13 +104,13 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     table = SimpleNamespace(
         kind=np.array([WALL, BESIDE]), known=np.array([-1, 0]), trials=SimpleNamespace(track=np.zeros(2, dtype=int))
     )
-    digest = SimpleNamespace(mean=(np.array([[40.0, 1.0, 0.0]]), None, None), middle=middle)
+    summary = SimpleNamespace(mean=(np.array([[40.0, 1.0, 0.0]]), None, None), middle=middle)
     scene = SimpleNamespace(sensor=SimpleNamespace(cell_length=np.array([0.75])))
     found = {}
     for clear in (1.0, 0.0):
         looked = VisibilityObservations(pack(form, landmarks), np.array([clear]), np.ones(1))
         context = SimpleNamespace(landmarks=landmarks, scene=scene, visibility=looked)
-        found[clear] = hypothesis_evidence.log_beside(table, digest, known, context)
+        found[clear] = hypothesis_evidence.log_beside(table, summary, known, context)
     # heard a moment ago, the ceiling throws an edge too; never heard from here, it throws none
     assert found[1.0][1] > found[1.0][0] + 2.0
     assert found[0.0][0] > found[0.0][1] + 2.0

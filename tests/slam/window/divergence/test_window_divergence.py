@@ -10,7 +10,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
 
@@ -131,7 +131,7 @@ def _window(rng):
 def test_after_a_jump_all_but_the_place_is_as_it_was():
     window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
     mean, covariance = window_gaussian.now(window)
-    after, spread = window_gaussian.now(divergence_monitor.landed(window, by))
+    after, spread = window_gaussian.now(divergence_monitor.after_jump(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
     wide[[0, 1], [0, 1]] += CONSTANTS.walk**2

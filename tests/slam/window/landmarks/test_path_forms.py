@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.returns import TX, Poses, reflect
+from rislam_rt.slam.predicted_returns import TX, Poses, reflect
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, possible_legs
 
 RX, BASELINE = np.zeros(3), 0.1

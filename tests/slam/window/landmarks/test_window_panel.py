@@ -18,7 +18,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
-from rislam_rt.slam.returns import TX as MOVING
+from rislam_rt.slam.predicted_returns import TX as MOVING
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh

@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.steps import HEAD, POSE
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
 DT, CYCLES, SIGMA_A = 0.1, 12, 0.5

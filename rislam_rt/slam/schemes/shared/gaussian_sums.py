@@ -1,4 +1,4 @@
-"""Potential features as Gaussian sums given the agent's course; their ranges, birth, motion and pruning.
+"""Potential features as Gaussian sums given the agent's trajectory: their ranges, birth, motion and pruning.
 
 A Gaussian holds three numbers about the place where the agent was at the feature's birth: distance, angle off the
 direction that it walked in, and turn about that direction. On a straight walk ranges tell the first two and never the
@@ -14,17 +14,17 @@ from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
 from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic, length_of
 
 POINT, PLANE, DRIFT = 0, 1, 2
-"""What a Gaussian holds its feature for: a point that stays, a wall (the image of the Tx moves), or a point that
-wanders, as a path over a wall and a scatterer seems to."""
+"""Kinds of a feature's Gaussian: a static point, a wall (the image of the Tx moves), or a wandering point, as a path
+over a wall and a scatterer seems to be."""
 
 NUDGE = 1e-5
 """Step of central differences [m, m/s]."""
 LEAST_SPEED = 1e-3
 """An agent that stands counts as one this fast [m/s]."""
 LEAST_ACROSS = 1e-4
-"""Smallest squared sine, for cosines that a Gaussian has beyond one."""
+"""Smallest squared sine of a feature's angle, for cosines that a Gaussian has beyond one."""
 UPRIGHT, UPRIGHT_STD = (0.0, 0.5 * np.pi, np.pi), 0.02
-"""Turns of walls and of the ceiling about a level walk, and how far off they may be [rad]."""
+"""Turns [rad] of upright walls and the ceiling about a level direction of motion, and their deviation [rad]."""
 
 
 STRONG_KINDS = np.array([0.2, 0.5, 0.3])
@@ -33,62 +33,62 @@ point."""
 
 
 def kinds_of(strong: Booleans, wanderers: float) -> Floats:
-    """(M, 3) probabilities of point, wall and wanderer for new features of strong and of weak paths."""
+    """Prior probabilities (M, 3) of point, wall and wanderer for new features, by whether paths are strong (M,)."""
     return np.where(strong[:, None], STRONG_KINDS, np.array([1.0 - wanderers, 0.0, wanderers]))
 
 
 class Sums(NamedTuple):
-    """C Gaussians of K potential features, those of one feature side by side; the course has n numbers."""
+    """Gaussian sums of K potential features, C Gaussians in all, a feature's side by side; n numbers of trajectory."""
 
     base: Floats
-    """(K, 3) mean of the agent's position at the birth [m]."""
+    """Mean position (K, 3) [m] of the agent at the feature's birth."""
     base_slope: Floats
-    """(K, 3, n) by how much it moves with the course."""
+    """Derivative (K, 3, n) of that position by the trajectory."""
     walk: Floats
-    """(K, 3) mean of the agent's velocity at the birth [m/s]."""
+    """Mean velocity (K, 3) [m/s] of the agent at the feature's birth."""
     walk_slope: Floats
-    """(K, 3, n)."""
+    """Derivative (K, 3, n) of that velocity by the trajectory."""
     speed: Floats
-    """(K,) what was taken for its horizontal speed then [m/s]; a unit of the second number, and never changed."""
+    """Horizontal speed (K,) [m/s] assumed at birth; a unit of the second number, and never changed."""
     existence: Floats
-    """(K,)."""
+    """Existence probability (K,)."""
     ident: Integers
-    """(K,) number for life."""
+    """Number (K,) of the feature, for life."""
     owner: Integers
-    """(C,) row of the feature, ascending."""
+    """Row (C,) of each Gaussian's feature, ascending."""
     kind: Integers
-    """(C,) POINT, PLANE or DRIFT."""
+    """Kind (C,) of each Gaussian: POINT, PLANE or DRIFT."""
     mean: Floats
-    """(C, 3) distance [m], angle and turn [rad], with the course at its mean."""
+    """Mean (C, 3) of distance [m], angle and turn [rad], with the trajectory at its mean."""
     slope: Floats
-    """(C, 3, n)."""
+    """Derivative (C, 3, n) of the mean by the trajectory."""
     covariance: Floats
-    """(C, 3, 3) given the course."""
+    """Covariance (C, 3, 3) given the trajectory."""
     share: Floats
-    """(C,) shares of one feature sum to one."""
+    """Share (C,) of each Gaussian; those of one feature sum to one."""
 
 
 OF_FEATURES = ("base", "base_slope", "walk", "walk_slope", "speed", "existence", "ident")
-"""Fields that have a row a feature; all others have one a Gaussian."""
+"""Fields of Gaussian sums that have one row per feature; all others have one per Gaussian."""
 Features = TypeVar("Features", bound=Any)
 """Features as named tuples with the fields `existence`, `ident`, `owner` and `share`, as `Sums`."""
 
 
 class PredictedRanges(NamedTuple):
-    """Ranges that C Gaussians predict, to first order in all and to second in the angles."""
+    """Ranges that C Gaussians of features predict, to first order in all and to second in the angles."""
 
     length: Floats
-    """(C,) [m], curvature included."""
+    """Ranges (C,) [m], curvature included."""
     by_mean: Floats
-    """(C, 3)."""
+    """Derivatives (C, 3) of the ranges by the Gaussian's mean."""
     by_course: Floats
-    """(C, n), through the agent and through the feature."""
+    """Derivatives (C, n) of the ranges by the trajectory, through the agent and through the feature."""
     own: Floats
-    """(C,) variance given the course [m^2]."""
+    """Variances (C,) [m^2] of the ranges given the trajectory."""
 
 
 def no_sums(size: int) -> Sums:
-    """No Gaussian sums yet."""
+    """Empty set of features' Gaussian sums, for a trajectory of `size` numbers."""
     none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     rows, slopes = np.zeros((0, 3)), np.zeros((0, 3, size))
     return Sums(
@@ -97,7 +97,7 @@ def no_sums(size: int) -> Sums:
 
 
 def carry(sums: Sums, step: Step, wander: Floats) -> Sums:
-    """The same beliefs about a new course; Gaussians of kind DRIFT widen by standard deviations `wander` (3,)."""
+    """Features' Gaussian sums given the trajectory after a time step; kind DRIFT widens by deviations `wander` (3,)."""
     width = len(step.residual)
     covariance = sums.covariance.copy()
     missed = sums.slope[:, :, :width]
@@ -114,7 +114,7 @@ def carry(sums: Sums, step: Step, wander: Floats) -> Sums:
 
 
 def axes_of(walk: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors (..., 3) along walks (..., 3) and level across them, and their horizontal speeds (...,)."""
+    """Unit vectors (..., 2, 3) along velocities (..., 3) and level across them, and horizontal speeds (...,) [m/s]."""
     speed = np.sqrt(walk[..., 0] ** 2 + walk[..., 1] ** 2 + LEAST_SPEED**2)
     ahead = np.stack([walk[..., 0], walk[..., 1], np.zeros_like(speed)], axis=-1) / speed[..., None]
     aside = np.stack([-ahead[..., 1], ahead[..., 0], np.zeros_like(speed)], axis=-1)
@@ -122,7 +122,7 @@ def axes_of(walk: Floats) -> tuple[Floats, Floats]:
 
 
 def unit_of(mean: Floats, walk: Floats, usual: Floats) -> Floats:
-    """Directions (..., 3) of features; of unit length where the cosine is one of an angle."""
+    """Directions (..., 3) of features from the agent's place at birth; unit length where the cosine is an angle's."""
     axes, speed = axes_of(walk)
     cosine = mean[..., 1] * usual / speed
     across = np.sqrt(np.maximum(1.0 - cosine**2, LEAST_ACROSS))
@@ -132,7 +132,7 @@ def unit_of(mean: Floats, walk: Floats, usual: Floats) -> Floats:
 
 
 def lengths(kind: Integers, mean: Floats, walk: Floats, usual: Floats, moved: Floats, model: Bistatic) -> Floats:
-    """Ranges (..., C) [m] with the agent `moved` (..., C, 3) from the base, where it had the velocity `walk`.
+    """Ranges (..., C) [m] of features' Gaussians, the agent `moved` (..., C, 3) [m] from where its velocity was `walk`.
 
     The law of cosines takes cosines beyond one without a bend, which a Gaussian has on its rim.
     """
@@ -144,12 +144,13 @@ def lengths(kind: Integers, mean: Floats, walk: Floats, usual: Floats, moved: Fl
 
 
 def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
+    """Lengths (..., C) [m] from a feature to an end of the agent, by the law of cosines."""
     square = distance**2 - 2.0 * distance * np.sum(unit * end, axis=-1) + np.sum(end**2, axis=-1)
     return np.asarray(np.sqrt(np.maximum(square, 1e-4)))
 
 
-def look(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> PredictedRanges:
-    """Ranges of all Gaussians from the present position `place` (3,), by central differences."""
+def predict_ranges(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> PredictedRanges:
+    """Predicted ranges of all features' Gaussians from the present position `place` (3,) [m], by differences."""
     owner, kind, mean = sums.owner, sums.kind, sums.mean
     spread = np.sum((sums.slope @ course.covariance) * sums.slope, axis=2)
     std = np.sqrt(np.maximum(np.einsum("cii->ci", sums.covariance) + spread, 1e-14))
@@ -181,8 +182,7 @@ def born(
     length: Floats, std: Floats, kinds: Floats, existence: Floats, course: AgentTrajectory, place: Floats, turns: int,
     first: int,
 ) -> Sums:  # fmt: skip
-    """Births of delay-only filters: a new feature a range, over the upper half space; `kinds` (M, 3) are kinds'
-    shares."""
+    """New features' Gaussian sums over the upper half space, one feature a range; `kinds` (M, 3) are probabilities."""
     count, size = len(length), len(course.mean)
     speed = np.zeros(3)
     speed[: course.axes] = course.mean[course.axes : 2 * course.axes]
@@ -212,13 +212,13 @@ def born(
 
 
 def join(one: Features, other: Features) -> Features:
-    """Both sets of features with their Gaussians as one."""
+    """Two sets of features with their Gaussians, concatenated."""
     moved = other._replace(owner=other.owner + len(one.ident))
     return type(one)._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
 
 
 def prune(features: Features, least_existence: float, least_share: float, most: int) -> Features:
-    """Without improbable features, and without Gaussians of small share; every feature keeps its best."""
+    """Features without improbable ones, and without Gaussians of small share; every feature keeps its best."""
     rank = np.argsort(np.argsort(-features.existence, kind="stable"), kind="stable")
     keep = (features.existence >= least_existence) & (rank < most)
     best = np.zeros(len(keep))
@@ -231,7 +231,7 @@ def prune(features: Features, least_existence: float, least_share: float, most: 
 
 
 def range_moments(sums: Sums, sight: PredictedRanges, course: AgentTrajectory) -> tuple[Floats, Floats]:
-    """Mean [m] and variance [m^2] (F,) of each feature's range, over its whole sum."""
+    """Mean [m] and variance [m^2] (F,) of each feature's predicted range, over its whole Gaussian sum."""
     count = len(sums.ident)
     mean = np.bincount(sums.owner, sums.share * sight.length, minlength=count).astype(float)
     apart = spread_of(sight, course) + (sight.length - mean[sums.owner]) ** 2

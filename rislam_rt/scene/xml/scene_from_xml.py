@@ -1,4 +1,4 @@
-"""From a Mitsuba or Sionna scene file to a scene folder of ours."""
+"""Import of a Mitsuba or Sionna scene file (XML) as a scene, or a scene folder, of ours."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,13 +25,14 @@ from rislam_rt.scene.xml.read_scene import find_xml, read_xml
 from rislam_rt.scene.xml.write import SHADE_OF
 
 CITY_FACES = 1_000_000
-"""Faces that are read at most where only those within a window are kept."""
+"""Most faces of an XML scene file that are read where only those within a window are kept."""
 
 
 def new_from_xml(
     source: str, folder: str | Path, *, within: Sequence[float] = (), overwrite: bool = False
 ) -> list[str]:
-    """Make a scene folder from an XML file, or from `sionna:NAME`; remarks on what was left out or supplied.
+    """Make a scene folder from an XML scene file, or from `sionna:NAME`; returns remarks on what was left out or
+    supplied.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def new_from_xml(
 
 
 def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[Scene, list[str]]:
-    """The scene of an XML file, and remarks.
+    """Make a scene from an XML scene file; also remarks.
 
     Where a `scene.toml` lies beside the file (as `rislam-rt export --xml` leaves it), agent, panel and scatterers are
     its, and a material that the XML file still has as it was written there is the exact one. Without it the agent gets
@@ -89,7 +90,7 @@ def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[S
 
 
 def _window(within: Sequence[float]) -> Floats | None:
-    """(2, 2) [m] lowest and highest x, y of an XML scene to keep; None for everything."""
+    """Window (2, 2) [m] of an XML scene to keep, lowest and highest x, y; None for everything."""
     if not within:
         return None
     window = np.array(within, dtype=np.float64)
@@ -99,7 +100,8 @@ def _window(within: Sequence[float]) -> Floats | None:
 
 
 def _exact(read: Material, exact: Material | None) -> Material:
-    """The material as the scene file beside has it, if the XML file has just what is written for that one."""
+    """Material of an XML scene as the scene file beside it has it, if the XML file has just what is written for that
+    one; else as it was read."""
     if exact is not None and read_material(material_element(exact, "written")).material == read:
         return exact
     return read
@@ -108,7 +110,8 @@ def _exact(read: Material, exact: Material | None) -> Material:
 def _panel(
     reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory
 ) -> tuple[RisPanel | None, str]:
-    """Panel for an XML scene above or beside the way, where there is a place for one, and words on it."""
+    """Propose a RIS panel for an XML scene above or beside the agent's path, where there is a place for one, and a
+    remark on it."""
     draft = RoomDraft(
         {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
         {s.name: Mesh(s.vertices, s.faces) for s in occluders},
@@ -119,6 +122,7 @@ def _panel(
 
 
 def _motion(path: Path, reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Trajectory:
+    """Suggested trajectory of an agent through the reflectors and occluders of an XML scene."""
     try:
         table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in occluders]))
     except Fault as fault:

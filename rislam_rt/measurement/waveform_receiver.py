@@ -1,4 +1,4 @@
-"""The waveform-driven receiver: makes the signal of a cycle, and finds the paths in it again."""
+"""The waveform-driven receiver: simulates the received signal of a cycle and estimates multipath components from it."""
 
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_gri
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.false_alarms import detection_threshold
-from rislam_rt.measurement.hardware import FrontEnd, Sent, digitise, draw_gain_variation, scaled_to_fit
+from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
 from rislam_rt.measurement.received import Received
@@ -25,7 +25,7 @@ from rislam_rt.model import Measurement, PathTruth, RadioConfig
 
 
 class Capture(NamedTuple):
-    """Samples of one cycle, in which one set of paths is to be found."""
+    """Received samples of one cycle: of all paths, or the sum or one panel's difference of alternated codes."""
 
     samples: Complexes
     """(L, M) tones [sqrt(J)] at full energy E."""
@@ -37,20 +37,20 @@ class Capture(NamedTuple):
 
 
 class DetectedComponents(NamedTuple):
-    """N components found, in the order of their delays."""
+    """N multipath components estimated from samples, in the order of their delays."""
 
     tau: Floats
-    """(N,) [s]."""
+    """(N,) [s] delay."""
     cosines: Floats
-    """(N, 2) body frame."""
+    """(N, 2) direction cosines in the body frame."""
     gain: Complexes
-    """(N,)."""
+    """(N,) complex gain."""
     tau_std: Floats
-    """(N,) [s]."""
+    """(N,) [s] standard deviation of the delay."""
     cosines_std: Floats
-    """(N, 2)."""
+    """(N, 2) standard deviations of the cosines."""
     amplitude_std: Floats
-    """(N,)."""
+    """(N,) standard deviation of the gain's magnitude."""
     capture: Integers
     """(N,) number of the capture that it was found in."""
 
@@ -64,12 +64,12 @@ def capture(
     *,
     rng: np.random.Generator,
 ) -> list[Capture]:
-    """Sound the channel with the waveform: one capture, or with alternation the sum and difference of two at half
-    energy.
+    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of several
+    codes.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
-    Several panels take as many codes as a Hadamard matrix that has a row for each (`slot.codes_in_turn`).
+    Several panels take as many codes as a Hadamard matrix that has a row for each (`slot_motion.codes_in_turn`).
 
     Parameters
     ----------
@@ -84,10 +84,10 @@ def capture(
     clean = [tones(one, radio, config, elements) for one in heard]
     direct = leakage * np.sqrt(radio.energy / num_tones(radio, config))
     if not config.alternation:
-        return [Capture(*digitise(clean[0], Sent(1.0, direct, swing), radio, config, front_end, rng=rng), 0)]
+        return [Capture(*digitise(clean[0], SentSignal(1.0, direct, swing), radio, config, front_end, rng=rng), 0)]
     signs = codes_in_turn(config.panels)
     share = np.sqrt(1.0 / len(signs))
-    sent = Sent(share, share * direct, swing)
+    sent = SentSignal(share, share * direct, swing)
     heard_under = [
         digitise(share * _signed_sum(clean, code), sent, radio, config, front_end, rng=rng) for code in signs.T
     ]
@@ -99,7 +99,7 @@ def capture(
 
 
 def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
-    """Sum of captures, each with its sign."""
+    """Sum of the received samples (L, M) of several codes, each multiplied by its sign."""
     total = signs[0] * parts[0]
     for part, sign in zip(parts[1:], signs[1:], strict=False):
         total = total + sign * part
@@ -109,13 +109,13 @@ def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
 def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
 ) -> DetectedComponents:
-    """Components in the waveform's captures of one cycle; the search begins with those of the previous one, if
+    """Estimate the multipath components in the captures of one cycle, starting from those of the previous cycle, if
     given."""
     return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
 
 
 def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
-    """Components of several captures of the waveform, in the order of their delays."""
+    """Join the components of several captures, in the order of their delays."""
     joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
     return DetectedComponents._make(field[order] for field in joined)
@@ -131,14 +131,16 @@ def measure_waveform(
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
-    """Components estimated from the cycle's waveform, and the paths that they most likely are."""
+    """Simulate the received signal of a cycle and estimate its multipath components; also the paths that they most
+    likely are."""
     captures = capture(received, radio, config, front_end, leakage, rng=rng)
     found = find_components(captures, radio, config, previous)
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the true path behind each component of the waveform, by what its capture holds; -1 for none."""
+    """Column (N,) of the true path that each estimated component most likely is, of those in its capture; -1 for
+    none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -147,7 +149,7 @@ def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig
 
 
 def to_measurement(found: DetectedComponents, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
-    """Measurement that the agent gets to see of the waveform's components."""
+    """Measurement of the agent from estimated components, with the probability that each came over the panel."""
     told: tuple[Any, ...] = ()
     if config.alternation:
         points, deviation = (
@@ -161,7 +163,7 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
 
 
 def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Floats:
-    """Parameters (Q, 3) of the previous cycle's components of this kind of capture, where the search begins."""
+    """Parameters (Q, 3) of the previous cycle's components of the same capture, where the estimator's search begins."""
     if previous is None:
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
@@ -172,7 +174,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
 
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
-    """Components found in one capture of the waveform, with deviations that count what cannot be seen."""
+    """Estimate the components of one capture, their standard deviations inflated for what the bound leaves out."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
@@ -199,17 +201,16 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Sounding, MatchedFilterGrid]:
-    """Sounding and grid of a waveform: so many tones, searched in a window of delays, in cells."""
+    """Sounding of `count` tones, and the matched filter's grid over a window of delays in resolution cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)
 
 
 def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
-    """Components that a capture tells apart: parameters (N, 3), gains (N,), deviations (N, 3), amplitude deviations
-    (N,).
+    """Components after merging estimated paths that cannot be resolved: parameters (N, 3), gains (N,), their standard
+    deviations (N, 3), (N,).
 
-    Where the data ask for several paths but cannot share the amplitude out between them, they are reported as one, as
-    wide as they lie apart.
+    Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
     """
     parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
     label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
@@ -230,7 +231,8 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """(P,) component of each path found: a doubtful one joins its nearest neighbour, if that lies within a cell."""
+    """Number (P,) of the component of each estimated path: an unresolved one joins its nearest neighbour within a
+    cell."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

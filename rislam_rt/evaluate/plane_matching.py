@@ -20,9 +20,9 @@ class Surfaces(NamedTuple):
     """Surfaces of a room's W true walls, against which estimated planes are scored."""
 
     middle: Floats
-    """(W, 3) [m] centroid of each wall's surface."""
+    """Centroid (W, 3) [m] of each wall's surface."""
     normal: Floats
-    """(W, 3) unit normals."""
+    """Unit normals (W, 3) of the walls."""
     spread: Floats
     """Covariance (W, 3, 3) [m^2] of the points of each wall's surface."""
 

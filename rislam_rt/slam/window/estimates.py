@@ -1,5 +1,4 @@
-"""Outputs of the window filter: pose and map estimates, the prediction for the phase design, and a start on an earlier
-map."""
+"""Estimates of the window filter: pose and map, the prediction for the phase design, and a start on an earlier map."""
 
 from dataclasses import replace
 
@@ -10,14 +9,14 @@ from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.gaussian_draws import even_draws, square_root
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
-from rislam_rt.slam.returns import AXES, poses_of
+from rislam_rt.slam.predicted_returns import AXES, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window.filter import init
+from rislam_rt.slam.window.landmarks.duplicate_walls import second_planes
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, image_ident
-from rislam_rt.slam.window.landmarks.same_wall import second_planes
 from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.steps import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
 

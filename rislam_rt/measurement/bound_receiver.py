@@ -1,4 +1,4 @@
-"""The bound-driven receiver: what an efficient estimator would report, without making the signal.
+"""The bound-driven receiver: draws the multipath components that an efficient estimator would report, without a signal.
 
 A component's complex amplitude is measured with the variance of the matched filter over the signal and all L antennas,
 N0 / (L E) for a lone path; it is detected when its measured SNR exceeds the threshold, which makes the detection
@@ -31,7 +31,7 @@ from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
 NEGLIGIBLE = 1e-3
-"""Paths this far below the detection threshold are left out: they move an amplitude at the threshold by 3 %."""
+"""SNR over the detection threshold below which paths are left out: they move an amplitude at the threshold by 3 %."""
 
 
 def measure_bound(
@@ -43,12 +43,12 @@ def measure_bound(
     *,
     rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:
-    """Components with bound-driven errors, missed detections, merging and clutter, in the order of their delays.
+    """Draw the multipath components of a cycle by the Cramér-Rao bound, with missed detections, merging and clutter.
 
     The errors have the variance that belongs to the true SNR; the standard deviations reported are those that the
     measured one suggests, all that a receiver knows. Each of the `num_paths` columns has its own draws in every capture
     whether heard or not, so that two codes see the same noise; the `num_extra` columns beyond have theirs from a
-    generator of their own, so that they change nobody else's.
+    generator of their own, so that they change nobody else's. Components are in the order of their delays.
     """
     sensor, captures = build_sensor(radio, config), split_by_code(received, config)
     draws = rng.standard_normal((len(captures), num_paths, 5))
@@ -78,7 +78,7 @@ def measure_bound(
 def _capture(
     received: Received, draws: Floats, sensor: SensorModel, config: ReceiverConfig, *, rng: np.random.Generator
 ) -> ReportedComponents:
-    """Components that the bound makes of the paths in one capture, and what is false among them."""
+    """Draw the detected components of one capture by the bound, and its false alarms."""
     radio, window = sensor.radio, sensor.window
     received = select_paths(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
     if config.resolution == "joint":

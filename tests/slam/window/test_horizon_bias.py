@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement.components import clip_to_unit_disc
-from rislam_rt.slam.window.rim import bring_back
+from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 
 STD = 0.02
 
@@ -13,7 +13,7 @@ def brought_back(radius, angle=0.7, std=STD):
     """What is added to the residual, and the slopes, of a ray of that radius whose cosines move with themselves."""
     out = np.array([np.cos(angle), np.sin(angle)])
     seen, left, slopes = np.array([[3.0, *(radius * out)]]), np.zeros((1, 3)), np.eye(3)[None]
-    bring_back(seen, np.broadcast_to(std, (1, 3)), left, slopes)
+    correct_horizon_bias(seen, np.broadcast_to(std, (1, 3)), left, slopes)
     return out, left[0], slopes[0]
 
 

@@ -1,4 +1,4 @@
-"""Merging: returns of features that come out as one, and how they pull each other."""
+"""Unresolved returns of features: the probability that one merges into a louder one, and how neighbours pull it."""
 
 import numpy as np
 
@@ -12,8 +12,7 @@ from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeature
 def unresolved_neighbours(
     features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
 ) -> tuple[Floats, ...]:
-    """Probability (C,) that a return merges into a louder one before association; mean (C, 3), covariance of the
-    pull."""
+    """Probability (C,) that a return merges into a louder one; mean (C, 3) and covariance of neighbours' pull."""
     weight = features.existence[features.owner] * features.share * detection
     sure = np.flatnonzero(weight > 0.1)
     weight = weight[sure]

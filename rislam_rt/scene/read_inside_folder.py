@@ -1,4 +1,4 @@
-"""Files that a scene names: inside its folder, and no larger than they may be."""
+"""Reading of files that a scene names inside its folder: none outside, and none larger than a limit."""
 
 from pathlib import Path, PurePosixPath
 
@@ -6,7 +6,7 @@ from rislam_rt.scene.findings import Fault, one_line
 
 
 def read_inside(folder: Path, name: str, limit: int) -> bytes:
-    """Content of a file that a scene names, which must lie inside the scene's folder, links followed.
+    """Read a file that a scene names, which must lie inside the scene's folder, links followed.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sionna's path buffer, filled with given wall sequences: row i names its own source, target and walls."""
+"""Sionna's path buffer, filled with candidates for legs: row i names its own source, target and wall sequence."""
 
 import drjit as dr
 import mitsuba as mi
@@ -13,7 +13,8 @@ from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
 
 
 def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices) -> PathsBuffer:
-    """The tracer's path buffer, from far ends (sources) to devices (targets) over `sequences` (N, D), in reverse.
+    """Fill Sionna's path buffer with candidates, from far ends (sources) to devices (targets) over wall sequences (N,
+    D), in reverse.
 
     Its vertices are any point of each wall's plane, which the image method needs, from the tracer scene's origin.
     """
@@ -41,7 +42,7 @@ def read_vertices(tracer_scene: TracerScene, buffer: PathsBuffer, keep: Integers
 
 
 def as_indices(values: Integers) -> mi.UInt:
-    """Numbers (N,) for the tracer."""
+    """Convert numbers (N,) to unsigned integers of the tracer's backend."""
     return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
 
 

@@ -1,4 +1,4 @@
-"""Coordinate descent over levels, all elements looked at together: the strong heuristic for several panel paths."""
+"""Coordinate descent over the elements' phase levels: the strongest designer of codes for several panel paths."""
 
 import numpy as np
 
@@ -8,14 +8,16 @@ from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.single_path import exact_code
 
 LARGE = 100
-"""Elements above which changes are first ranked by the objective's slope, before each is valued on its own."""
+"""Number of elements above which changes are first ranked by the objective's slope instead of their exact values."""
 
 _WORTHWHILE = 1e-7
-"""Relative improvement below which a change is not worth a step; rounding is 1e-15, one element of 4096 gives 1e-4."""
+"""Relative improvement of the objective below which descent stops; rounding is 1e-15, one element of 4096 gives
+1e-4."""
 
 
 def coordinate_descent(objective: Objective, index: Integers, levels: int, max_steps: int) -> tuple[Integers, Floats]:
-    """Improve a code (N M,) until no change of a single element helps; the objective after each step.
+    """Improve a code (N M,) until no change of a single element lowers the expected CRLB; also the objective after each
+    step.
 
     Each step values every change of one element, ranks the elements by what their best change gains, and applies the
     first m of them for the m = 1, 2, 4, ... that turns out best: never worse than the best single change.
@@ -43,8 +45,8 @@ def coordinate_descent(objective: Objective, index: Integers, levels: int, max_s
 
 
 def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements that coordinate descent tries, best first, and for all elements the best step in level, less one;
-    exact."""
+    """Elements whose best level change lowers the objective, best first, and that change less one for all elements;
+    exact values."""
     shift = objective.table[1:] - 1.0
     value = objective.value(gain + (weight[:, None] * objective.matrix) * shift[:, None, None])
     change = np.argmin(value, axis=0)
@@ -54,7 +56,8 @@ def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements that coordinate descent tries, to first order in the powers: two products for all changes."""
+    """Elements whose best level change lowers the objective to first order in the powers, best first, and that change
+    less one."""
     size = 1e-6
     slope = (objective.value(gain * (1.0 + 0.5 * size * np.eye(len(gain)))) - now) / size
     shift = objective.table[1:] - 1.0
@@ -70,7 +73,7 @@ def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _first_changes(index: Integers, order: Integers, change: Integers, levels: int) -> Integers:
-    """Codes (T, N M) of coordinate descent with the best changes of the first 1, 2, 4, ... elements of `order`."""
+    """Codes (T, N M) with the level changes of the first 1, 2, 4, ... elements of `order` applied."""
     trials = []
     count = 1
     while True:
@@ -84,14 +87,15 @@ def _first_changes(index: Integers, order: Integers, change: Integers, levels: i
 
 
 def exact_codes(problem: DesignProblem) -> Integers:
-    """(N M,) start of coordinate descent: every panel at the optimum of its direct path."""
+    """Code (N M,) with every panel at the exact optimum of its direct path's gain."""
     return np.concatenate([exact_code(target, problem.levels)[0] for target in problem.targets])
 
 
 def coordinate_search(
     problem: DesignProblem, objective: Objective, starts: int, max_steps: int
 ) -> tuple[Integers, Floats]:
-    """Descend from the single-path optima at the belief's first sample; the best `starts` of them are tried."""
+    """Best code (N M,) of coordinate descents from the best `starts` single-path optima at the belief's first sample,
+    and the objective after each step."""
     paths = problem.response.shape[1]
     own, _ = exact_code(problem.response[0].reshape(paths, -1), problem.levels)
     codes = np.tile(exact_codes(problem), (paths, 1))  # what a path leaves open, the other panels, is at their optimum

@@ -1,5 +1,4 @@
-"""Noise-free motion model: the window's poses as a linear function of the first pose, its velocity and the steps'
-accelerations."""
+"""Motion basis: the window's poses as a linear function of the first one, its velocity and the steps' accelerations."""
 
 from functools import lru_cache
 
@@ -17,7 +16,7 @@ POSE = 4
 
 @lru_cache(maxsize=4)
 def basis(steps: bytes, turns: bool) -> Floats:
-    """Matrices (A, K, K + 1) that give the K poses along each axis from its first place, its first rate and the
+    """Matrices (A, K, K + 1) that give K poses along each axis from the first place, the first rate and the
     accelerations of the steps (a time [s] each, as bytes)."""
     step = np.frombuffer(steps)
     count = len(step) + 1
@@ -37,12 +36,13 @@ FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
 """Indices of the head's numbers in the order of a basis: first places, then first rates."""
 
 
-def starts(free: int) -> Integers:
-    """Indices of the head's numbers that a basis of `free` axes multiplies: first places, then first rates."""
+def head_order(free: int) -> Integers:
+    """Indices of the window's unknowns that a motion basis of so many axes multiplies: first places, then first
+    rates."""
     return FIRST if free > TURN else np.arange(6)
 
 
-def carry_on(dt: float, free: int) -> Floats:
+def step_transition(dt: float, free: int) -> Floats:
     """Transition matrix (7, 7 + A) from pose, velocity and compass offset, and a step's accelerations, to those `dt`
     [s] later."""
     found = np.eye(HEAD, HEAD + free)
@@ -55,7 +55,7 @@ def carry_on(dt: float, free: int) -> Floats:
 
 
 @lru_cache(maxsize=4)
-def latest(steps: bytes, turns: bool) -> Floats:
+def last_pose_matrix(steps: bytes, turns: bool) -> Floats:
     """Matrix (7, 7 + (K - 1) A) that gives the last pose, velocity and compass offset from the first ones and all
     accelerations."""
     last, step, free = basis(steps, turns)[:, -1], np.frombuffer(steps), 3 + turns

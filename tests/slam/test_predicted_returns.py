@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.geometry.planes import mirror, plane_between
-from rislam_rt.slam.returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
 
 LEGS = np.array(
     [[0, NONE, NONE], [0, 2, NONE], [1, 2, 3], [1, 3, 2], [TX, 2, NONE], [TX, NONE, NONE], [TX, 2, 3], [1, 3, NONE]]

@@ -7,15 +7,15 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import squared_distance
 from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.returns import AXES, by_wall, reflect
+from rislam_rt.slam.predicted_returns import AXES, by_wall, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 
 def second_planes(
     features: Floats, covariance: Floats, landmarks: WindowTable, walls: Integers, middle: Floats
 ) -> Booleans:  # fmt: skip
-    """Whether each of some walls, rows (W,) of the map, is a second plane of another of them, features (F, 3) [m] being
-    known within a covariance (3F, 3F) [m^2], and the agent at `middle` (3,) [m].
+    """Whether walls of the map, rows (W,), are duplicates of another of them, features (F, 3) [m] being known within a
+    covariance (3F, 3F) [m^2], and the agent at `middle` (3,) [m].
 
     Of the planes of one wall, the first is that whose expected square of lean, off upright or level, is least: what
     level returns do not tell goes wrong first.

@@ -1,4 +1,4 @@
-"""Looks into mesh files before they are unfolded: what they hold, and whether that is more than can be served."""
+"""Checks of mesh files (GLB, PLY) before they are parsed: how much they hold, and what they refer to."""
 
 import json
 import re
@@ -9,19 +9,20 @@ from typing import Any
 from rislam_rt.scene.findings import Fault
 
 MAX_HEADER = 100_000
-"""Bytes of a PLY header."""
+"""Most bytes of a PLY file's header."""
 
 _PLY_NOTE = re.compile(rb"^(?:comment|obj_info)(?:[ \t][^\r\n]*)?(?:\r\n|\r|\n)", re.MULTILINE)
 
 
 def without_comments(content: bytes) -> bytes:
-    """A PLY file without comments in its header: one that names a texture would send the reader to look for it."""
+    """Content of a PLY file without the comments in its header: one that names a texture would send the reader to look
+    for it."""
     end = content.find(b"end_header", 0, MAX_HEADER)
     return content if end < 0 else _PLY_NOTE.sub(b"", content[:end]) + content[end:]
 
 
 def too_many_faces(count: int, limit: int) -> Fault:
-    """The one answer to too large a mesh."""
+    """Error for a mesh with more faces than the scene file's limit."""
     return Fault(
         f"{count} faces, and check and trace take time in proportion to them",
         f"simplify the mesh, or raise limits.faces = {limit} in the scene file",
@@ -29,7 +30,8 @@ def too_many_faces(count: int, limit: int) -> Fault:
 
 
 def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
-    """Refuse a GLB file whose nodes, unfolded, are too many, or have too many faces.
+    """Refuse a GLB mesh file whose nodes are too many, or, each mesh counted as often as a node names it, have too many
+    faces.
 
     What cannot be read as a GLB file passes: the reader will say what is wrong with it.
 
@@ -55,7 +57,7 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
 
 
 def _document(content: bytes) -> dict[str, Any]:
-    """The JSON chunk of a GLB file; empty if there is none."""
+    """Table of contents (JSON chunk) of a GLB mesh file; empty if there is none."""
     try:
         magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
         found = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}
@@ -65,7 +67,7 @@ def _document(content: bytes) -> dict[str, Any]:
 
 
 def _num_faces(mesh: Any, accessors: list[Any]) -> int:
-    """Triangles of a mesh: a third of its indices, or of its corners where it has none."""
+    """Number of triangles of a GLB file's mesh: a third of its indices, or of its corners where it has none."""
     total = 0
     for part in mesh["primitives"]:
         number = part["indices"] if "indices" in part else part["attributes"]["POSITION"]

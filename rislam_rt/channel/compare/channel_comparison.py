@@ -1,4 +1,4 @@
-"""Both channels of one scene at the same random poses."""
+"""Both channels of a scene, ray-traced and image-source, run at the same random poses and compared."""
 
 import zlib
 from collections.abc import Iterable
@@ -14,19 +14,19 @@ from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 
 
 class Validation(NamedTuple):
-    """One room's comparison."""
+    """Comparison of the ray-traced and the image-source channel in one room."""
 
     scene: str
     depth: int
     numbers: str
-    """Whose numbers: `traced` (the tracer's float32) or `refined`."""
+    """Precision of the traced paths: `traced` (the tracer's float32) or `refined` (float64)."""
     report: PathReport
 
 
 def compare_channels(
     scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator, refine: bool = True
 ) -> PathReport:
-    """Trace and compute `poses` random poses, with the panel at one random code, and compare path by path.
+    """Compare the ray-traced with the image-source channel path by path, at random poses and under one random code.
 
     By default the channel as its users get it, its numbers refined in float64 on the facets that the tracer named;
     without `refine` the tracer's own float32 numbers.
@@ -40,7 +40,7 @@ def compare_channels(
 def trace_both(
     scene: Scene, radio: RadioConfig, *, poses: int, depth: int, rng: np.random.Generator, refine: bool = True
 ) -> tuple[Paths, Paths, Trajectory]:
-    """Paths of both channels to compare, at random poses and under the same random code, and the poses."""
+    """Ray-traced and image-source paths of a scene at random poses, under the same random panel code, and the poses."""
     from rislam_rt.channel.traced import TracedChannel  # starting the tracer takes seconds
 
     trajectory = random_poses(scene, poses, rng=rng)
@@ -56,7 +56,7 @@ def trace_both(
 def validate_rooms(
     rooms: Iterable[tuple[Scene, int]], radio: RadioConfig, *, poses: int, seed: int
 ) -> list[Validation]:
-    """Compare both channels in several rooms, each with its depth: the tracer's own numbers, and the refined ones.
+    """Compare ray-traced and image-source channel in several rooms, each with its depth, in float32 and refined.
 
     A room's poses depend on seed and name alone.
     """
@@ -70,5 +70,5 @@ def validate_rooms(
 
 
 def room_rng(scene: Scene, seed: int) -> np.random.Generator:
-    """The generator of the poses at which a room's channels are compared."""
+    """Random generator of a room's poses for comparison, from the seed and the room's name."""
     return np.random.default_rng([seed, zlib.crc32(scene.name.encode())])

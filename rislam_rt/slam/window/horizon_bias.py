@@ -1,5 +1,4 @@
-"""Bias of direction cosines near the horizon, where a receiver brings those that noise puts beyond the unit disc back
-to its rim.
+"""Horizon bias of direction cosines: a receiver brings those that noise puts beyond the unit disc back to its rim.
 
 Directions lie within the unit disc, and a receiver that finds a pair of cosines beyond it brings them back to the rim.
 A ray of radius r (1 on the horizon), heard with noise of standard deviation s along it, is reported at `min(1, r + n)`:
@@ -17,7 +16,7 @@ REACH = 4.0
 """Distance from the rim, in standard deviations, from which on noise puts nothing beyond it."""
 
 
-def bring_back(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
+def correct_horizon_bias(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:
     """Correct residuals `left` (A, 3) and slopes (A, 3, D) of predictions `seen` (A, 3), length and cosines, in place
     for a receiver that brings cosines of noise `std` (A, 3) back into the unit disc.
 

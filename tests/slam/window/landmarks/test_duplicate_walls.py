@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.estimates import build_map
+from rislam_rt.slam.window.landmarks.duplicate_walls import same_wall, second_planes
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.landmarks.same_wall import same_wall, second_planes
-from rislam_rt.slam.window.mapping import build_map
 
 MIDDLE = np.array([1.0, 2.0, 1.2])
 FAR = 4.0

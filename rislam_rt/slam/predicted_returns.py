@@ -26,15 +26,15 @@ class Returns(NamedTuple):
     """R paths (returns) over the map's features, each of a Tx leg and an Rx leg among G legs."""
 
     legs: Integers
-    """(G, 3) feature row of the point (or `TX`), of the wall next to it, and of the wall next to the device."""
+    """Feature rows (G, 3) of each leg's point (or `TX`), of the wall next to it, and of the wall next to the device."""
     tx: Integers
-    """(R,) row of the Tx leg."""
+    """Row (R,) of each return's Tx leg."""
     rx: Integers
-    """(R,) row of the Rx leg."""
+    """Row (R,) of each return's Rx leg."""
 
     @property
     def point(self) -> Integers:
-        """(R,) feature row of each return's point."""
+        """Feature row (R,) of each return's point."""
         return self.legs[self.rx, 0]
 
 
@@ -42,13 +42,13 @@ class PredictedReturn(NamedTuple):
     """Predicted length and direction of R returns, as seen from the agent's poses."""
 
     seen: Floats
-    """(..., R, 3) length [m] and the two direction cosines in the body frame."""
+    """Lengths [m] and the two direction cosines in the body frame (..., R, 3)."""
     tx_length: Floats
     """Unfolded lengths (..., R) [m] of the Tx legs."""
     rx_length: Floats
     """Unfolded lengths (..., R) [m] of the Rx legs."""
     up: Floats
-    """(..., R) third direction cosine; the array is blind where it is negative."""
+    """Third direction cosine (..., R) of the arrival; the array is blind where it is negative."""
 
 
 class Poses(NamedTuple):
@@ -161,7 +161,10 @@ def linearise(returns: Returns, features: Floats, anchor: Floats, poses: Poses, 
 
 
 def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses, spare: int = 0) -> Linear:
-    """Predicted returns with derivatives as by `linearise`, each from a pose of its own; a leg has one `TX` at most."""
+    """Predicted returns with derivatives as by `linearise`, each return as seen from a pose of its own.
+
+    Returns that share a leg which begins at the Tx itself (`TX`) must share the Tx's position.
+    """
     tx = np.empty((len(returns.legs), 3))
     tx[returns.tx] = tx[returns.rx] = poses.tx
     return _linearise(returns, features, anchor, tx, poses, spare)
@@ -206,8 +209,8 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
 
 
 def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats]:
-    """Images (..., G, 3) of the legs and their derivatives (..., G, 3, 9) by all that moves them: the base, through
-    both mirrors, the wall next to it, through the other mirror, and that other wall."""
+    """Mirror images (..., G, 3) of the legs' points, and derivatives (..., G, 3, 9) by the point, the wall next to it
+    and the other wall."""
     moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx, image)

@@ -1,0 +1,72 @@
+"""What is wanted in place of a bad value in a file or on the command line, said as what to give."""
+
+from collections.abc import Mapping
+from typing import Any
+
+UNITS = {
+    "_m_s2": "m/s^2",
+    "_m_s": "m/s",
+    "_bits_s": "bit/s",
+    "_ns_s": "ns/s",
+    "_s_m": "S/m",
+    "_m2": "m^2",
+    "_ghz": "GHz",
+    "_db": "dB",
+    "_deg": "degrees",
+    "_ns": "ns",
+    "_s": "s",
+    "_m": "m",
+    "_j": "J",
+    "_wavelengths": "wavelengths",
+}
+"""Units by the suffix of a name; the longest that fits. A name without one has its unit in its meaning."""
+
+BOUNDS = {
+    "greater than or equal to": "at least",
+    "less than or equal to": "at most",
+    "greater than": "more than",
+    "less than": "less than",
+}
+"""Bounds of a range as the models say them, and in plain words; the longer first."""
+
+KINDS = {
+    "int_": "a whole number",
+    "float_": "a number",
+    "bool_": "true or false",
+    "string_type": "text in quotes",
+}
+"""What a value of a wrong type must be, by the beginning of the fault's type."""
+
+
+def unit_of(name: str) -> str:
+    """Unit of a setting by its name; empty if the name does not say it."""
+    return next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
+
+
+def wanted(item: Mapping[str, Any], typed: bool = False) -> str:
+    """What to give instead, of a fault of pydantic's: `give at most 3000 GHz`; `typed` on the command line, a list
+    needs quotes."""
+    message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
+    names = [part for part in item["loc"] if isinstance(part, str)]
+    name = names[-1] if names else ""
+    if item["type"] == "list_type":
+        words = str(item["input"]).strip("[]()").replace('"', "").replace("'", "").split(",")
+        values = f"[{', '.join(_toml(word.strip()) for word in words)}]"[:100]
+        return f"give a list, in quotes: '{name}={values}'" if typed else f"give a list, {name} = {values}"
+    kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
+    if kind is not None:
+        return f"give {kind}"
+    text = message.removeprefix("Input should be ")
+    for long, plain in BOUNDS.items():
+        if text.startswith(long) and text != message:
+            return f"give {plain}{text.removeprefix(long)} {unit_of(name)}".rstrip()
+    return f"give {text}" if text != message else f"{message[:1].lower()}{message[1:]}"
+
+
+def _toml(word: str) -> str:
+    """A word as an entry of a list: numbers as they are, text in quotes."""
+    try:
+        float(word)
+    except ValueError:
+        return f'"{word}"'
+    return word
