@@ -206,7 +206,7 @@ class _SweepState:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Write the table of all cells and draw the figures of the results so far, unless those there are to be kept."""
+        """Write the table of all cells and draw the figures of the results so far, unless the old ones are kept."""
         if self.keep:
             return
         begin = monotonic()

@@ -84,7 +84,7 @@ def cell_label(settings: Mapping[str, Any]) -> str:
 
 
 def scheme_here(asked: str, room: RandomRoom) -> str:
-    """Name of the scheme to run: the one asked for or, in a room without a panel, that of the same estimator without."""
+    """Name of the scheme to run: the one asked for or, in a room without a panel, that of its estimator without."""
     scheme = SCHEMES[asked]
     if room.scene.ris is not None or not scheme.panel:
         return asked
