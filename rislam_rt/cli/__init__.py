@@ -1,4 +1,4 @@
-"""Floor 9: the command line, one file a command. Nothing heavy is imported before a command runs."""
+"""The command line `rislam-rt`, one file for each command; heavy libraries are imported only when a command runs."""
 
 from rislam_rt.cli.entry_point import main
 

@@ -1,4 +1,4 @@
-"""The app: the list of commands."""
+"""The command line app (Typer) of `rislam-rt` with all commands."""
 
 import typer
 
@@ -33,6 +33,7 @@ for _command in (run, sweep, slam, pipelines, config, new, check, export, show, 
 
 
 def _print_version(wanted: bool) -> None:
+    """Print the package's version and leave, for the option `--version`."""
     if wanted:
         from rislam_rt import __version__
 

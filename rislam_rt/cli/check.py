@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.specification.spec import Settings as Records
 
 SEED = 0
-"""Of the random codes that a panel is tried under."""
+"""Seed of the random phase codes under which the advice computes a panel's detectability."""
 
 
 def command(
@@ -69,7 +69,7 @@ def command(
 
 
 def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:
-    """Print the adviser's word and draw the map; what was said, for the machine-readable copy."""
+    """Print which landmarks the receiver will detect, draw the coverage map if asked, return the advice for JSON."""
     import numpy as np
 
     from rislam_rt.adviser.advice import advise

@@ -57,6 +57,7 @@ def _print_file(settings: "list[Setting]", spec: Any, folder: Path) -> None:
 
 
 def _print_one(one: "Setting", value: Any) -> None:
+    """Print value, meaning, range and default of one setting."""
     from rislam_rt.toml import toml_value
 
     typer.echo(f"{one.key} = {'(not set)' if value is None else toml_value(_plain(value))}")
@@ -66,11 +67,13 @@ def _print_one(one: "Setting", value: Any) -> None:
 
 
 def _facts(one: "Setting") -> str:
+    """Meaning, type, unit and range of a setting in one line."""
     facts = [one.kind, f"in {one.unit}" if one.unit else "", one.allowed]
     return f"{one.meaning} ({'; '.join(fact for fact in facts if fact)})".strip()
 
 
 def _value(spec: Any, key: str) -> Any:
+    """Value of the setting with a dotted key in a specification."""
     for part in key.split("."):
         spec = getattr(spec, part)
     return spec
@@ -87,7 +90,7 @@ def _from_here(value: Any, folder: Path, key: str = "") -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A value for `config` as TOML and JSON know it."""
+    """Value of a setting as plain data for TOML and JSON."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):

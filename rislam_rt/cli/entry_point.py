@@ -1,4 +1,4 @@
-"""Entry point of the command line: a command run, every failure that was foreseen told in a line, an exit code."""
+"""Entry point of the command line: runs a command, prints expected errors in one line each, returns the exit code."""
 
 import os
 import sys
@@ -8,11 +8,11 @@ if TYPE_CHECKING:
     from rislam_rt.errors import RislamError
 
 LONGEST = 1000
-"""Characters of a line on the error stream; what is longer repeats what a user gave."""
+"""Largest number of characters of an error line; the middle of a longer one, which repeats a user's text, is cut."""
 
 
 def main() -> None:
-    """Entry point of `rislam-rt`: run a command; a failure that was foreseen is one line and its exit code."""
+    """Run the command of the command line `rislam-rt` and exit with its exit code; expected errors are one line."""
     try:
         import atexit
 
@@ -33,7 +33,7 @@ def main() -> None:
 
 
 def _run(heard: list[int]) -> int:
-    """Run the command that was asked for; its exit code. `heard`: signals that came."""
+    """Run the command of the command line and return its exit code; `heard` are the interrupt signals that came."""
     import typer
 
     from rislam_rt.cli.app import app
@@ -66,7 +66,7 @@ def _run(heard: list[int]) -> int:
 
 
 def _tell(error: "RislamError") -> int:
-    """Every fault of a command on a line of its own; returns the exit code."""
+    """Print the messages of an error, a line each (and the traceback if verbose), and return its exit code."""
     from rislam_rt.cli.verbosity import verbosity
 
     if verbosity().verbose:
@@ -79,7 +79,7 @@ def _tell(error: "RislamError") -> int:
 
 
 def _say(line: str, code: int) -> int:
-    """Print one line, the middle of a long one left out: what is wrong stands before it, how to mend it behind."""
+    """Print one line on the error stream, the middle of a long one cut, and return the exit code `code`."""
     line = " ".join(line.split())
     print(line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}", file=sys.stderr)
     return code

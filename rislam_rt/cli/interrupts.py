@@ -1,4 +1,4 @@
-"""Interrupts, Ctrl-C and SIGTERM as a queue sends it: the work ends in order, and says so in one line."""
+"""Interrupts by Ctrl-C or by SIGTERM (as a batch queue sends it): a command stops in order with a one-line message."""
 
 import signal
 import sys
@@ -8,19 +8,21 @@ from threading import Event, Timer
 from types import FrameType
 
 EXIT_CODE = 130
+"""Exit code of an interrupted command."""
 AGAIN_SECONDS = 0.05
+"""Time [s] after which an interrupt that Python dropped is raised again."""
 
 
 class Interrupted(Exception):
-    """The work ended at a signal; the message is the line that says what is kept."""
+    """Error of a command that an interrupt stopped; its message says what results are kept."""
 
 
 @contextmanager
 def interruptible() -> Iterator[list[int]]:
-    """Answer both signals by a `KeyboardInterrupt`; gives the list of signals that were heard.
+    """Raise `KeyboardInterrupt` on Ctrl-C and on SIGTERM within this context; yields the list of signals received.
 
-    An interrupt that the parent has told us to ignore, as a shell does in the background, stays ignored. One that falls
-    into a destructor, where Python drops it, comes again a moment later.
+    A Ctrl-C that the parent process has set to be ignored, as a shell does for background jobs, stays ignored. An
+    interrupt that falls into a destructor, where Python drops it, is raised again a moment later.
     """
     answered, heard, at_work = [signal.SIGTERM], list[int](), Event()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -55,9 +57,9 @@ def interruptible() -> Iterator[list[int]]:
 
 
 def end_quietly() -> None:
-    """While Python ends, there is nothing left to interrupt.
+    """Block interrupt signals while Python exits, so that the exit code stands.
 
-    Signals are blocked, not ignored: where an interrupt fell into code that a library makes from text, `python -m`
-    would end by a signal to itself, and not with our exit code.
+    They are blocked, not ignored: where an interrupt fell into code that a library makes from text, `python -m` would
+    end by a signal to itself, and not with our exit code.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))

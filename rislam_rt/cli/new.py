@@ -109,12 +109,12 @@ def command(
 
 
 def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:
-    """Refuse `new` for a room from more than one thing.
+    """Check that the options of `new` name one origin of the room: a file, a floor plan, a seed or a template.
 
     Raises
     ------
     ConfigError
-        From two.
+        They name two.
     """
     from rislam_rt.errors import ConfigError
 
@@ -125,12 +125,12 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
 
 
 def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:
-    """A room from an XML scene, which says itself how it lies and what it is made of.
+    """Write a scene folder from an XML scene of Mitsuba or Sionna RT, which has its own units, axes and materials.
 
     Raises
     ------
     ConfigError
-        Options are given that contradict it.
+        Options for units, axes or materials are given (`useless`).
     """
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.xml import new_from_xml

@@ -1,4 +1,4 @@
-"""Options that several commands share, and the machine-readable copy of what they print."""
+"""Command line options that several commands share, their parsing, and the JSON file of the option `--json`."""
 
 import os
 import sys
@@ -16,11 +16,14 @@ if TYPE_CHECKING:
     from rislam_rt.pipeline.specification.spec import Settings as RunSettings
 
 FARTHEST = 1e5
-"""Largest coordinate [m], as in a scene."""
+"""Largest coordinate [m] of a point on the command line, as in a scene."""
 
 
 def pipeline_file(name: str) -> Path:
-    """The file of a pipeline; modules beside it and in the working folder can be named in it from now on."""
+    """Path of a pipeline file, or of a built-in one by its name.
+
+    Its folder and the working folder are added to Python's module path, so that it can name a user's own methods.
+    """
     file = find_pipeline(name)
     for folder in (str(file.parent.resolve()), os.getcwd()):
         if folder not in sys.path:
@@ -41,7 +44,7 @@ PipelineFile = Annotated[
     ),
 ]
 MAIN_JOB = Path("trace_then_slam")
-"""The pipeline of a command that names none."""
+"""Default pipeline of all commands."""
 SceneOption = Annotated[
     Path | None,
     typer.Option(
@@ -67,18 +70,24 @@ ChannelName = Annotated[Literal["traced", "image_source"], typer.Option(help="Ra
 
 
 class StudyOptions(NamedTuple):
-    """What the command line says beside the settings."""
+    """Options of `rislam-rt run` beside the settings, for studies as well."""
 
     pipeline: Path
+    """Pipeline file."""
     scene: Path | None
+    """Scene folder of `--scene`."""
     out: Path | None
+    """Output folder of `--out`."""
     jobs: int | None
+    """Number of processes."""
     json: Path | None
+    """File of `--json`."""
     page: bool
+    """Whether to draw the figures and the page."""
 
 
 def parse_numbers(option: str, text: str) -> list[float]:
-    """Numbers of an option, parted by commas; none of an empty text.
+    """Numbers of a command line option, separated by commas; none from an empty text.
 
     Raises
     ------
@@ -94,7 +103,7 @@ def parse_numbers(option: str, text: str) -> list[float]:
 
 
 def parse_point(option: str, text: str) -> "Floats":
-    """The point or vector (3,) `x,y,z` of an option.
+    """Point or vector (3,) from the text `x,y,z` of a command line option.
 
     Raises
     ------
@@ -115,12 +124,12 @@ def parse_point(option: str, text: str) -> "Floats":
 
 
 def beside(pipeline: Path, name: str) -> Path:
-    """A folder that an option's pipeline file names, relative to the file."""
+    """Path of a folder that a pipeline file names relative to itself."""
     return Path(os.path.normpath(pipeline.parent / name))
 
 
 def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
-    """Radio, receiver and the rest as a pipeline has them, with settings changed (`KEY=VALUE`).
+    """Settings of a pipeline in SI units (radio, receiver, estimators), with `KEY=VALUE` settings put over them.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Files that a command is asked to write: one that is there and not of this program's making stays."""
+"""Output files of commands: checks that no file of the user's is replaced unless `--overwrite` is given."""
 
 import inspect
 import re
@@ -12,17 +12,16 @@ import typer
 from rislam_rt.cli.verbosity import with_switches
 
 OUTPUT = "a file to write"
-"""Marks, in an option's annotation, the file that the command writes."""
+"""Mark, in an option's annotation, of a file that the command writes."""
 PAGE_MARK = re.compile(rb"ritten\s+by\s+`rislam-rt\b")
-"""Stands in the head of every study's page."""
+"""Text in the head of every study's page, by which the program's own pages are recognised."""
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that this program did not make.")]
 
 _may_overwrite = False
 
 
 def with_overwrite(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command with `--overwrite` behind its own options, if some of those name files to write; these are looked at
-    before anything is worked out."""
+    """Add the option `--overwrite` to a command that writes files, and check these files before the command runs."""
     own = inspect.signature(command).parameters.values()
     outputs = [one.name for one in own if OUTPUT in getattr(one.annotation, "__metadata__", ())]
     if not outputs:
@@ -40,13 +39,12 @@ def with_overwrite(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_output(file: Path | None, option: str = "") -> Path | None:
-    """The file that the running command is to write, if it may.
+    """Check that a command may write an output file, and return its path.
 
     Raises
     ------
     ConfigError
-        It is a folder; or it is there, is not empty and not made by this program, and the command was not told to
-        overwrite it.
+        It is a folder; or it exists, is not empty and was not made by this program, and `--overwrite` is not given.
     StoreError
         Its folder cannot be written to.
     """
@@ -67,22 +65,22 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
 
 
 def page_files(name: str, *, figure: bool = False) -> tuple[str, ...]:
-    """Names of what a study leaves behind: its page first, the table, the data, and the figure if there is one."""
+    """Names of the files that a study writes: page, table, data, and the figure if there is one."""
     return (f"{name}.md", f"{name}.csv", f"{name}.json", *([f"figures/{name}.png"] if figure else []))
 
 
 def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: Sequence[str]) -> Path:
-    """Where a study's files go: `--out`, shared with others, or `runs/<name>-<hash of the record>`.
+    """Output folder of a study, checked: `--out`, which may hold other files, or `runs/<name>-<hash of the record>`.
 
-    `files`: what it will write there, its page first; this is the program's own if its page is.
+    `files` are those that it will write there, its page first; they count as the program's own if the page is.
 
     Raises
     ------
     ConfigError
-        There is a file of that name; or one of the study's files is there, not empty, and not the program's, which was
-        not told to overwrite it.
+        It is a file; or one of the study's files exists, is not empty and not the program's own, and `--overwrite` is
+        not given.
     StoreError
-        The disk would refuse.
+        It cannot be written to.
     """
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.store.identity import short_name
@@ -106,6 +104,7 @@ def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: 
 
 
 def _is_page(file: Path) -> bool:
+    """Whether a file is a page that a study of this program wrote."""
     try:
         return PAGE_MARK.search(file.read_bytes()) is not None
     except OSError:

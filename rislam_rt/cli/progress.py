@@ -1,4 +1,4 @@
-"""A progress bar a stage, with the time left, on the terminal's error stream."""
+"""Progress bars of runs and sweeps on the terminal's error stream, with the time left."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 
 def _bars(*columns: "ProgressColumn") -> "Progress":
+    """Progress bars on the error stream, none with `--quiet`."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -22,7 +23,7 @@ def _bars(*columns: "ProgressColumn") -> "Progress":
 
 @contextmanager
 def show_progress() -> Iterator[Tell]:
-    """Show progress as a bar for every stage that news comes of."""
+    """Show progress bars within this context; yields the function to report a stage's progress with."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
@@ -46,7 +47,7 @@ def show_progress() -> Iterator[Tell]:
 
 @contextmanager
 def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
-    """Show a sweep: its cost before it starts, a bar with the time left, and every failure as it comes."""
+    """Show the progress of a sweep within this context: estimated cost, a bar with the time left, every failure."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
     columns = (TextColumn("cells"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[left]}"))
@@ -69,7 +70,7 @@ def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
 
 
 def describe_cost(told: "SweepProgress") -> str:
-    """Progress of a sweep: how many cells there are, how many are done, and what the rest will cost."""
+    """Text on the progress of a sweep: numbers of cells in all, done and failed, and the estimated time of the rest."""
     there = f"{told.total} cells, {told.done} done" + (f", {told.failed} failed" if told.failed else "")
     if not told.cost.cells:
         return f"{there}; nothing left to do"
@@ -77,7 +78,7 @@ def describe_cost(told: "SweepProgress") -> str:
 
 
 def clock(cost: "SweepCost") -> str:
-    """Progress: the time that is left as `h:mm:ss`."""
+    """Estimated time left of a sweep as text `h:mm:ss`."""
     if cost.seconds is None:
         return "unknown time"
     whole = round(cost.seconds)

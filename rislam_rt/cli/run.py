@@ -62,7 +62,7 @@ def command(
 
 
 def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
-    """All schemes over all cycles of a room; a run that is there already is shown."""
+    """Run all schemes of a SLAM pipeline in a scene, as `rislam-rt run` does; a completed run is shown instead."""
     from rislam_rt.cli.scenes import open_scene, scene_of
     from rislam_rt.pipeline.run import check_run, prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
@@ -83,7 +83,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
-    """A completed run of these very settings, as it was written."""
+    """Print the scores of a completed run from its folder, and draw its page if that is missing."""
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
     from rislam_rt.report.page import PAGE, write_report
@@ -109,7 +109,7 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
 def compute_run(
     spec: "PipelineSpec", room: "Scene", identity: "RunIdentity", folder: Path, given: StudyOptions
 ) -> None:
-    """Begin a run or go on with it, and report it."""
+    """Compute a run, or the schemes of it that are not there yet, in its folder; print scores and write the page."""
     import os
 
     import numpy as np

@@ -1,4 +1,4 @@
-"""Opening a scene for a command."""
+"""Scenes that commands work on: reading and checking them, their warnings, points in them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
 
 
 class OpenedScene(NamedTuple):
-    """A scene that was read and checked, and what is odd about it."""
+    """A scene that was read and checked, with the warnings of the check."""
 
     scene: "Scene"
     warnings: tuple[str, ...]
 
     def warn(self) -> None:
-        """Print the warnings; once all else is known to be in order, so that an error is one line."""
+        """Print the scene's warnings, after all other checks of a command, so that an error is one line."""
         for line in self.warnings:
             warn(line)
 
 
 def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:
-    """Read and check a scene, its materials and its panel for a radio where one is given.
+    """Read and check a scene folder; where a radio is given, materials and panel at its carrier as well.
 
     Raises
     ------
     SceneError
-        It is unusable.
+        The scene has errors.
     """
     from rislam_rt.scene import check_scene, load_scene
     from rislam_rt.scene.findings import raise_errors
@@ -60,7 +60,7 @@ def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Pa
 
 
 def point_in(scene: "Scene", text: str) -> "Floats":
-    """The point `x,y,z` [m] of `--at`, within the bounds of a scene.
+    """Point (3,) [m] from the text `x,y,z` of the option `--at`, which must lie within the bounds of a scene.
 
     Raises
     ------

@@ -66,7 +66,7 @@ def command(
 
 
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
-    """Write the page of `show --html`, with the paths of some poses."""
+    """Write the HTML view of a scene (`show --html`) with the paths at some poses of its trajectory."""
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.cli.progress import show_progress
     from rislam_rt.report.view.page import view_page

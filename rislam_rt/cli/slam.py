@@ -77,6 +77,7 @@ def command(
 
 
 def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "StartPrior":
+    """Start prior from the options `--start` and `--velocity`; the heading is that of the velocity."""
     import numpy as np
 
     from rislam_rt.slam import StartPrior
@@ -87,7 +88,7 @@ def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "Star
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
-    """Where Tx and Rx sit on the agent, from the options of `slam`; None if nothing is said."""
+    """Offsets of Tx and Rx from the agent's position, from the options `--tx` and `--rx`; None without them."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.model import Body
 
@@ -99,6 +100,7 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
 
 
 def _true_positions(file: Path, cycles: int) -> "Floats":
+    """True positions (K, 3) [m] from the TUM file of `--truth`, one a cycle."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
     from rislam_rt.scene.recorded_poses import parse_tum
@@ -115,6 +117,7 @@ def _true_positions(file: Path, cycles: int) -> "Floats":
 
 
 def _new_folder(folder: Path) -> Path:
+    """Output folder of `slam`, which must not exist or be empty."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.storage.files import check_writable
 
@@ -154,7 +157,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
 
 
 def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
-    """Write what `slam` found: the estimate as TUM and as CSV, and the last map."""
+    """Write the results of `slam`: estimated trajectory as TUM and CSV, and the last map as JSON."""
     import numpy as np
 
     from rislam_rt.scene.write import tum_bytes

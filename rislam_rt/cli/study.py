@@ -1,4 +1,4 @@
-"""Studies: what `rislam-rt run` does with a pipeline that is not the main job; loaded for one alone."""
+"""Studies on the command line: runs a pipeline file of a kind other than `slam` for `rislam-rt run`."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +35,7 @@ from rislam_rt.sweeps.store import check_folder
 
 
 def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
-    """Refuse `--scene` for a study that has rooms of its own, or none.
+    """Raise an error if `--scene` is given for a study that names its own rooms, or has none.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
 
 
 def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
-    """Compare both channels in all rooms; exit code 1 if a difference is unexplained or beyond its limit."""
+    """Run the study that compares ray tracer and image sources, and write its page; exit code 1 if they differ."""
     refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
@@ -70,7 +70,7 @@ def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
 
 
 def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
-    """Run the study of Fig. 4(a): gain against distance."""
+    """Run the study of Fig. 4(a), panel gain against distance, and write its page."""
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
     check_fig4a(scene, spec)
@@ -89,7 +89,7 @@ def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
 
 
 def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
-    """A study on the sweep engine; its page grows while it runs. Exit code 1 if a cell failed."""
+    """Run a swept study (Fig. 4(b), rooms, ablations, ...) and write its page; exit code 1 if a cell failed."""
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
@@ -109,7 +109,10 @@ def run_cells(
     sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
     write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run a study's cells, its page written anew as they end; `show` prints them at last. Exit code 1 if one failed."""
+    """Run the cells of a study's sweep, rewriting its page as they end; exit code 1 if one failed.
+
+    `show` prints the results at the end.
+    """
 
     def grow(rows: Sequence[Row]) -> None:
         write(rows)
@@ -130,7 +133,7 @@ def run_cells(
 
 
 def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
-    """The claims' table, from what other studies left behind."""
+    """Check the paper's claims against the results of other studies, and write the page."""
     refuse_scene(given, "claims", "runs in no room; leave it out")
     results = read_results(beside(given.pipeline, spec.results))
     found = judge(results)

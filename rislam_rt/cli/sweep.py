@@ -68,7 +68,7 @@ def command(
 
 
 def _run(sweep: "Sweep", target: Path, effort: "SweepOptions") -> "SweepReport":
-    """The sweep with its bar; scores and their picture grow beside the table."""
+    """Run a pipeline's sweep with a progress bar, updating scores and their figure as cells end."""
     from rislam_rt.cli.progress import show_sweep
     from rislam_rt.pipeline.run import prepare_channel
     from rislam_rt.report.studies.sweep import draw_scores

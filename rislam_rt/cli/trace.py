@@ -25,14 +25,15 @@ AT_REST = "at level 0"
 
 
 class TraceResult(NamedTuple):
-    """What a trace leaves behind."""
+    """Result of `rislam-rt trace`: paths along the trajectory, time taken, and entries for JSON."""
 
     paths: "Paths"
     seconds: float
+    """Time [s] that finding the paths took."""
     panel: str
-    """What the panel was set to."""
+    """Phase codes of the panel, in words."""
     content: dict[str, Any]
-    """For the machine-readable copy."""
+    """Further entries of the JSON file."""
 
 
 def command(
@@ -100,12 +101,12 @@ def command(
 
 
 def check_new(folder: Path) -> None:
-    """For `trace --deepmimo`: refuse a folder that is there already, before anything is traced.
+    """Check the folder of `trace --deepmimo` before paths are traced: it must not exist.
 
     Raises
     ------
     ConfigError
-        It is there already, or has a name that the package cannot load.
+        It exists, or has a name that the DeepMIMO package cannot load.
     """
     from rislam_rt.errors import ConfigError
     from rislam_rt.report.exports.deepmimo import check_name
@@ -116,7 +117,7 @@ def check_new(folder: Path) -> None:
 
 
 def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
-    """The scene to trace with a part of its trajectory's cycles.
+    """Scene with the first `cycles` of its trajectory alone, of these every `stride`-th.
 
     Raises
     ------
@@ -136,7 +137,7 @@ def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
 
 
 def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> TraceResult:
-    """Trace all paths with the panel at level 0, to a file if one is given."""
+    """Find all paths along a scene's trajectory with the RIS panel at phase level 0; written to a file if one is given."""
     from time import perf_counter
 
     from rislam_rt.pipeline.dataset import paths_to_dataset
@@ -156,7 +157,7 @@ def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, 
 def trace_signals(
     scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
 ) -> TraceResult:
-    """All paths under the codes asked for, their samples, and what the receiver finds in them, written to a file."""
+    """Find all paths under phase codes, simulate received samples and components, and write the data set to a file."""
     from itertools import count
     from time import perf_counter
 

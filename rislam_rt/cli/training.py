@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a pipeline that trains the classifier; loaded for that alone."""
+"""Training of the component classifier on the command line: runs a pipeline file of kind `train_classifier`."""
 
 import typer
 
@@ -34,7 +34,7 @@ PICTURES = {
 
 
 def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
-    """Train the classifier of components and score it; weights, page, data and figures."""
+    """Train and score the classifier of multipath components, and write weights, page, data and figures."""
     refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]

@@ -1,4 +1,4 @@
-"""What `rislam-rt run` does with a study in unseen rooms; loaded for that alone."""
+"""The study in unseen rooms on the command line: runs a pipeline file of kind `unseen` for `rislam-rt run`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ from rislam_rt.sweeps.store import check_folder, read_timings
 
 
 def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
-    """Draw the rooms, run what the file asks for in each, print and write the score card; exit code 1 if one failed."""
+    """Run the study in unseen random rooms, print the scores and write its page; exit code 1 if a room failed."""
     refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)

@@ -1,4 +1,4 @@
-"""Verbosity, what a command says beside its result: `-q` no bars and warnings, `-v` what it used, where it failed."""
+"""Verbosity of commands: `-q` without progress bars and warnings, `-v` with versions, times and tracebacks."""
 
 import inspect
 from collections.abc import Callable
@@ -14,7 +14,7 @@ Verbose = Annotated[
 
 
 class Verbosity(NamedTuple):
-    """What was asked for."""
+    """Options `--quiet` and `--verbose` of the running command."""
 
     quiet: bool = False
     verbose: bool = False
@@ -24,24 +24,24 @@ _now = Verbosity()
 
 
 def verbosity() -> Verbosity:
-    """Verbosity of the command that runs."""
+    """Verbosity of the running command."""
     return _now
 
 
 def reset() -> None:
-    """Verbosity as before any command."""
+    """Reset the verbosity to neither quiet nor verbose, before a command."""
     global _now
     _now = Verbosity()
 
 
 def warn(line: str) -> None:
-    """Print a warning on the error stream, unless quiet was asked for by verbosity."""
+    """Print a warning on the error stream, unless the verbosity is quiet."""
     if not _now.quiet:
         typer.echo(f"warning: {line}", err=True)
 
 
 def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command with the options of verbosity, `-q` and `-v`, behind its own."""
+    """Add the options `--quiet` and `--verbose` to a command."""
 
     @wraps(command)
     def wrapped(*arguments: Any, quiet: bool = False, verbose: bool = False, **options: Any) -> Any:
@@ -55,7 +55,7 @@ def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def with_switches(wrapped: Callable[..., Any], command: Callable[..., Any], **switches: Any) -> Callable[..., Any]:
-    """A wrapped command with switches, such as those of verbosity, behind the command's own options."""
+    """Give a wrapper of a command the command's signature with boolean options, such as `--quiet`, added."""
     own = inspect.signature(command)
     more = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
             for name, kind in switches.items()]  # fmt: skip
@@ -65,7 +65,7 @@ def with_switches(wrapped: Callable[..., Any], command: Callable[..., Any], **sw
 
 
 def _watched(command: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """With verbosity `-v`, say what the command used."""
+    """Run a command and print library versions and the time that it took, for the verbosity `-v`."""
     from time import perf_counter, process_time
 
     from rislam_rt.pipeline.run import library_versions

@@ -1,4 +1,4 @@
-"""Floor 8: figures, tables and the page of a run."""
+"""Reports: figures, terminal tables and HTML pages of runs, pages of studies, exports to other programs."""
 
 from rislam_rt.report.page import draw_figures, write_report
 

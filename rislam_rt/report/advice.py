@@ -1,4 +1,4 @@
-"""The adviser's word on the terminal, and the panel's coverage as a picture."""
+"""Advice on a scene: a terminal table of which landmarks will be detected, and a figure of the panel's coverage."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,12 +20,13 @@ from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import save_figure, styled
 
 STEPS_DB = np.arange(-18.0, 31.0, 6.0)
-"""Of the map's colours; zero, where it begins to be heard, is one of them."""
+"""Limits [dB] of the coverage map's colours; zero is the detection threshold."""
 UNSEEN = "#d9d9d9"
+"""Colour of places in the coverage map that no direct path from the panel reaches."""
 
 
 def print_advice(advice: Advice) -> None:
-    """Print the adviser's word: one row a landmark and kind of codes, then what would help, then the cost."""
+    """Print a table of the SNR margin of each landmark along the trajectory, remedies, and the cost of tracing."""
     console = Console(highlight=False)
     table = Table("landmark", "codes", "start", "middle", "end", "heard", "why not")
     for link in advice.links:
@@ -43,7 +44,7 @@ def print_advice(advice: Advice) -> None:
 
 
 def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Path:
-    """A map for each panel over the room's plan, the edge of hearing as a line; returns the file."""
+    """Draw a coverage map of each RIS panel, SNR of its direct path over the threshold, to a file; return its path."""
     low, high = scene.bounds
     height = float(np.clip(6.0 * (high[1] - low[1]) / (high[0] - low[0]), 2.5, 9.0)) + 1.2
     with styled():
@@ -54,6 +55,7 @@ def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Pa
 
 
 def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
+    """Draw one panel's coverage map over the room's plan, with the line where the SNR meets the threshold."""
     from matplotlib import colormaps
 
     colours = colormaps["viridis"].with_extremes(bad=UNSEEN)
@@ -77,7 +79,7 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
 
 
 def _cell(link: LandmarkLink, at: int) -> str:
-    """Cell of the adviser's table: the margin at a place, in brackets where it is not heard all the same."""
+    """Cell of the advice table: a landmark's SNR margin [dB] at one place, in brackets where it is not detected."""
     if link.margin_db[at] <= NOTHING_DB:
         return "none"
     text = f"{link.margin_db[at]:+.1f}"
@@ -85,5 +87,6 @@ def _cell(link: LandmarkLink, at: int) -> str:
 
 
 def _why(link: LandmarkLink) -> str:
+    """The most frequent reason why a landmark is not detected; empty if it is."""
     said = [reason for reason in link.reason if reason]
     return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)

@@ -1,4 +1,4 @@
-"""Codes as pictures."""
+"""Pictures of the RIS panel's phase codes: level of every element, for runs and for the designs of a position."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,11 +15,11 @@ from rislam_rt.report.room import middle_cycles
 from rislam_rt.report.style import save_figure, styled
 
 MAX_LABELLED = 10
-"""Largest side of a panel whose elements are labelled with their levels."""
+"""Largest side of a panel whose elements are labelled with their phase levels."""
 
 
 def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
-    """Codes that the panel was set to at some cycles, one row a scheme; None without a panel."""
+    """Figure of the phase codes applied at `number` cycles of a run, a row for each scheme; None without a panel."""
     schemes = [scheme for scheme in result.schemes.values() if scheme.applied.shape[1]]
     if not schemes:
         return None
@@ -41,7 +41,10 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
 
 
 def draw_codes(designs: Mapping[str, Design], path: Path, sheet: DataSheet | None = None) -> Path:
-    """The codes of several designs, with the gain of the direct path; returns the file. `sheet`: of several panels."""
+    """Draw the phase codes that several methods designed, with the gain of their target path; return the file's path.
+
+    `sheet` is the data sheet, needed for several panels.
+    """
     with styled():
         columns = (len(designs) + 1) // 2
         figure = Figure(figsize=(2.4 * columns + 0.8, 5.4))
@@ -56,8 +59,7 @@ def draw_codes(designs: Mapping[str, Design], path: Path, sheet: DataSheet | Non
 
 
 def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataSheet | None = None) -> None:
-    """Picture of the levels of an (N, M) code, row 0 at the bottom (rows run along `up`); several panels side by
-    side."""
+    """Draw the phase levels of an (N, M) code, row 0 at the bottom as on the panel; several panels side by side."""
     if isinstance(sheet, RisSpecs):
         index = _side_by_side([part.index for part in sheet.parts(RisCode(index, levels))])
     axis.imshow(index, cmap=_colours(levels), vmin=-0.5, vmax=levels - 0.5, origin="lower", interpolation="nearest")
@@ -72,13 +74,14 @@ def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataShe
 
 
 def _colours(levels: int) -> ListedColormap:
-    """Colours of a code's levels, from a map that goes round as phase does."""
+    """Colours of a code's phase levels, from a cyclic colour map."""
     from matplotlib import colormaps
 
     return ListedColormap(colormaps["twilight"](np.arange(levels) / levels))
 
 
 def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.object_]]", levels: int) -> None:
+    """Add a colour bar of the phase shifts."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -90,7 +93,7 @@ def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.o
 
 
 def _side_by_side(parts: Sequence[Integers]) -> Floats:
-    """Codes of several panels as one, NaN where no element is, a column between them."""
+    """Join the phase codes of several panels in one array with NaN between them, and below the lower ones."""
     rows, cols = max(len(part) for part in parts), sum(part.shape[1] for part in parts) + len(parts) - 1
     whole, first = np.full((rows, cols), np.nan), 0
     for part in parts:

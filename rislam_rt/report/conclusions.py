@@ -1,4 +1,4 @@
-"""Conclusions on a run, in sentences: the first thing that a reader of its page sees."""
+"""Conclusions on a run in sentences, for the head of its page: errors, what was mapped, and why a landmark was not."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -12,25 +12,25 @@ from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
-"""Schemes in words; others go by their names."""
+"""Schemes in words; others are called by their names."""
 AT_BOUND = float(np.sqrt(-np.log(0.05)))
-"""Error over posterior bound up to which a run counts as at the bound: 1.73. Of the runs of an efficient estimator
-whose error along two axes lasts over the run (chi-square with two degrees of freedom), 95 % lie below."""
+"""Largest ratio, 1.73, of RMSE to posterior bound at which a run counts as at the bound: for an efficient estimator
+whose error along two axes is constant over the run (chi-square, two degrees of freedom), 95 % of runs lie below."""
 
 
 class Conclusions(NamedTuple):
-    """Sentences, the most important first."""
+    """Sentences on a run: a headline, the results of each scheme, and the landmarks that each did not map."""
 
     headline: str
-    """All schemes in one."""
+    """RMSE of all schemes in one sentence."""
     schemes: dict[str, str]
-    """What each found."""
+    """Results of each scheme, by name."""
     missing: dict[str, list[str]]
-    """What each did not find, and why."""
+    """Landmarks that each scheme did not map, and why, by name."""
 
 
 def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
-    """Conclusion on a run from its scores and from what could be heard in it."""
+    """Conclusions on a run in sentences, from its scores and from the SNR of its paths."""
     found, missing = {}, {}
     for name, scheme in result.schemes.items():
         scores = summary["schemes"][name]
@@ -40,7 +40,7 @@ def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
-    """First conclusion: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes, ...`"""
+    """Headline of a run: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes, ...`"""
     best, *others = schemes.items()
     parts = [f"{_centimetres(best[1]['rmse_m'])} with {_words(best[0])}"]
     parts += [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in others]
@@ -50,6 +50,7 @@ def _headline(schemes: Mapping[str, Any]) -> str:
 
 
 def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> str:
+    """Results of one scheme in words: RMSE and bound, panel, scatterers and walls mapped."""
     over = scores["over_bound"]
     bound = f"{_centimetres(scores['bound_m'])} would be possible" if scores["bound_m"] else "no bound"
     parts = [f"{_centimetres(scores['rmse_m'])}, " + ("at the bound" if over and over <= AT_BOUND else bound)]
@@ -66,7 +67,7 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
 
 
 def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
-    """Conclusion on the panel: time [s] from which the map holds it to the end; None if it does not."""
+    """Time [s] from which on a scheme's map has the RIS panel identified until the run's end; None if not then."""
     if panel >= len(result.scene.panels):
         return None
     column = landmark_track(result.scene, scheme).column[:, len(result.scene.scatterers) + panel]
@@ -83,7 +84,7 @@ def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> 
 
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
-    """Conclusion, one line, on each landmark that the last map lacks."""
+    """One line for each landmark that is missing in a scheme's last map, with the reason."""
     spec = PipelineSpec.model_validate(dict(result.config))
     settings = build_settings(spec)
     threshold = build_sensor(settings.radio, settings.receiver).threshold
@@ -98,9 +99,9 @@ def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]
 
 
 def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
-    """Conclusion why a landmark with paths (K, P) of these SNRs is not in the map.
+    """Reason in words why a landmark is not mapped: no path, SNR below the threshold, or detected too seldom.
 
-    `threshold` is that of detection; both linear, over all antennas.
+    `snr` and `valid` (K, P) are those of its paths, `threshold` that of detection; linear, over all antennas.
     """
     if not valid.any():
         return "no path reaches the agent"
@@ -115,8 +116,10 @@ def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
 
 
 def _words(name: str) -> str:
+    """Name of a scheme in words."""
     return CODES.get(name, name)
 
 
 def _centimetres(metres: float) -> str:
+    """Length in centimetres, or in metres from one on, with two digits."""
     return f"{100.0 * metres:.2g} cm" if metres < 1.0 else f"{metres:.2g} m"

@@ -8,12 +8,12 @@ from rislam_rt.geometry.triangles import outline_edges
 
 
 def wall_edges(walls: Walls) -> Floats:
-    """(E, 2, 3) [m] edges of all walls, without the lines between triangles of the same wall."""
+    """Edges (E, 2, 3) [m] of all walls, for drawing, without those between triangles of the same wall."""
     return outline_edges(walls.triangles, walls.wall_of_triangle)
 
 
 def section(triangles: Floats, height: float) -> Floats:
-    """(S, 2, 2) [m] segments in which triangles (T, 3, 3) cut the horizontal plane at `height`."""
+    """Line segments (S, 2, 2) [m] in which triangles (T, 3, 3) cut the horizontal plane at `height`, for drawing."""
     above = triangles[:, :, 2] - height
     cut = triangles[(above.min(axis=1) < 0.0) & (above.max(axis=1) > 0.0)]
     segments = []
@@ -28,7 +28,10 @@ def section(triangles: Floats, height: float) -> Floats:
 
 
 def plane_trace(normal: Floats, offset: float, height: float, bounds: Floats) -> Floats | None:
-    """Segment (2, 2) [m] in which a plane cuts the horizontal plane at `height`, inside a box; None if it misses."""
+    """Line segment (2, 2) [m] in which an estimated wall's plane cuts the horizontal plane at `height` inside a box.
+
+    None if it misses the box, or is nearer to horizontal than to vertical.
+    """
     flat, level = normal[:2], offset - normal[2] * height
     size = float(np.linalg.norm(flat))
     if size < 0.5:  # nearer to a floor or a ceiling than to a wall
@@ -47,7 +50,7 @@ def plane_trace(normal: Floats, offset: float, height: float, bounds: Floats) ->
 
 
 def ellipse(center: Floats, covariance: Floats, sigmas: float = 2.0) -> Floats:
-    """Points (65, 2) of the ellipse of so many standard deviations of a 2-D Gaussian."""
+    """Points (65, 2) of the ellipse of `sigmas` standard deviations of a 2-D Gaussian, for drawing."""
     value, vector = np.linalg.eigh(covariance)
     turn = np.linspace(0.0, 2.0 * np.pi, 65)
     circle = np.stack([np.cos(turn), np.sin(turn)])

@@ -1,4 +1,4 @@
-"""A run's map from above: room, path, landmarks and walls, true and estimated, one panel a scheme."""
+"""Figure of a run's map from above: room, trajectory, landmarks and walls, true and estimated, for each scheme."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,17 +18,20 @@ from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wal
 from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 
 ZOOM = 0.25
-"""Half the width [m] of the close-up of the path's end, unless the error is larger."""
+"""Half the width [m] of the close-up of the trajectory's end, unless the error is larger."""
 
 SHADE = "#d9cdb8"
-"""Colour of what hides and does not reflect."""
+"""Colour of occluders."""
 
 WALL_NAME, MOST_NAMES = "#54606e", 40
-"""Colour of walls' names, and how many are written at most."""
+"""Colour of the walls' names, and the largest number of names written."""
 
 
 def draw_above(result: SlamResult) -> Figure:
-    """Draw the map from above, one panel a scheme: room, path, landmarks, walls, and a close-up of the path's end."""
+    """Draw a run's true and estimated trajectory, landmarks and walls from above, for each scheme side by side.
+
+    Each has a close-up of the trajectory's end.
+    """
     schemes = list(result.schemes.values())
     low, high = result.scene.bounds
     aspect = (high[1] - low[1]) / (high[0] - low[0])
@@ -50,7 +53,7 @@ def draw_above(result: SlamResult) -> Figure:
 
 
 def draw_plan(axis: Axes, scene: Scene) -> None:
-    """Walls (thick where they stand at the agent's height), occluders, path and landmarks as they are."""
+    """Draw the plan of a scene from above: walls (thick at the agent's height), occluders, trajectory, landmarks."""
     walls, path = build_walls(scene), scene.agent.position
     cuts = section(walls.triangles, float(path[-1, 2]))
     axis.add_collection(PolyCollection(list(walls.occluders.triangles[..., :2]), color=SHADE, lw=0.5, zorder=0))
@@ -68,13 +71,13 @@ def draw_plan(axis: Axes, scene: Scene) -> None:
 
 
 def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
-    """Names of the reflectors, and the middle (3,) [m] of the largest wall of each; not of all, if they are many."""
+    """Names of a scene's reflectors and the centroid (3,) [m] of the largest wall of each, at most `MOST_NAMES`."""
     named = [(reflector.name, largest_middle(reflector.triangles)) for reflector in scene.reflectors]
     return named[:MOST_NAMES]
 
 
 def largest_middle(triangles: Floats) -> Floats:
-    """Centroid (3,) [m] of the largest of triangles (T, 3, 3), with those that share its plane."""
+    """Centroid (3,) [m] of the largest of triangles (T, 3, 3) together with those that share its plane."""
     across = triangle_cross(triangles)
     area = np.linalg.norm(across, axis=1)
     normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
@@ -84,7 +87,7 @@ def largest_middle(triangles: Floats) -> Floats:
 
 
 def name_walls(axis: Axes, scene: Scene) -> None:
-    """Names at walls that stand up, along them; a floor or a ceiling has none from above."""
+    """Write the names of upright walls beside them in a plan; floors and ceilings have none."""
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
     for (name, point), reflector in zip(wall_places(scene), scene.reflectors, strict=False):
         extent = np.ptp(reflector.vertices, axis=0)
@@ -98,7 +101,7 @@ def name_walls(axis: Axes, scene: Scene) -> None:
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
-    """A true landmark on the map, its name and height beside it."""
+    """Draw a true landmark in the plan, its name and height beside it."""
     axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
     axis.annotate(f"{name}\nz = {point[2]:.1f} m", (point[0], point[1]), (12, 0), textcoords="offset points",
@@ -106,7 +109,7 @@ def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
 
 
 def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
-    """What the agent's map holds after the last cycle."""
+    """Draw the estimated trajectory, and the walls and landmarks of a scheme's last map that match true ones."""
     colour = scheme_colour(scheme.scheme)
     axis.plot(scheme.position[:, 0], scheme.position[:, 1], color=colour, lw=1.4, zorder=4)
     walls = build_walls(scene)
@@ -138,8 +141,7 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
 
 
 def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
-    """Close-up of the map: the last stretch of the path, magnified, with the believed 2 sigma ellipse of the last
-    position."""
+    """Draw a close-up of the trajectory's end, with the estimator's 2 sigma ellipse of the last position."""
     truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
     colour = scheme_colour(scheme.scheme)
     low, high = scene.bounds[:, :2]
@@ -165,6 +167,7 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) 
 
 
 def _legend() -> list[Line2D]:
+    """Legend entries of the map."""
     grey = "#555555"
     return [
         Line2D([], [], color=WALL, lw=3.0, label="true wall"),

@@ -1,4 +1,4 @@
-"""The report of a run: figures as files, and one page that holds them all."""
+"""The report page of a run: an HTML file with conclusions, map, figures and scores, and the figures as PNG files."""
 
 import base64
 import html
@@ -54,7 +54,7 @@ td, th { overflow-wrap: normal; }
 
 
 def write_report(result: SlamResult, summary: Mapping[str, Any], folder: Path) -> Path:
-    """Write `figures/*.png` and `report.html` into a run folder; returns the page.
+    """Write the report of a run, `figures/*.png` and `report.html`, into its folder; return the page's path.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def write_report(result: SlamResult, summary: Mapping[str, Any], folder: Path) -
 
 
 def draw_figures(result: SlamResult) -> dict[str, bytes]:
-    """All figures of a run as PNG, by name, in the order of the page."""
+    """Draw all figures of a run's report as PNG, by name, in the order of the page."""
     spec = PipelineSpec.model_validate(dict(result.config))
     settings = build_settings(spec)
     snr = 10.0 * float(np.log10(settings.radio.integrated_snr(np.ones(()))))
@@ -97,7 +97,7 @@ def draw_figures(result: SlamResult) -> dict[str, bytes]:
 
 
 def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
-    """One HTML page with everything in it."""
+    """HTML page of a run's report, self-contained, with its figures, map, conclusions and scores."""
     title = f"{result.name} in {result.scene.name}"
     about = f"{summary['cycles']} cycles, seed {summary['seed']}, paths {result.paths.source} in "
     about += f"{summary['trace_seconds']:.1f} s."
@@ -147,4 +147,5 @@ time of each step on this machine.</p>
 
 
 def _bullets(lines: Sequence[str]) -> str:
+    """HTML list of the landmarks that were not found; empty without any."""
     return f"<ul>{''.join(f'<li>not found: {html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""

@@ -1,4 +1,4 @@
-"""The room in three dimensions, with the paths of one cycle; as a page, with its plan."""
+"""Figures of a room in three dimensions, with the paths of one cycle, or beside its plan from above."""
 
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,11 @@ from rislam_rt.report.map_from_above import SHADE, WALL_NAME, draw_plan, name_wa
 from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, styled
 
 LABEL = np.array([0.02, 0.0, 0.014])
-"""From an object to its name in the three-dimensional picture, in sizes of the room."""
+"""Offset of an object's name in the three-dimensional figure, relative to the room's size."""
 
 
 def draw_paths(scene: Scene, paths: Paths, gain: Floats, cycle: int, title: str) -> Figure:
-    """The room in three dimensions, with the paths of one cycle that have at most one wall bounce.
+    """Draw a room in three dimensions with the paths of one cycle that have at most one wall bounce.
 
     `gain` (P,) are the magnitudes of the path gains in that cycle.
     """
@@ -37,7 +37,7 @@ def draw_paths(scene: Scene, paths: Paths, gain: Floats, cycle: int, title: str)
 
 
 def draw_scene(scene: Scene, path: Path) -> Path:
-    """A room from above and in three dimensions, without any run; returns the file."""
+    """Draw a scene from above and in three dimensions to a file, and return the file's path."""
     with styled():
         figure = Figure(figsize=(11.0, 5.0))
         flat = figure.add_subplot(1, 2, 1)
@@ -56,6 +56,7 @@ def draw_scene(scene: Scene, path: Path) -> Path:
 
 
 def _draw_room_3d(axis: Any, scene: Scene) -> None:
+    """Draw walls, floor and occluders of a room in three dimensions."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     walls = build_walls(scene)
@@ -80,6 +81,7 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
 
 
 def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
+    """Draw trajectory, agent, scatterers and panels in three dimensions."""
     path = scene.agent.position
     label = LABEL * float(np.max(scene.bounds[1] - scene.bounds[0]))
     axis.plot(*path.T, color=TRUTH, lw=2.0, alpha=0.3, zorder=3)
@@ -94,7 +96,7 @@ def _draw_objects_3d(axis: Any, scene: Scene, cycle: int) -> None:
 
 
 def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int, kind: PathKind) -> Line2D | None:
-    """Paths of one class in the room's picture; the legend says how many of them are shown."""
+    """Draw the paths of one class with at most one wall bounce in a room's figure; return its legend entry."""
     columns = np.flatnonzero((paths.kind == kind) & paths.valid[cycle])
     if not len(columns):
         return None
@@ -111,12 +113,12 @@ def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int,
 
 
 def path_points(scene: Scene, paths: Paths, cycle: int, path: int) -> Floats:
-    """(V + 2, 3) [m] points of a path in the room's picture: Tx, interaction points, Rx."""
+    """Points (V + 2, 3) [m] of one path in a cycle, for drawing: Tx, interaction points, Rx."""
     count = int(paths.num_vertices[path])
     inner = paths.vertices[cycle, path, :count]
     return np.concatenate([scene.agent.tx[cycle][None], inner, scene.agent.rx[cycle][None]])
 
 
 def middle_cycles(count: int, number: int) -> Integers:
-    """Cycles shown in the room's picture, at the middles of `number` equal parts of `count`."""
+    """Cycles to be shown in a figure: the middles of `number` equal parts of `count` cycles."""
     return ((np.arange(number) + 0.5) / number * count).astype(np.int64)

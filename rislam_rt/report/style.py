@@ -1,4 +1,4 @@
-"""One style for all figures: colours that colour-blind readers can tell apart (Okabe and Ito), sizes, file writing."""
+"""Style of all figures: colours that colour-blind readers can tell apart (Okabe and Ito), markers, file writing."""
 
 import io
 import warnings
@@ -39,7 +39,7 @@ MARKER = {
     "bp_slam_aoa": "^",
     "channel_slam": "P",
 }
-"""Marker of each scheme, so that colour is never all that tells them apart."""
+"""Marker of each scheme in every figure, so that schemes differ not in colour alone."""
 KIND = {
     PathKind.LOS: "black",
     PathKind.VT: "#999999",
@@ -50,7 +50,7 @@ KIND = {
 }
 """Colour of each path class."""
 MARKED_BY = {"png": "Comment", "svg": "Description", "pdf": "Subject"}
-"""Formats of pictures, and the field of each that holds the program's mark."""
+"""Picture formats, and the metadata field of each that holds the program's mark (`storage.files.MARK`)."""
 SETTINGS: dict[Any, Any] = {
     "font.size": 10,
     "axes.titlesize": 11,
@@ -67,13 +67,13 @@ SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the style of all figures."""
+    """Set the common style of all figures within this context."""
     with mpl.rc_context(SETTINGS):
         yield
 
 
 def close_up(axis: Any, middle: Floats, half: float) -> None:
-    """Make an axis a close-up: a framed square about a point (2,), `half` [m] to each side, without marks."""
+    """Make an axis a close-up of a map: a framed square about a point (2,), `half` [m] to each side, without ticks."""
     axis.set_xlim(middle[0] - half, middle[0] + half)
     axis.set_ylim(middle[1] - half, middle[1] + half)
     axis.set_aspect("equal")
@@ -84,31 +84,31 @@ def close_up(axis: Any, middle: Floats, half: float) -> None:
 
 
 def scheme_colour(name: str) -> str:
-    """Colour of a scheme in the figures' style."""
+    """Colour of a scheme in all figures."""
     return SCHEME.get(name, "#0072B2")
 
 
 def _save(figure: Figure, target: Any, **how: Any) -> None:
-    """Save a figure; a name that the fonts lack is drawn as boxes, which is no warning's worth."""
+    """Save a figure without warnings about characters that the fonts lack, which are drawn as boxes."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         figure.savefig(target, **how)
 
 
 def to_png(figure: Figure) -> bytes:
-    """A figure in the common style as PNG."""
+    """Encode a figure as PNG."""
     buffer = io.BytesIO()
     _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
     return buffer.getvalue()
 
 
 def picture_kind(path: Path) -> str:
-    """Format of a picture by its file's ending.
+    """Format of a picture file by its suffix: `png`, `svg` or `pdf`.
 
     Raises
     ------
     ConfigError
-        It is none that can be drawn.
+        It is another.
     """
     kind = path.suffix.lstrip(".").lower()
     if kind not in MARKED_BY:
@@ -117,12 +117,12 @@ def picture_kind(path: Path) -> str:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure, its format by the file's ending, whole or not at all.
+    """Write a figure to a PNG, SVG or PDF file by the file's suffix, whole or not at all.
 
     Raises
     ------
     ConfigError
-        The ending is of no format that can be drawn.
+        The suffix is another.
     StoreError
         The disk refused.
     """

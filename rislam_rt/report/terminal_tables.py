@@ -1,4 +1,4 @@
-"""Tables for the terminal."""
+"""Tables for the terminal: scores of runs, path classes, channel comparisons, code designs, sweeps, scenes."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
-    """Table of a run on the terminal: agent, landmarks and walls, one column a scheme."""
+    """Print the scores of a run as a table, a column for each scheme: RMSE of agent, landmarks and walls, bound."""
     schemes = summary["schemes"]
     title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
     table = Table()
@@ -30,7 +30,7 @@ def print_summary(summary: Mapping[str, Any]) -> None:
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of the run's table: label, then one entry a scheme."""
+    """Rows of the table of a run's scores: label, then one cell for each scheme."""
     schemes = list(summary["schemes"].values())
     first = schemes[0]
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
@@ -55,13 +55,13 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _said(outcomes: Mapping[str, int]) -> str:
-    """Entry of a table: in how many cycles an estimator said, without the truth, that it had diverged."""
+    """Table cell: in how many cycles the estimator itself reported divergence."""
     cycles = outcomes.get("diverged", 0)
     return f"in {cycles} of {sum(outcomes.values())} cycles" if cycles else "never"
 
 
 def path_table(paths: Paths) -> list[dict[str, Any]]:
-    """Table of path classes: how many identities, how many a cycle, and the range of their gains."""
+    """Statistics of the paths of each class: number of identities, mean number per cycle, range of gains [dB]."""
     rows = []
     for kind in PathKind:
         columns = np.flatnonzero(paths.kind == kind)
@@ -82,7 +82,7 @@ def path_table(paths: Paths) -> list[dict[str, Any]]:
 
 
 def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: float, panel: str) -> None:
-    """The table of `path_table`; `panel` says what the panel was set to."""
+    """Print the statistics of path classes from `path_table`; `panel` are the panel's phase codes in words."""
     title = f"{name}: {paths.num_cycles} cycles, {paths.source}, {seconds:.2f} s (panel {panel})"
     table = Table("class", "identities", "a cycle", "gain \\[dB]")
     for row in rows:
@@ -92,9 +92,9 @@ def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: fl
 
 
 def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> None:
-    """Matched, explained and unexplained paths, the largest errors, and how near their limits the errors come.
+    """Print the comparison of traced and image-source paths in a room: matched, explained and unexplained, errors.
 
-    Two columns: the tracer's own float32, which is the verdict, and refined numbers.
+    Two columns: the tracer's own float32, by which the channels agree or not, and refined numbers.
     """
     title = f"{name}: {refined.cycles} poses"
     table = Table("traced against analytic", "float32", "refined")
@@ -123,7 +123,7 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
 
 
 def _print_faults(report: "PathReport", of: str, at: str) -> None:
-    """Beside a table: the first paths that nothing explains, and the first errors beyond their limits."""
+    """Print the first ten unexplained paths and the first ten errors beyond their limits of a channel comparison."""
     for path in [p for p in report.one_sided if not p.reason][:10]:
         print(f"unexplained: {of}, {at} {path.cycle}, {path.label}, only {path.side}")
     for breach in report.breaches[:10]:
@@ -131,12 +131,12 @@ def _print_faults(report: "PathReport", of: str, at: str) -> None:
 
 
 def _nearest(limits: "Mapping[str, Any]") -> str:
-    """Entry of a table: how much of its limit the path uses up that comes nearest to it."""
+    """Table cell: the largest ratio of a path's error to its limit."""
     return f"{limits['nearest']['share']:.1%}" if limits else "-"
 
 
 def print_validation(rows: Sequence["Validation"]) -> None:
-    """One line a room and kind of numbers: counts, and the largest error in length; then what fails."""
+    """Print the comparison of both channels in many rooms, a line for each room and kind of numbers, then failures."""
     table = Table("room", "numbers", "matched", "explained", "open", "beyond", "length \\[m]")
     for scene, _, numbers, report in rows:
         counts = (report.matched, sum(report.explained.values()), report.unexplained, report.num_breaches)
@@ -150,7 +150,7 @@ def print_validation(rows: Sequence["Validation"]) -> None:
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], target: str) -> None:
-    """One row a method: gain of the target path, its gap to the optimum, the bound on the position, time."""
+    """Print the phase code designs of one position by method: gain of the target path, gap to the optimum, CRLB, time."""
     at = ", ".join(f"{x:g}" for x in point)
     title = f"{name}, agent at ({at}) m, target {target}"
     table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]")
@@ -164,7 +164,7 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], t
 
 
 def print_sweep(scores: Sequence["SchemeScore"]) -> None:
-    """Table of a sweep on the terminal: one line a point of the axes and a scheme."""
+    """Print the scores of a sweep as a table, a line for each point of the axes and scheme."""
     keys = [key.rpartition(".")[2] for key in scores[0].point if key != "schemes"]
     table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")
     for score in scores:
@@ -177,7 +177,7 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
 
 
 def print_scene(scene: Scene) -> None:
-    """Table of what a room holds, on the terminal."""
+    """Print the contents of a scene as a table: reflectors, scatterers, panels, trajectory, bounds."""
     low, high = scene.bounds
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
@@ -196,22 +196,24 @@ def print_scene(scene: Scene) -> None:
 
 
 def _show(title: str, table: Table) -> None:
-    """Print a table under its title (rich would wrap a title at the table's width)."""
+    """Print a table on the terminal under its title, which rich would wrap at the table's width."""
     console = Console(highlight=False)
     console.print(title, style="bold", markup=False)
     console.print(table)
 
 
 def _metres(value: float | None) -> str:
-    """As the sentences and the map of the report: centimetres below a metre."""
+    """Table cell: an error in centimetres, or in metres from one on; `not found` if None."""
     if value is None:
         return "not found"
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
 
 
 def _wall(score: Mapping[str, Any]) -> str:
+    """Table cell: distance and angle error of a wall."""
     return "not found" if score["rmse_m"] is None else f"{_metres(score['rmse_m'])}, {score['angle_deg']:.1f}°"
 
 
 def _point(point: "Floats") -> str:
+    """Table cell: coordinates of a point."""
     return "(" + ", ".join(f"{x:.2f}" for x in point) + ")"

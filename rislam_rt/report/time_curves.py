@@ -1,4 +1,4 @@
-"""Curves against time: errors with what the filter believes of them, and the levels of the path classes."""
+"""Figures of curves against time: errors of agent and landmarks with the filter's own std, gains of path classes."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,7 +12,7 @@ from rislam_rt.report.style import KIND, scheme_colour, styled
 
 
 def draw_agent_error(result: SlamResult) -> Figure:
-    """Distance between true and estimated position, with the believed standard deviation as a band."""
+    """Draw the agent's position error of all schemes against time, the filter's own standard deviation as a band."""
     time = result.scene.agent.elapsed
     with styled():
         figure = Figure(figsize=(8.6, 4.1))
@@ -36,7 +36,7 @@ def draw_agent_error(result: SlamResult) -> Figure:
 
 
 def draw_landmark_errors(result: SlamResult) -> Figure:
-    """Draw landmark errors against time: distance of each true one from the estimate that stands for it."""
+    """Draw the position errors of a run's landmarks against time, for all schemes: distance to the matched estimate."""
     scene, time = result.scene, result.scene.agent.elapsed
     tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
     with styled():
@@ -60,7 +60,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
 
 
 def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: float) -> Figure:
-    """Strongest path of each class against time; the panel's once a scheme.
+    """Draw the gain of the strongest path of each class against time; that of the panel for each scheme's codes.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
 
 
 def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
-    """Curve (K,) of the level [dB] of the strongest of some paths; NaN where there is none."""
+    """Gain (K,) [dB] of the strongest of some paths in each cycle; NaN where there is none."""
     gain = np.abs(scheme.gain[:, columns]).max(axis=1, initial=0.0)
     with np.errstate(divide="ignore"):
         level = 20.0 * np.log10(gain)

@@ -1,4 +1,4 @@
-"""Timing of the cycle's four steps against their budgets."""
+"""Figure of the computing times of the cycle's four steps against their time budgets (timing)."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from rislam_rt.report.style import scheme_colour, styled
 
 
 def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
-    """Draw the timing of steps: median (bar), 99th percentile (whisker), and budget [s]."""
+    """Draw the computing times of the cycle's steps: median (bar), 99th percentile (whisker), and `budget` [s]."""
     schemes = result.schemes
     height = 0.8 / len(schemes)
     with styled():

@@ -1,1 +1,1 @@
-"""A run or a room in formats of other programs: GIF, Rerun, DeepMIMO."""
+"""Exports of runs and traced scenes in formats of other programs: GIF, Rerun, DeepMIMO."""

@@ -1,4 +1,4 @@
-"""Animation of a run as a GIF: the room from above, and beside it the agent in close-up, moment by moment."""
+"""Animation of a run as a GIF: the room from above, and beside it a close-up of the agent."""
 
 import io
 from typing import TYPE_CHECKING, Any
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FRAMES = 80
-"""Moments of a picture."""
+"""Number of frames of an animation."""
 FRAME_MS, LAST_MS = 100, 2500
-"""[ms] that each is shown, and the last."""
+"""[ms] Duration of a frame, and of the last one."""
 WIDTH, DPI = 8.0, 80
-"""Of the picture: [inch], and dots to the inch."""
+"""Width of a frame [inch], and dots per inch."""
 LEAST_HALF = 0.05
 """[m] Least half width of the close-up."""
 HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""[m] Half widths of the close-up: the least that holds all errors but the largest twentieth."""
+"""[m] Half widths of the close-up, of which the least is taken that holds 95 % of the errors."""
 
 
 def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
-    """The animation as a GIF file. `tell` is told of every frame."""
+    """Draw the animation of a run and encode it as GIF; `tell` reports progress after every frame."""
     rows = spread(len(result.scene.agent), FRAMES)
     pictures: list[Image] = []
     with styled():
@@ -64,7 +64,7 @@ def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
 
 
 def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
-    """Figure of the animation with all that stands still, its layout settled."""
+    """Draw all of the animation that does not move; return figure, map axis and close-up axis."""
     low, high = result.scene.bounds
     aspect = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.35, 1.6))
     figure = Figure(figsize=(WIDTH, 0.6 * WIDTH * aspect + 0.9), dpi=DPI)
@@ -89,6 +89,7 @@ def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
 
 
 def _half_width(result: SlamResult) -> float:
+    """Half width [m] of the animation's close-up, for the errors of a run."""
     truth = result.scene.agent.position
     errors = [np.linalg.norm(scheme.position - truth, axis=1) for scheme in result.schemes.values()]
     need = 1.3 * float(np.quantile(np.concatenate(errors), 0.95))
@@ -96,7 +97,7 @@ def _half_width(result: SlamResult) -> float:
 
 
 def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list[Artist]:
-    """All that moves in the animation at one moment, to be taken off again."""
+    """Draw all that moves in one frame of the animation, and return it to be removed for the next."""
     scene, half = result.scene, _half_width(result)
     truth = scene.agent.position[cycle, :2]
     moving: list[Artist] = []
@@ -111,6 +112,7 @@ def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list
 
 
 def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> list[Artist]:
+    """Draw a scheme's estimated trajectory, 2 sigma ellipse and landmarks up to a cycle."""
     colour, done = scheme_colour(scheme.scheme), scheme.position[: cycle + 1, :2]
     ring = ellipse(done[-1], scheme.covariance[cycle, :2, :2])
     moving: list[Artist] = []
@@ -127,7 +129,7 @@ def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> li
 
 
 def _picture(canvas: Any) -> "Image":
-    """A frame of the animation in the 256 colours of a GIF."""
+    """Convert a drawn frame of the animation to an image of 64 colours."""
     from PIL import Image
 
     return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()).quantize(64)

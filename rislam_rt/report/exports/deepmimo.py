@@ -1,4 +1,4 @@
-"""A traced scene as a scenario of DeepMIMO v4, which its package reads; written without it.
+"""Export of a traced scene as a scenario of DeepMIMO v4, written without its package.
 
 Each quantity is one `.npz` file for a pair of Tx and Rx sets, receivers by
 paths, the strongest first, filled up with NaN; `params.json` describes radio, sets and materials; the room is a
@@ -18,9 +18,9 @@ from rislam_rt.model.itu import itu_parameters
 from rislam_rt.storage.files import json_file
 
 FORMAT_VERSION = "4.0.5"
-"""Of the package whose readers these files were made for."""
+"""Version of the DeepMIMO package whose readers these files are made for."""
 REFLECTION, SCATTERING = 1, 3
-"""DeepMIMO's interaction codes: a path's are the digits of one number, from the Tx on; a line of sight is 0."""
+"""DeepMIMO's interaction codes: those of a path are the digits of one number, from the Tx on; a line of sight is 0."""
 NO_DIFFUSE = ("diffuse_reflections", "diffuse_diffractions", "diffuse_transmissions")
 NO_FLAGS = (
     "diffuse_final_interaction_only",
@@ -32,12 +32,12 @@ NO_FLAGS = (
 NO_SCATTERING = ("cross_polarization_coefficient", "roughness", "vertical_attenuation", "horizontal_attenuation")
 """Settings that the format wants and that have no meaning here: paths are specular or run over a point."""
 METAL = 1e7
-"""[S/m] of a metal in ITU-R P.2040."""
+"""[S/m] Conductivity of a metal in ITU-R P.2040."""
 PER_PATH = ("power", "phase", "delay", "aod_az", "aod_el", "aoa_az", "aoa_el", "inter", "inter_pos")
 
 
 def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, bytes]:
-    """All files of a DeepMIMO scenario by name.
+    """Files of a DeepMIMO scenario by name, from a scene and the paths along its trajectory.
 
     Power is the path gain [dB], phase [deg] holds the carrier's, so that the sum over paths is the channel at the
     carrier; angles [deg] are azimuth and zenith angle in the world's frame. The panel is at the level of `paths`.
@@ -62,19 +62,19 @@ def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -
 
 
 def check_name(name: str) -> None:
-    """A DeepMIMO scenario's folder must be one that its package finds: names in lower case alone.
+    """Check the folder name of a DeepMIMO scenario: its package finds lower-case names alone.
 
     Raises
     ------
     ConfigError
-        It is not.
+        The name has upper case or special characters.
     """
     if name != name.lower() or set(name) & set("/\\:*?\"'<>|\n"):
         raise ConfigError(f"--deepmimo: '{name[:60]}' is a name that deepmimo cannot load; use lower case and no marks")
 
 
 def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
-    """DeepMIMO's matrices of one cycle, (1, P) each and (1, P, V, 3) for the points, strongest path first."""
+    """DeepMIMO's path matrices of one cycle, (1, P) each and (1, P, V, 3) for the points, strongest path first."""
     found = np.flatnonzero(paths.valid[cycle])
     found = found[np.argsort(-np.abs(paths.gain[cycle, found]), kind="stable")]
     gain = paths.gain[cycle, found]
@@ -100,7 +100,7 @@ def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
 
 
 def _interactions(paths: Paths, path: int) -> int:
-    """DeepMIMO's digits of a path: reflections at walls, one scattering at a landmark or at the panel."""
+    """DeepMIMO's interaction number of a path: digits for reflections at walls, scattering at a landmark or panel."""
     kind, _, tx, rx = paths.identity(path)
     middle = [] if kind in (PathKind.LOS, PathKind.VT) else [SCATTERING]
     digits = len(tx) * [REFLECTION] + middle + len(rx) * [REFLECTION]
@@ -108,7 +108,7 @@ def _interactions(paths: Paths, path: int) -> int:
 
 
 def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, Any]:
-    """What DeepMIMO's `params.json` says of the scenario: tracer, scene, materials, Tx and Rx."""
+    """Content of DeepMIMO's `params.json`: tracer, scene, materials, Tx and Rx."""
     from rislam_rt import __version__
 
     faces = sum(len(one.faces) for one in scene.reflectors)
@@ -166,10 +166,12 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
 
 
 def _distinct(scene: Scene) -> list[Material]:
+    """Materials of a scene's reflectors, each once."""
     return list(dict.fromkeys(one.material for one in scene.reflectors))
 
 
 def _materials(scene: Scene, radio: RadioConfig) -> list[dict[str, Any]]:
+    """DeepMIMO's entries of a scene's materials."""
     return [
         {"id": number, "name": one.words, "thickness": one.thickness}
         | dict.fromkeys(NO_SCATTERING, 0.0)
@@ -199,7 +201,7 @@ def _electric(material: Material, carrier: float) -> dict[str, float]:
 
 
 def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:
-    """DeepMIMO's room: reflectors as one pool of vertices, with faces and materials of each."""
+    """DeepMIMO's files of the room: vertices of all reflectors, with faces and materials of each."""
     materials = _distinct(scene)
     faces: dict[str, Integers] = {}
     kinds: dict[str, Integers] = {}
@@ -222,6 +224,7 @@ def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:
 
 
 def _npz(arrays: Mapping[str, Any]) -> bytes:
+    """Encode arrays as the content of a compressed `.npz` file."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()

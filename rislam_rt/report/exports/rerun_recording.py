@@ -1,4 +1,4 @@
-"""A run as a recording for the Rerun viewer: the room, the true way, and what each scheme held for true, over time."""
+"""Export of a run as a recording for the Rerun viewer: room, true trajectory, and each scheme's estimates over time."""
 
 from typing import Any
 
@@ -14,16 +14,16 @@ from rislam_rt.report.style import scheme_colour
 TIMELINE = "time"
 TWO_SIGMA = 2.0
 GREY = (90, 90, 90)
-"""Of what is true."""
+"""Colour of the true room, trajectory and landmarks."""
 
 
 def recording_bytes(result: SlamResult, identity: str) -> bytes:
-    """Recording for Rerun as the content of an `.rrd` file, metres and seconds.
+    """Encode a run as a recording for the Rerun viewer, the content of an `.rrd` file in metres and seconds.
 
     Parameters
     ----------
     identity
-        Names the recording: the viewer holds two files of one name for one.
+        Name of the recording: the viewer takes two files of one name for the same.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def recording_bytes(result: SlamResult, identity: str) -> bytes:
 
 
 def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
-    """Record for Rerun the edges of the walls, true landmarks, true way: the same at all times."""
+    """Add the edges of the walls, true landmarks and true trajectory to a Rerun recording, for all times."""
     stream.log("/", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     edges = wall_edges(build_walls(scene))
     stream.log("truth/room", rerun.LineStrips3D(edges, colors=[GREY]), static=True)
@@ -63,7 +63,7 @@ def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
 
 
 def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: int) -> None:
-    """Record for Rerun the estimate of a cycle with its 2 sigma ellipsoid, and the map as it then was."""
+    """Add a scheme's estimated position, its 2 sigma ellipsoid and the landmarks of a cycle to a Rerun recording."""
     from scipy.spatial.transform import Rotation
 
     size, axes = np.linalg.eigh(scheme.covariance[cycle, :3, :3])
@@ -88,4 +88,5 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
 
 
 def _colour(scheme: str) -> tuple[int, ...]:
+    """Colour of a scheme as red, green, blue from 0 to 255."""
     return tuple(round(255 * part) for part in to_rgb(scheme_colour(scheme)))

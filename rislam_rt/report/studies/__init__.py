@@ -1,1 +1,1 @@
-"""Pages, tables and figures of the studies that run in one piece, and of a sweep."""
+"""Pages, tables and figures of single studies (channel comparison, Fig. 4(a), claims, classifier) and of a sweep."""

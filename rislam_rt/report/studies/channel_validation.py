@@ -1,4 +1,4 @@
-"""The page on the validation of the channels: what was compared, and a table with a row a room."""
+"""The page of the channel validation: how traced and image-source paths were compared, and a table of all rooms."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -38,7 +38,7 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 
 
 def validation_table(rows: Sequence[Validation]) -> str:
-    """Markdown table: paths per room, every reason with its count and weakest proof, largest errors."""
+    """Markdown table of the channel validation: matched and one-sided paths with reasons, largest errors, by room."""
     cells = []
     for scene, depth, kind, report in rows:
         numbers = report.as_dict()
@@ -52,14 +52,14 @@ def validation_table(rows: Sequence[Validation]) -> str:
 
 
 def validation_page(rows: Sequence[Validation], *, seed: int) -> str:
-    """The page `docs/results/channel_validation.md`: what was compared, and the table."""
+    """Markdown page of the channel validation: method and table."""
     return f"{_TEXT}Seed {seed}; poses at random, midpoint at least 0.1 m off every surface, baseline 0.1 m.\n\n" + (
         validation_table(rows)
     )
 
 
 def _reasons(numbers: Mapping[str, Any]) -> str:
-    """Cell of the comparison's table: `edge: 3 (1.2e-6 m)`, one reason after the other."""
+    """Table cell of the channel validation: reasons of one-sided paths, as `edge: 3 (1.2e-6 m)`."""
     limits = numbers["proof_limits_m"]
     texts = [
         f"{reason}: {n}" + (f" ({limits[reason]:.1e} m)" if limits[reason] else "")
@@ -69,12 +69,12 @@ def _reasons(numbers: Mapping[str, Any]) -> str:
 
 
 def _share(limits: Mapping[str, Any]) -> str:
-    """Cell of the comparison's table: share of its limit that the nearest path takes."""
+    """Table cell of the channel validation: largest ratio of a path's error to its limit."""
     return f"{limits['nearest']['share']:.0%}" if limits else "-"
 
 
 def _error(spread: Mapping[str, float]) -> str:
-    """Cell of the comparison's table: largest error and 99th percentile; rounding is rounding, whatever its digits."""
+    """Table cell of the channel validation: largest error and 99th percentile; `< 1e-12` for mere rounding."""
     if not spread:
         return "-"
     return " ".join(

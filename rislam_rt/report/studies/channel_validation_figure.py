@@ -1,4 +1,4 @@
-"""The figure of the channel validation: both path sets of one pose, what only one side has, and the errors."""
+"""The figure of the channel validation: traced and image-source paths at one pose, one-sided paths, and errors."""
 
 from collections.abc import Sequence
 
@@ -16,16 +16,15 @@ from rislam_rt.report.style import KIND, TRUTH, WALL, styled
 from rislam_rt.studies.compare import Certificate
 
 ALONE = "#CC79A7"
-"""Colour of a path that only one side has."""
+"""Colour of a path that only one channel has."""
 FLOOR = 1e-16
-"""Smallest error that is drawn: a tenth of the spacing of float64 at 1."""
+"""Smallest error that is drawn: half the spacing of float64 at 1."""
 MOST_LISTED = 6
-"""One-sided paths whose proofs are written out."""
+"""Largest number of one-sided paths whose explanations are written out."""
 
 
 def draw_certificate(certificate: Certificate) -> Figure:
-    """Draw the certificate of two channels in four parts: traced paths, analytic paths, one-sided ones with their
-    proofs, and errors of the matched ones."""
+    """Draw the comparison of both channels at one pose: traced paths, image-source paths, one-sided ones, errors."""
     scene, report = certificate.scene, certificate.report
     low, high = scene.bounds
     aspect = float((high[1] - low[1]) / (high[0] - low[0]))
@@ -52,7 +51,7 @@ def draw_certificate(certificate: Certificate) -> Figure:
 
 
 def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) -> None:
-    """All paths of one side in the certificate, from above; those that the other side lacks on top."""
+    """Draw all paths of one channel from above, those that the other channel lacks on top."""
     _draw_plan(axis, certificate)
     columns = np.flatnonzero(paths.valid[0])
     only = {path.label for path in certificate.report.one_sided if path.side == name}
@@ -67,7 +66,7 @@ def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) ->
 
 
 def _draw_alone(axis: Axes, certificate: Certificate) -> None:
-    """What only one side has, in the certificate, and the proof of each below."""
+    """Draw the paths that only one channel has, with their explanations below."""
     _draw_plan(axis, certificate)
     sides = {"traced": certificate.traced, "analytic": certificate.analytic}
     one_sided = certificate.report.one_sided
@@ -83,7 +82,7 @@ def _draw_alone(axis: Axes, certificate: Certificate) -> None:
 
 
 def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
-    """Proofs in the certificate, one line a path, the first few of them."""
+    """Explanations of the first one-sided paths of a channel comparison as text."""
     if not one_sided:
         return "nothing: both sides have the same paths"
     lines = [f"{p.label}\n  only {p.side}: {p.reason or 'UNEXPLAINED'}, {p.proof}" for p in one_sided[:MOST_LISTED]]
@@ -92,8 +91,7 @@ def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
 
 
 def _draw_errors(axis: Axes, certificate: Certificate) -> None:
-    """Errors of matched paths in the certificate, the tracer's float32 against float64: one row of dots a quantity and
-    class."""
+    """Draw the errors of matched paths, the tracer's float32 against float64, in rows by quantity and path class."""
     report = certificate.report
     rows = (
         ("length [m]", report.length_error), ("gain [dB]", report.gain_error_db), ("phase [rad]", report.phase_error),
@@ -114,7 +112,7 @@ def _draw_errors(axis: Axes, certificate: Certificate) -> None:
 
 
 def _draw_plan(axis: Axes, certificate: Certificate) -> None:
-    """Walls from above in the certificate, landmarks, Tx and Rx."""
+    """Draw walls, landmarks and agent of the compared pose from above."""
     scene = certificate.scene
     for edge in wall_edges(build_walls(scene)):
         axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)

@@ -1,4 +1,4 @@
-"""The claims as a page and a table."""
+"""The page and table of the paper's claims compared with our results."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from rislam_rt.studies.claims import Claim
 
 
 def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any], folder: Path) -> Path:
-    """Write the claims as `<name>.md`, `.csv` and `.json`; returns the page.
+    """Write the comparison of the paper's claims with our results as `<name>.md`, `.csv` and `.json`; return the page.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def write_claims(claims: Sequence[Claim], name: str, sources: Mapping[str, Any],
 
 
 def claims_page(claims: Sequence[Claim], sources: Mapping[str, Any]) -> str:
-    """Markdown: one table of all claims."""
+    """Markdown page of the paper's claims compared with our results."""
     made = ", ".join(f"`{name}` (seed {about['seed']})" for name, about in sources.items())
     text = f"""From the results of {made}; written by `rislam-rt run` from one pipeline, do not edit. A claim
     without its SNR, start and motion says little: each is judged at every SNR of Fig. 4(b) and for each motion.

@@ -1,4 +1,4 @@
-"""The classifier's page and figures: F1 room by room, what each feature is worth, and how it grows with age."""
+"""The page and figures of the component classifier's scores: F1 by room, path class, track age, SNR and feature."""
 
 import io
 from collections.abc import Sequence
@@ -27,18 +27,18 @@ SNRS = (5, 10, 13, 16, 20, 25, 30, 40, 60)
 CODES = """`random` a new one each cycle; `held` one random one; `aimed` the best for the direct path from the middle of
 the walk, held; `exact` the best for the direct path in each cycle."""
 FEWEST = 5
-"""Looks at the panel's direct path in a room under one policy, from which on its share of them says something."""
+"""Least number of examples of the direct panel path in a room and policy for its share of mistakes to be shown."""
 
 
 def weights_file(found: Training) -> bytes:
-    """The classifier's trained network as `.npz` without pickle."""
+    """Encode the classifier's trained network as the content of an `.npz` file without pickle."""
     buffer = io.BytesIO()
     np.savez(buffer, **network_arrays(found.network))
     return buffer.getvalue()
 
 
 def draw_scores(found: Training) -> Figure:
-    """Draw the classifier's scores: F1 of every rule in every room, with intervals."""
+    """Draw the classifier's scores: F1 of every classification rule in every room, with intervals."""
     rooms = {name: scores for name, scores in found.scores.items() if has_keep(found, name)}
     place = np.arange(len(rooms))
     with styled():
@@ -65,8 +65,7 @@ def draw_scores(found: Training) -> Figure:
 
 
 def draw_importance(found: Training) -> Figure:
-    """Draw the classifier's loss of F1 when a feature is shuffled, and F1 against age of the track and SNR, on the test
-    rooms."""
+    """Draw the importance of the classifier's features, and F1 against the track's age and SNR, on the test rooms."""
     with styled():
         figure = Figure(figsize=(12.0, 4.8))
         left, middle, right = figure.subplots(1, 3)
@@ -89,8 +88,7 @@ def draw_importance(found: Training) -> Figure:
 
 
 def draw_panel(found: Training) -> Figure:
-    """Draw the share of looks at the panel's direct path in which the classifier removes it: a dot a room, by policy
-    and rule."""
+    """Draw how often the classifier wrongly removes the direct panel path, a dot a room, by code policy and rule."""
     judges = rules(found.network)
     with styled():
         figure = Figure(figsize=(9.0, 4.0))
@@ -109,7 +107,7 @@ def draw_panel(found: Training) -> Figure:
 
 
 def classifier_table(found: Training) -> dict[str, Any]:
-    """All scores of the classifier's study as plain data, for the JSON beside its page."""
+    """All scores of the classifier as plain data, for the JSON file beside its page."""
     tested, drawn, judges = found.sets.tested, found.sets.all_drawn, rules(found.network)
     return {
         "scores": {
@@ -131,7 +129,7 @@ def classifier_table(found: Training) -> dict[str, Any]:
 
 
 def classifier_page(found: Training, spec: ClassifierSpec, figures: Sequence[str] | None) -> str:
-    """The classifier's page: what was done, scores by room, by class and of the panel by code, features."""
+    """Markdown page of the classifier: method, scores by room and path class, panel by code policy, features."""
     about = f"""Written by `rislam-rt run` from one pipeline, do not edit. Seed {spec.seed}, paths by
     {"ray tracing" if spec.channel == "traced" else "image sources"}, receiver `{spec.receiver.estimator}`. Trained on
     {spec.train} random rooms, one walk of {spec.cycles} cycles each, reference SNR {spec.snr_low_db:g} to
@@ -164,17 +162,18 @@ def classifier_page(found: Training, spec: ClassifierSpec, figures: Sequence[str
 
 
 def has_keep(found: Training, name: str) -> bool:
-    """Whether there is anything for the classifier to keep in a room."""
+    """Whether a room has any component that the classifier should keep."""
     return name not in found.sets.test or bool(found.sets.test[name].keep.any())
 
 
 def share_of(found: Training, name: str) -> tuple[float, float]:
-    """Share of the classifier's labelled components, and of those to keep, that comes from a room."""
+    """Share of all components in the classifier's test, and of those to keep, that a named room has."""
     room, tested = found.sets.test[name], found.sets.tested
     return float(room.labelled.sum() / tested.labelled.sum()), float(room.keep.sum() / max(tested.keep.sum(), 1))
 
 
 def _score_table(found: Training) -> list[str]:
+    """Table of the classifier's scores by room."""
     titles = ["room", "share of components", "of those to keep", *NAME.values(), "precision", "recall",
               "removed rightly", "clutter kept"]  # fmt: skip
     rows = []
@@ -197,7 +196,7 @@ def _rooms(found: Training) -> dict[str, Examples]:
 
 
 def _panel_summary(found: Training) -> list[str]:
-    """Panel looks that the classifier drops by code and rule: share of all, and of the room where largest."""
+    """Table of how often the direct panel path is removed, by code policy and rule: of all examples, and worst room."""
     judges = rules(found.network)
     titles = ["codes", "looks", "rooms", *(f"{name}: dropped, worst room" for name in NAME.values())]
     rows = []
@@ -214,7 +213,7 @@ def _panel_summary(found: Training) -> list[str]:
 
 
 def _panel_rooms(found: Training) -> list[str]:
-    """Panel looks that the network drops by code, of all, and those of the baselines under the best code."""
+    """Table of how often the direct panel path is removed in each room: by the network, and by baselines."""
     judges = rules(found.network)
     titles = ["room", *(f"`{policy}`" for policy in POLICIES), "geometric, `exact`", "amplitude, `exact`"]
     rows = []
@@ -227,6 +226,7 @@ def _panel_rooms(found: Training) -> list[str]:
 
 
 def _class_table(found: Training, examples: Examples) -> list[str]:
+    """Table of the share of misclassified examples by path class and rule."""
     tables = {rule: mistakes(examples, judge) for rule, judge in rules(found.network).items()}
     rows = [[kind, str(total), *(f"{tables[rule][kind][0] / total:.3f}" for rule in NAME)]
             for kind, (_, total) in tables["network"].items()]  # fmt: skip
@@ -234,6 +234,7 @@ def _class_table(found: Training, examples: Examples) -> list[str]:
 
 
 def _room_mistakes(found: Training) -> list[str]:
+    """Table of the network's misclassified examples by room and path class."""
     judge = rules(found.network)["network"]
     tables = {name: mistakes(examples, judge) for name, examples in found.sets.test.items()}
     kinds = list(mistakes(found.sets.tested, judge))
@@ -243,6 +244,7 @@ def _room_mistakes(found: Training) -> list[str]:
 
 
 def _bin_table(found: Training) -> list[str]:
+    """Table of F1 by the track's age and by SNR."""
     rows = []
     for unit, maker in (("measurements", _by_age), ("dB", _by_snr)):
         bins = {rule: maker(found, rule) for rule in NAME}
@@ -252,15 +254,18 @@ def _bin_table(found: Training) -> list[str]:
 
 
 def _by_age(found: Training, rule: str) -> dict[str, tuple[float, int]]:
+    """F1 and number of examples by the track's age."""
     tested = found.sets.tested
     return by_value(tested, rules(found.network)[rule], tested.age.astype(np.float64), AGES)
 
 
 def _by_snr(found: Training, rule: str) -> dict[str, tuple[float, int]]:
+    """F1 and number of examples by SNR [dB]."""
     tested = found.sets.tested
     level = 10.0 / np.log(10.0) * tested.features[:, FEATURES.index("snr")]
     return by_value(tested, rules(found.network)[rule], level, SNRS)
 
 
 def _f1(score: ClassifierScore) -> str:
+    """Table cell: F1 with its interval."""
     return f"{score.f1:.3f} ({score.low:.3f} to {score.high:.3f})"

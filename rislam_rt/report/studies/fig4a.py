@@ -1,4 +1,4 @@
-"""Fig. 4(a) as a figure, as a table, and as a page that says what holds."""
+"""Figure, table and page of Fig. 4(a): panel gain against distance, and which of the paper's claims hold."""
 
 from typing import Any
 
@@ -15,11 +15,11 @@ from rislam_rt.studies.spec import Fig4aSpec
 
 SPHERE = "#009E73"
 NUM_SHOWN = 9
-"""Places in the page's table."""
+"""Number of places in the page's table."""
 
 
 def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
-    """Draw Fig. 4(a): gain against distance, one part an element pattern."""
+    """Draw Fig. 4(a): gain of the panel against distance, a part for each element pattern."""
     with styled():
         figure = Figure(figsize=(1.0 + 4.6 * len(found.curves), 4.6))
         axes = figure.subplots(1, len(found.curves), sharey=True, squeeze=False)[0]
@@ -43,7 +43,7 @@ def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
 
 
 def fig4a_csv(found: Fig4a) -> bytes:
-    """Fig. 4(a) as CSV, one row a pattern and place."""
+    """Encode the curves of Fig. 4(a) as CSV, a row for each element pattern and place."""
     head = [
         "element", "distance_m", "x_m", "y_m", "z_m", "optimized_db", "optimized_low_db", "optimized_high_db",
         "random_rms_db", "random_low_db", "random_high_db", "exact_db", "continuous_db", "sphere_db",
@@ -59,7 +59,7 @@ def fig4a_csv(found: Fig4a) -> bytes:
 
 
 def fig4a_table(found: Fig4a) -> dict[str, Any]:
-    """Fig. 4(a) as plain data: curves, and which order of them holds at how many places."""
+    """Curves of Fig. 4(a) as plain data, with the number of places at which each of the paper's claims holds."""
     return {
         "distance_m": found.distance.tolist(),
         "sphere_radius_m": found.radius,
@@ -79,8 +79,10 @@ def fig4a_table(found: Fig4a) -> dict[str, Any]:
 
 
 def claims(found: Fig4a, curves: GainCurves) -> dict[str, Booleans]:
-    """Claims of Fig. 4(a): each order of two curves, and the places (K,) where it holds; optimised codes by their
-    interval's low end."""
+    """Places (K,) at which each claimed order of two curves of Fig. 4(a) holds, by claim.
+
+    Optimised codes count by the low end of their interval.
+    """
     return {
         "optimised above random codes, intervals apart": curves.optimized.low > curves.random.high,
         "optimised above the sphere": curves.optimized.low > found.sphere,
@@ -89,7 +91,7 @@ def claims(found: Fig4a, curves: GainCurves) -> dict[str, Booleans]:
 
 
 def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) -> str:
-    """Page of Fig. 4(a): what was done, what holds, the picture (if there is one), a table a pattern."""
+    """Markdown page of Fig. 4(a): method, which claims hold, the picture if any, a table by element pattern."""
     lines = ["# Gain against distance: Fig. 4(a)", "", *_method(found, spec, scene), "", "## What holds", ""]
     lines += ["The paper's claim: optimised codes lie significantly above random codes and above the sphere.", ""]
     for element in found.curves:
@@ -108,7 +110,7 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
 
 
 def _method(found: Fig4a, spec: Fig4aSpec, scene: str) -> list[str]:
-    """Where the curves of Fig. 4(a) come from."""
+    """Lines on how the curves of Fig. 4(a) were computed."""
     source = "ray tracing (Sionna RT)" if spec.channel == "traced" else "image sources"
     far, near, share = found.distance[0], found.distance[-1], f"{spec.coverage:.0%}"
     return [
@@ -127,7 +129,7 @@ def _method(found: Fig4a, spec: Fig4aSpec, scene: str) -> list[str]:
 
 
 def findings_of(found: Fig4a, element: str) -> list[str]:
-    """What holds in Fig. 4(a) with one element pattern, and where what does not hold fails."""
+    """Lines on which claims of Fig. 4(a) hold with one element pattern, and at which distances they fail."""
     curves = found.curves[element]
     gap = curves.exact - curves.optimized.middle
     return [
@@ -139,7 +141,7 @@ def findings_of(found: Fig4a, element: str) -> list[str]:
 
 
 def _extent(distance: Floats, where: Booleans) -> str:
-    """At how many places a claim of Fig. 4(a) holds, and the distances between which it does not."""
+    """Number of places at which a claim of Fig. 4(a) holds, and the distances between which it fails, in words."""
     if where.all():
         return f"at all {len(where)} places"
     near, far = distance[~where].min(), distance[~where].max()
@@ -149,9 +151,11 @@ def _extent(distance: Floats, where: Booleans) -> str:
 
 
 def _interval(curve: Any) -> dict[str, list[float]]:
+    """Middle and ends of a gain curve as lists, by name."""
     return {name: values.tolist() for name, values in curve._asdict().items()}
 
 
 def _spread(curve: Any, place: int) -> str:
+    """Table cell: gain at a place with its interval."""
     middle, low, high = (values[place] for values in curve)
     return f"{middle:.2f} ({low:.2f} to {high:.2f})"

@@ -1,4 +1,4 @@
-"""The files of a study: page, data and figures, each there whole or not at all."""
+"""Writing the files of the channel comparison and of Fig. 4(a): page, data and figure."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,7 +20,7 @@ CURVES, CURVES_FIGURE = "fig4a", "figures/fig4a.png"
 def write_comparison(
     found: Comparison, spec: CompareSpec, content: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path:
-    """Write the files of a comparison of channels: page, JSON and certificate; returns the page.
+    """Write the files of a comparison of both channels: page, JSON and figure; return the page's path.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def write_comparison(
 def write_fig4a(
     found: Fig4a, spec: Fig4aSpec, scene: str, content: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path:
-    """Write the files of the gain curves: page, CSV, JSON and figure; returns the page.
+    """Write the files of Fig. 4(a): page, CSV, JSON and figure; return the page's path.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The picture of a sweep: RMSE of the agent along one axis, a line for every scheme and value of the other axes."""
+"""Figure of a sweep: RMSE of the agent along one axis, a line for every scheme and value of the other axes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ LINES = ("-", "--", ":", "-.")
 
 
 def draw_scores(scores: Sequence[SchemeScore], path: Path) -> Path | None:
-    """Draw a sweep's scores so far; None, and no picture, before the first run has ended.
+    """Draw the RMSE of a sweep's runs so far to a file; no file and None before the first run has ended.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def draw_scores(scores: Sequence[SchemeScore], path: Path) -> Path | None:
 
 
 def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
-    """Figure of a sweep: RMSE with its interval, and how many runs each point rests on."""
+    """Figure of a sweep: RMSE with its interval along the main axis, and the number of runs for each point."""
     along = main_axis(scores)
     ticks = list(dict.fromkeys(str(score.point.get(along, score.scheme)) for score in scores))
     numeric = all(_is_number(score.point.get(along)) for score in scores)
@@ -66,20 +66,23 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
 
 
 def main_axis(scores: Sequence[SchemeScore]) -> str:
-    """Axis of a sweep along which it is drawn: the first of numbers, else the first but that of the schemes."""
+    """Axis along which a sweep's RMSE is drawn: the first with numbers, or else the first but that of the schemes."""
     keys = [key for key in scores[0].point if key != "schemes"]
     numbers = [key for key in keys if _is_number(scores[0].point[key])]
     return next(iter((*numbers, *keys)), "")
 
 
 def _others(point: Mapping[str, Any], along: str) -> str:
+    """Values of a point along the other axes, as text."""
     kept = {key: value for key, value in point.items() if key not in (along, "schemes")}
     return ", ".join(f"{key.rpartition('.')[2]} = {value}" for key, value in kept.items())
 
 
 def _place(score: SchemeScore, along: str, ticks: Sequence[str], numeric: bool) -> float:
+    """Abscissa of a point: its value along the main axis, or the number of its tick."""
     return float(score.point[along]) if numeric else float(ticks.index(str(score.point.get(along, score.scheme))))  # type: ignore[arg-type]
 
 
 def _is_number(value: Any) -> bool:
+    """Whether a value is a number, and not a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)

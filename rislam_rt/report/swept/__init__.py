@@ -1,4 +1,4 @@
-"""Swept studies as figures, tables and pages."""
+"""Figures, tables and pages of swept studies: Fig. 4(b) and (c), rooms, ablations, robustness, hardware."""
 
 from rislam_rt.report.swept.files import write_swept
 

@@ -1,4 +1,4 @@
-"""Ablations, one setting changed at a time: what each is worth, as table, figure and page."""
+"""Table, figure and page of the ablations: change of the RMSE with one setting changed at a time."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,7 +25,10 @@ WORSE, BETTER, SAME = "#D55E00", "#0072B2", "#8c8c8c"
 
 
 def ablations_content(groups: Sequence[Group], spec: AblationsSpec) -> dict[str, Any]:
-    """Plain data: one entry a variant and scheme; the change is against the reference's first scheme, seed by seed."""
+    """Scores of the ablations as plain data: an entry for each variant and scheme, with the change of its RMSE.
+
+    The change is that against the reference's first scheme, seed by seed.
+    """
     about = {variant.name: variant for variant in spec.variants}
     base = groups[0]
     own = base.column(base.schemes[0], "rmse_m") if base.schemes else np.full(len(base.results), np.nan)
@@ -41,7 +44,7 @@ def ablations_content(groups: Sequence[Group], spec: AblationsSpec) -> dict[str,
 
 
 def draw_ablations(content: Mapping[str, Any], spec: AblationsSpec) -> Figure:
-    """Draw ablations: RMSE of every variant with its interval, its bound as a tick, the reference as a line."""
+    """Draw the RMSE of every ablation with its interval, its posterior bound as a tick, the reference as a line."""
     entries = [entry for entry in content["entries"] if entry["rmse_m"] is not None]
     with styled():
         figure = Figure(figsize=(8.2, 1.4 + 0.3 * len(entries)))
@@ -63,7 +66,7 @@ def draw_ablations(content: Mapping[str, Any], spec: AblationsSpec) -> Figure:
 
 
 def ablations_body(content: Mapping[str, Any], spec: AblationsSpec, figure: str | None) -> list[str]:
-    """Page of the ablations: the picture, a table a group of variants."""
+    """Lines of the ablations' page: the picture, and a table for each group of variants."""
     lines = [
         f"The reference is `{content['reference']}`. The change is that of the agent's RMSE against it, from pairs of",
         "runs with the same motion and noise; more is worse.", "",
@@ -82,6 +85,7 @@ _HEAD = [
 
 
 def _row(entry: Mapping[str, Any]) -> list[str]:
+    """Table row of an ablation."""
     return [
         f"`{entry['variant']}`" + (f": {entry['note']}" if entry["note"] else ""), entry["scheme"],
         metres_between(entry), percent_between(entry, "change"), metres(entry["bound_m"]), ratio(entry["over_bound"]),
@@ -91,10 +95,12 @@ def _row(entry: Mapping[str, Any]) -> list[str]:
 
 
 def _colour(entry: Mapping[str, Any]) -> str:
+    """Colour of an ablation: better, worse, or no significant change."""
     if entry["change"] is None or entry["change_low"] <= 0.0 <= entry["change_high"]:
         return SAME
     return WORSE if entry["change"] > 0.0 else BETTER
 
 
 def _label(entry: Mapping[str, Any]) -> str:
+    """Label of an ablation in the figure."""
     return f"{entry['group']}: {entry['variant']}" if entry["group"] else str(entry["variant"])

@@ -1,4 +1,4 @@
-"""Entries of a swept study, one a point and scheme: numbers for tables, CSV and JSON, and how they are written."""
+"""Entries of swept studies: scores of one scheme at one point over all repetitions, and their form in tables."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,14 +13,15 @@ from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.swept import Group, paired_gain, spread
 
 NEAR_BOUND = 1.5
-"""RMSE over the posterior bound up to which the bound is what limits."""
+"""Largest ratio of RMSE to posterior bound at which the bound counts as what limits the error."""
 GOOD_ASSOCIATION = 0.95
-"""Share of components taken for what they were, below which association is held to limit."""
+"""Share of correctly associated components below which data association counts as what limits the error."""
 NOTHING = "-"
+"""Table cell without a value."""
 
 
 def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
-    """Entry of one scheme at one point of a study, over all repetitions. Errors are RMS over the repetitions."""
+    """Scores of one scheme at one point of a swept study over all repetitions; errors are RMS over the repetitions."""
     rmse, bound = group.column(scheme, "rmse_m"), group.column(scheme, "bound_m")
     overall, least = spread(rmse), spread(bound)
     known = rmse[~np.isnan(rmse)]
@@ -44,20 +45,22 @@ def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
 
 
 def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict[str, float | None]:
-    """Value and ends under three names of an entry; None where there is none."""
+    """Value and ends of an interval as three named numbers of an entry; None where there is none."""
     value, low, high = interval or (None, None, None)
     return {f"{name}{unit}": value, f"{name}_low{unit}": _finite(low), f"{name}_high{unit}": _finite(high)}
 
 
 def rmse_change(group: Group, scheme: str, reference: Floats) -> Interval | None:
-    """Change of the RMSE in a group's entry against a reference (R,) [m], seed by seed, as a share; more is worse."""
+    """Relative change of a scheme's RMSE against a reference (R,) [m], with its interval, from pairs of equal seeds."""
     gain = paired_gain(group.column(scheme, "rmse_m"), reference)
     return Interval(-gain.value, -gain.upper, -gain.lower) if gain else None
 
 
 def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> str:
-    """What limits an entry's error, the agent's, or one so far over its bound: the first of bound, association and
-    filter that explains it."""
+    """What limits an error: `bound` if it is near its posterior bound, else `association` if that is poor, or `filter`.
+
+    The error is the agent's, or one that is `over_bound` times its bound.
+    """
     over_bound = entry["over_bound"] if over_bound is None else over_bound
     if over_bound is None:
         return NOTHING
@@ -67,18 +70,18 @@ def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> st
 
 
 def entries_csv(entries: Sequence[Mapping[str, Any]]) -> bytes:
-    """Entries as CSV; lists are left out, numbers have six digits."""
+    """Encode the entries of a study as CSV; lists are left out, numbers have six digits."""
     names = [name for name, value in entries[0].items() if not isinstance(value, list)] if entries else []
     return csv_file(names, ([_cell(entry[name]) for name in names] for entry in entries))
 
 
 def metres(value: float | None) -> str:
-    """Entry in metres, three decimals."""
+    """Table cell: a length in metres with three decimals."""
     return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
 
 
 def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
-    """Entry in metres: an error with its interval."""
+    """Table cell: an entry's error in metres with its interval."""
     value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
     if value is None or low is None:
         return metres(value)
@@ -86,12 +89,12 @@ def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Entry as a ratio, two decimals."""
+    """Table cell: a ratio with two decimals."""
     return NOTHING if value is None else f"{value:.2f}"
 
 
 def percent_between(entry: Mapping[str, Any], name: str) -> str:
-    """Entry in percent: a share with its interval."""
+    """Table cell: a share of an entry in percent with its interval."""
     if entry[name] is None:
         return NOTHING
     found = (entry[name + end] for end in ("", "_low", "_high"))
@@ -100,7 +103,7 @@ def percent_between(entry: Mapping[str, Any], name: str) -> str:
 
 
 def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, list[Mapping[str, Any]]]:
-    """Entries of each scheme, sorted by one of their numbers."""
+    """Entries of a study grouped by scheme, each group sorted by one number."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for entry in sorted(entries, key=lambda entry: float(entry[along])):
         found.setdefault(entry["scheme"], []).append(entry)
@@ -108,7 +111,7 @@ def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, lis
 
 
 def failure_notes(groups: Sequence[Group]) -> list[str]:
-    """Notes in markdown beside entries: how many runs failed or diverged, and why they failed."""
+    """Markdown lines on how many runs of a study failed or diverged, with the error messages."""
     runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
     diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)
@@ -119,20 +122,19 @@ def failure_notes(groups: Sequence[Group]) -> list[str]:
 
 
 def panel_of(group: Group, scheme: str) -> str | None:
-    """Name of the landmark in an entry that is the panel, of several the first."""
+    """Name of the landmark in a scheme's scores that is the panel, of several the first; None without one."""
     known = _panels_of(group, scheme)
     return known[0] if known else None
 
 
 def _panels_of(group: Group, scheme: str) -> list[str]:
-    """Names of the landmarks in an entry that are panels."""
+    """Names of the landmarks in a scheme's scores that are panels."""
     names = group.parts(scheme, "landmarks")
     return [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """Landmarks of an entry: errors at the end of the run with their bounds, and the share of (landmark, run) pairs
-    that were in the map then.
+    """RMS errors of panel and scatterers at the end of the runs with their bounds, and the share that was mapped then.
 
     None where there is nothing to be found.
     """
@@ -148,10 +150,9 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """Walls of an entry: angle and distance errors at the end of the run over all that were found, with bounds and own
-    deviation.
+    """RMS angle and distance errors of the walls found at the end of the runs, with bounds and the map's own std.
 
-    The share is that of those found among the walls that are heard: for `HEARD` s in all, as in unseen rooms.
+    The share found is that among walls with a path above the detection threshold for `HEARD` s in all.
     """
     names = group.parts(scheme, "walls")
     angle, offset, own, least, near, audible = (
@@ -171,35 +172,38 @@ def _walls(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _pooled(group: Group, scheme: str, name: str, members: Sequence[str], part: str) -> Floats:
-    """A score pooled for an entry over all members, e.g. walls, in all repetitions."""
+    """One score of all members, e.g. all walls, in all repetitions, as one array."""
     return np.concatenate([np.zeros(0), *(group.column(scheme, name, member, part) for member in members)])
 
 
 def bound_beside(bound: Floats, error: Floats) -> float | None:
-    """Bound beside an entry's error: RMS over those that were found, so that it compares with their error; of all, if
-    none was."""
+    """RMS bound of the landmarks or walls that were found, to compare with their error; of all if none was."""
     found = ~np.isnan(error)
     return _rms(bound[found] if found.any() else bound)
 
 
 def _rms(values: Floats) -> float | None:
+    """RMS of the values that are known; None without any."""
     known = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else None
 
 
 def mean_known(values: Floats) -> float | None:
-    """Mean of an entry's values that are known; None without any."""
+    """Mean of the values that are not NaN; None without any."""
     known = values[~np.isnan(values)]
     return float(np.mean(known)) if len(known) else None
 
 
 def _share(values: Floats) -> float | None:
+    """Share of values that are not NaN; None of no values."""
     return float(np.mean(~np.isnan(values))) if len(values) else None
 
 
 def _finite(value: float | None) -> float | None:
+    """The value; None if it is not finite."""
     return value if value is not None and np.isfinite(value) else None
 
 
 def _cell(value: Any) -> Any:
+    """CSV cell of a value, numbers with six digits."""
     return "" if value is None else f"{value:.6g}" if isinstance(value, float) else value

@@ -1,4 +1,5 @@
-"""Error curves of the schemes: a band for the interval, the bound dashed, names at the ends of the lines."""
+"""Drawing of error curves: RMSE of each scheme with its interval as a band, the posterior bound dashed, names at the
+ends."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,11 +14,11 @@ from rislam_rt.arrays import Floats
 from rislam_rt.report.style import MARKER, TRUTH, scheme_colour
 
 GAP = 0.055
-"""Least distance between two names, in heights of the axes."""
+"""Least distance between the names of two curves, relative to the height of the axes."""
 
 
 def draw_schemes(axis: Axes, x: Sequence[float], curves: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Draw one curve a scheme, from its entries along x, on a logarithmic axis of metres; names stand to the right."""
+    """Draw RMSE and posterior bound of each scheme along x on a logarithmic axis [m], names to the right."""
     for scheme, entries in curves.items():
         axis.plot(x, numbers(entries, "bound_m"), color=scheme_colour(scheme), ls="--", lw=1.1)
         draw_error(axis, x, entries, scheme, "rmse")
@@ -27,7 +28,7 @@ def draw_schemes(axis: Axes, x: Sequence[float], curves: Mapping[str, Sequence[M
 
 
 def draw_error(axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, Any]], scheme: str, name: str) -> None:
-    """Draw one error of a scheme's entries along x as a curve, in the band of its interval."""
+    """Draw one error of a scheme along x as a curve with its interval as a band."""
     value, low, high = (numbers(entries, f"{name}{end}_m") for end in ("", "_low", "_high"))
     colour = scheme_colour(scheme)
     axis.fill_between(x, low, high, color=colour, alpha=0.13, lw=0.0)
@@ -35,26 +36,26 @@ def draw_error(axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, An
 
 
 def mark_metres(side: Axis) -> None:
-    """Marks on the axis of error curves at 1, 2 and 5 of every power of ten, in plain numbers."""
+    """Set the ticks of a logarithmic axis to 1, 2 and 5 of every power of ten, in plain numbers."""
     side.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     side.set_major_formatter(lambda value, _: f"{value:g}")
     side.set_minor_formatter(NullFormatter())
 
 
 def draw_rmse(axis: Axes, row: float, entry: Mapping[str, Any], colour: str, **marker: Any) -> None:
-    """Draw an entry's RMSE as a dot in a row, on the line of its interval."""
+    """Draw an RMSE as a dot in a row, with its interval as a line."""
     value, low, high = (entry[name] or entry["rmse_m"] for name in ("rmse_m", "rmse_low_m", "rmse_high_m"))
     axis.plot([low, high], [row, row], color=colour, lw=1.4)
     axis.plot([value], [row], color=colour, marker="o", **marker)
 
 
 def numbers(entries: Sequence[Mapping[str, Any]], name: str) -> Floats:
-    """(E,) one number of every entry along an error curve, NaN where there is none."""
+    """One number of every entry, (E,), NaN where there is none."""
     return np.array([np.nan if entry[name] is None else entry[name] for entry in entries], dtype=np.float64)
 
 
 def label_ends(axis: Axes, curves: Mapping[str, Sequence[Mapping[str, Any]]], name: str) -> None:
-    """Put each scheme's name at the height where its error curve ends, moved apart as far as need be."""
+    """Write each scheme's name at the height where its error curve ends, moved apart so that names do not overlap."""
     known = {scheme: [entry[name] for entry in entries if entry[name]] for scheme, entries in curves.items()}
     ends = {scheme: values[-1] for scheme, values in known.items() if values}
     low, high = np.log10(axis.get_ylim())
@@ -74,7 +75,7 @@ def label_ends(axis: Axes, curves: Mapping[str, Sequence[Mapping[str, Any]]], na
 
 
 def explain_lines(figure: Figure, axis: Axes) -> None:
-    """What solid and dashed error curves are, below the figure."""
+    """Add a legend of solid (RMSE) and dashed (posterior bound) curves below a figure."""
     error = axis.plot([], [], color=TRUTH, lw=1.7, label="RMSE over seeds, band: 95 % interval")
     bound = axis.plot([], [], color=TRUTH, lw=1.1, ls="--", label="posterior bound")
     figure.legend(handles=[*error, *bound], loc="outside lower center", ncols=2, fontsize=8)

@@ -1,4 +1,4 @@
-"""Fig. 4(b): the agent's error against SNR, all schemes with their bounds, as figure, table and page."""
+"""Figure, tables and page of Fig. 4(b): RMSE of the agent against SNR, for all schemes with their bounds."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -25,11 +25,11 @@ from rislam_rt.studies.swept.sweep import SNR
 
 TITLE = "Error of the agent against SNR: Fig. 4(b)"
 OURS = "optimized"
-"""The scheme that the paper proposes."""
+"""Name of the scheme that the paper proposes."""
 
 
 def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:
-    """Plain data: one entry a case, SNR and scheme, and the gains of the paper's scheme over the others."""
+    """Scores of Fig. 4(b) as plain data: an entry for each case, SNR and scheme, and the paper's scheme's gains."""
     entries = [
         {
             "case": group.point["variant"],
@@ -45,7 +45,7 @@ def fig4b_content(groups: Sequence[Group], spec: Fig4bSpec) -> dict[str, Any]:
 
 
 def gain_entries(group: Group) -> list[dict[str, Any]]:
-    """Gains of Fig. 4(b): how far the paper's scheme is below each other one, and what the bounds say of it."""
+    """Reduction of the RMSE by the paper's scheme against each other one, and that of the bounds, at one SNR."""
     if OURS not in group.schemes:
         return []
     found = []
@@ -63,7 +63,7 @@ def gain_entries(group: Group) -> list[dict[str, Any]]:
 
 
 def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
-    """Draw Fig. 4(b): RMSE against SNR, one part a case; the paper's SNR along the top."""
+    """Draw Fig. 4(b): RMSE of all schemes against SNR, a part for each case, the paper's SNR along the top."""
     cases = [case for case in spec.cases if any(e["case"] == case.name for e in content["entries"])]
     with styled():
         figure = Figure(figsize=(1.2 + 5.2 * len(cases), 5.0))
@@ -83,7 +83,7 @@ def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
 
 
 def fig4b_body(content: Mapping[str, Any], spec: Fig4bSpec, figure: str | None) -> list[str]:
-    """Page of Fig. 4(b): the picture, errors, gains, and what limits them."""
+    """Lines of the page of Fig. 4(b): the picture, errors, gains, and what limits the errors."""
     lines = picture(figure, "RMSE of the agent against SNR")
     for case in spec.cases:
         entries = [entry for entry in content["entries"] if entry["case"] == case.name]
@@ -95,6 +95,7 @@ def fig4b_body(content: Mapping[str, Any], spec: Fig4bSpec, figure: str | None) 
 
 
 def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Tables of the RMSE of all schemes, absolute and after alignment."""
     shape = """The shape of the way alone: RMSE [m] after the turn about the vertical and the shift that fit it best.
     Most of the start's own error is not in it, which no measurement of unknown landmarks removes:"""
     return [
@@ -104,7 +105,7 @@ def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str]:
-    """Table of Fig. 4(b): one error of all schemes, SNR by SNR."""
+    """Table of one error of all schemes by SNR."""
     schemes = list(dict.fromkeys(entry["scheme"] for entry in entries))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in entries):
@@ -116,7 +117,7 @@ def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str
 
 
 def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table of Fig. 4(b): gains, in pairs of runs with the same motion and noise."""
+    """Table of the RMSE reductions by the paper's scheme, from pairs of runs with the same motion and noise."""
     rivals = list(dict.fromkeys(entry["over"] for entry in gains))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in gains):
@@ -134,6 +135,7 @@ def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Table of bounds, NEES, association and what limits the error, by SNR and scheme."""
     rows = [
         [
             f"{entry['snr_db']:g}", entry["scheme"], metres(entry["bound_m"]), ratio(entry["over_bound"]),

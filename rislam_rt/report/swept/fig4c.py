@@ -1,4 +1,4 @@
-"""Fig. 4(c): errors of agent and panel against the panel's size, as figure, table and page."""
+"""Figure, table and page of Fig. 4(c): RMSE of agent and panel against the panel's size."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -26,7 +26,7 @@ TITLE = "Error against the panel's size: Fig. 4(c)"
 
 
 def fig4c_content(groups: Sequence[Group], spec: Fig4cSpec) -> dict[str, Any]:
-    """Plain data: one entry a size and scheme, and how much lower the largest panel's error is than the smallest's."""
+    """Scores of Fig. 4(c) as plain data: an entry for each panel size and scheme, and the RMSE's fall with size."""
     return {
         "entries": [
             {**scheme_entry(group, scheme), **interval_entry("panel", spread(panel_error(group, scheme)), "_m")}
@@ -38,7 +38,7 @@ def fig4c_content(groups: Sequence[Group], spec: Fig4cSpec) -> dict[str, Any]:
 
 
 def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
-    """Draw Fig. 4(c): agent left, panel right, on a logarithmic axis of panel sizes."""
+    """Draw Fig. 4(c): RMSE of the agent (left) and of the panel (right) against the panel's size."""
     entries = content["entries"]
     sizes = sorted({entry["size"] for entry in entries})
     curves = by_scheme(entries, "size")
@@ -61,7 +61,7 @@ def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
 
 
 def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) -> list[str]:
-    """Page of Fig. 4(c): the picture, the tables."""
+    """Lines of the page of Fig. 4(c): the picture, and a table of errors."""
     lines = ["Gains of the panel are summed element by element; the far field begins farther off than the room is high",
              "from 10 x 10 elements on. The panel's position is that at the end of a run, where the map holds it.", "",
              *picture(figure, "RMSE of agent and panel against the panel's size")]  # fmt: skip
@@ -86,13 +86,13 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
 
 
 def panel_error(group: Group, scheme: str) -> Any:
-    """(R,) distance [m] of the panel's estimate at the end, for Fig. 4(c); NaN where the map has none."""
+    """Position error (R,) [m] of the panel at the end of each run; NaN where it is not mapped."""
     name = panel_of(group, scheme)
     return np.full(len(group.results), np.nan) if name is None else group.column(scheme, "landmarks", name, "final_m")
 
 
 def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
-    """Fall in Fig. 4(c): lower RMSE with the largest panel than with the smallest, as a share."""
+    """Relative reduction of a scheme's RMSE of agent and panel from the smallest to the largest panel."""
     ordered = sorted(groups, key=lambda group: group.point["size"])
     small, large = ordered[0], ordered[-1]
     agent = paired_gain(large.column(scheme, "rmse_m"), small.column(scheme, "rmse_m"))
@@ -101,4 +101,5 @@ def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
 
 
 def _percent(fall: Mapping[str, Any], name: str) -> str:
+    """A reduction in percent with its interval, in words."""
     return "an unknown share" if fall[name] is None else percent_between(fall, name)

@@ -1,4 +1,4 @@
-"""The files of a swept study: page, CSV, JSON and figure, from the cells that there are."""
+"""Writing the files of a swept study (page, CSV, JSON, figure) from the cells done so far."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -27,14 +27,16 @@ from rislam_rt.sweeps.plain_data import plain_result
 
 
 class StudyLayout(NamedTuple):
-    """How a swept study is told: what its files, figure and page hold."""
+    """Functions that make the data, figure and page of one kind of swept study."""
 
     title: str
+    """Title of the page."""
     content: Callable[[Sequence[Group], Any], dict[str, Any]]
-    """Plain data, of groups and specification."""
+    """Makes plain data from groups and specification."""
     draw: Callable[[Mapping[str, Any], Any], Figure]
+    """Draws the figure from plain data and specification."""
     body: Callable[[Mapping[str, Any], Any, str | None], list[str]]
-    """Lines between where the numbers come from and what failed, of content, specification and the figure's file."""
+    """Makes the lines of the page from plain data, specification and the figure's file name."""
 
 
 LAYOUTS: dict[type, StudyLayout] = {
@@ -56,7 +58,7 @@ LAYOUTS: dict[type, StudyLayout] = {
 def write_swept(
     rows: Sequence[Row], spec: SweptSpec, record: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path | None:
-    """Write the files of a swept study, `.md`, `.csv`, `.json`, figure; returns the page, None before any cell.
+    """Write the files of a swept study (`.md`, `.csv`, `.json`, figure); return the page, None before any cell is done.
 
     Raises
     ------
@@ -82,12 +84,12 @@ def write_swept(
 
 
 def _of_receiver(spec: SweptSpec) -> bool:
-    """Whether the cells hold the receiver's scores, and no scheme's."""
+    """Whether a study's cells have scores of the receiver alone, and none of schemes."""
     return isinstance(spec, HardwareSpec)
 
 
 def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any], wanted: int) -> list[str]:
-    """Where the numbers in a study's files come from; `wanted`: how many cells there will be."""
+    """Lines on how the numbers of a swept study were computed; `wanted` is the number of cells in all."""
     config = record["settings"]
     source = "ray tracing (Sionna RT)" if config["channel"] == "traced" else "image sources"
     cycles = f"the first {config['cycles']} cycles" if config["cycles"] else "all cycles"

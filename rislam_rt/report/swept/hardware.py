@@ -1,4 +1,5 @@
-"""What faults of the hardware do to the receiver, before and after calibration, as table, figure and page."""
+"""Table, figure and page of the hardware study: errors of the receiver with impairments, with and without
+calibration."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,13 +16,13 @@ from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 TITLE = "Hardware: what a laboratory must reach for the panel to matter"
 SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
-"""The panel still matters while it is heard in this share of the looks in which an ideal front end hears it, with at
-most so many more false components a cycle."""
+"""Tolerable impairment: least share of panel detections relative to an ideal front end, and most further false
+components a cycle."""
 WAYS = {
     "built": ("", "receiver"), "told": ("", "told"), "calibrated": (CALIBRATED, "receiver"),
     "calibrated_told": (CALIBRATED, "told"),
 }  # fmt: skip
-"""How a fault is met: end of the variant's name, and which of its scores."""
+"""Ways of dealing with an impairment: suffix of the variant's name, and key of its scores."""
 NAMES = dict(zip(WAYS, ("as built", "told", "calibrated", "calibrated, told"), strict=True))
 MARKS = dict(zip(WAYS, (("#D55E00", "o"), ("#E69F00", "^"), ("#0072B2", "s"), ("#009E73", "D")), strict=True))
 LAW = """Of each run the receiver alone is looked at, at some places of its second half, with the panel focused on
@@ -34,7 +35,7 @@ they are as reported. What false components do to the agent: [receiver](../recei
 
 
 def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, Any]:
-    """Plain data of the hardware study: scores of every fault at every level and way of meeting it, and its limits."""
+    """Scores of the hardware study as plain data, by impairment, level and way of dealing with it; tolerable levels."""
     found = {str(group.point["variant"]): group for group in groups}
     ideal = _means(found.get("reference"), "receiver")
     entries = [{"fault": "none", "level": "", "note": "ideal", "way": "built", **ideal}]
@@ -50,7 +51,7 @@ def hardware_content(groups: Sequence[Group], spec: HardwareSpec) -> dict[str, A
 
 
 def draw_hardware(content: Mapping[str, Any], spec: HardwareSpec) -> Figure:
-    """Draw hardware faults: false components, and the panel's share, of every level, however the fault is met."""
+    """Draw false components and panel detections of the hardware study at every level of every impairment."""
     entries = content["entries"]
     rows = list(dict.fromkeys((entry["fault"], entry["level"]) for entry in entries))
     with styled():
@@ -74,7 +75,7 @@ def draw_hardware(content: Mapping[str, Any], spec: HardwareSpec) -> Figure:
 
 
 def hardware_body(content: Mapping[str, Any], spec: HardwareSpec, figure: str | None) -> list[str]:
-    """Page on hardware: what a laboratory must reach, the picture, all numbers."""
+    """Lines of the hardware study's page: tolerable levels, the picture, all numbers."""
     ideal = content["entries"][0]
     text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
     hears it ({_share(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
@@ -91,7 +92,7 @@ def hardware_body(content: Mapping[str, Any], spec: HardwareSpec, figure: str | 
 
 
 def failed_cells(groups: Sequence[Group]) -> list[str]:
-    """How many cells of a hardware study failed."""
+    """Line on how many cells of the hardware study failed."""
     failed = sum(result is None for group in groups for result in group.results) - sum(g.missing for g in groups)
     return [f"Of {sum(len(group.results) for group in groups)} cells {failed} failed."]
 
@@ -100,7 +101,7 @@ TITLES = {"false": "false", "panel": "panel", "landmarks": "landmarks", "error_o
 
 
 def _means(group: Group | None, key: str) -> dict[str, Any]:
-    """Mean of every score over the hardware that was built."""
+    """Mean of each of the receiver's scores over the front ends drawn."""
     rows = [result.get(key, result["receiver"]) for result in group.results if result] if group is not None else []
     known = {name: [row[name] for row in rows if row.get(name) is not None] for name in SCORES}
     return {"runs": len(rows), **{name: float(np.mean(values)) if values else None for name, values in known.items()}}
@@ -109,8 +110,7 @@ def _means(group: Group | None, key: str) -> dict[str, Any]:
 def _limit(
     fault: MismatchSection, entries: Sequence[Mapping[str, Any]], way: str, ideal: Mapping[str, Any]
 ) -> str | None:
-    """Largest level of a hardware fault, as they stand in the file, up to which the panel still matters; None if it
-    does at none."""
+    """Largest tolerable level of an impairment, in the file's order; None if not even the first is tolerable."""
     limit = None
     for entry in entries:
         if entry["fault"] == fault.name and entry["way"] == way:
@@ -121,12 +121,14 @@ def _limit(
 
 
 def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
+    """Whether an impairment is tolerable: panel detections and false components near those of an ideal front end."""
     if any(one.get("panel") is None for one in (scores, ideal)):
         return False
     return bool(scores["panel"] >= HEARD * ideal["panel"] and scores["false"] <= ideal["false"] + MORE_FALSE)
 
 
 def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:
+    """Table row of an impairment's largest tolerable levels."""
     fault, limits = content["about"][name], content["limits"][name]
     found = [limits[way] for way in WAYS]
     cells = [NOTHING if one is None else f"{one} {fault['unit']}".strip() for one in found]
@@ -134,6 +136,7 @@ def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:
 
 
 def _rows(content: Mapping[str, Any], scores: Sequence[str]) -> list[list[str]]:
+    """Table rows of some scores at every level of every impairment."""
     table: dict[tuple[str, str], dict[str, Mapping[str, Any]]] = {}
     for entry in content["entries"]:
         table.setdefault((entry["fault"], entry["level"]), {})[entry["way"]] = entry
@@ -149,4 +152,5 @@ def _rows(content: Mapping[str, Any], scores: Sequence[str]) -> list[list[str]]:
 
 
 def _share(value: float | None) -> str:
+    """Table cell: a share in percent."""
     return NOTHING if value is None else f"{100 * value:.0f} %"

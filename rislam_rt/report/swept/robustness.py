@@ -1,4 +1,4 @@
-"""Robustness against a belief that is told wrong: the agent's error by mismatch, as table, figure and page."""
+"""Table, figure and page of the robustness study: change of the agent's RMSE by model mismatch."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,9 +20,9 @@ from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
 from rislam_rt.studies.swept import Group, RobustnessSpec
 
 WORST = 3
-"""Mismatches that are named."""
+"""Number of the worst mismatches that are listed."""
 LEVELS = ("#9ecae1", "#4292c6", "#08519c", "#08306b")
-"""Colours of the levels, the first one first."""
+"""Colours of a mismatch's levels, in their order."""
 REFERENCE = "#8c8c8c"
 TITLE = "Robustness: what happens when the belief is told wrong"
 LAW = """One quantity at a time is not as filter and design are told ([list](../told.md)), all else right. The change is
@@ -31,7 +31,7 @@ part of the error. The bound is that of an agent that is told the truth."""
 
 
 def robustness_content(groups: Sequence[Group], spec: RobustnessSpec) -> dict[str, Any]:
-    """Plain data: one entry a level and scheme, with the change against the reference, seed by seed; and the worst."""
+    """Scores of the robustness study as plain data: by mismatch level and scheme, with the change of the RMSE."""
     levels = {
         mismatch.variant(level).name: (mismatch, level) for mismatch in spec.mismatches for level in mismatch.levels
     }
@@ -54,15 +54,14 @@ def robustness_content(groups: Sequence[Group], spec: RobustnessSpec) -> dict[st
 
 
 def worst_mismatches(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Mismatches that robustness is worst against, by their change at the level of ordinary equipment, the largest
-    first; the first scheme counts."""
+    """Mismatches that raise the first scheme's RMSE at the level of ordinary equipment, the worst first."""
     first = entries[0]["scheme"] if entries else ""
     known = {e["mismatch"]: e["change"] for e in entries if e["ordinary"] and e["scheme"] == first and e["change"]}
     return sorted((name for name, change in known.items() if change > 0.0), key=lambda name: -known[name])
 
 
 def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
-    """Draw robustness: RMSE of every level with its interval, one row a mismatch, the reference as a line."""
+    """Draw the RMSE at every level of every mismatch with its interval, a row a mismatch, the reference as a line."""
     entries = [entry for entry in content["entries"] if entry["rmse_m"] is not None]
     scheme = entries[0]["scheme"] if entries else ""
     own = [entry for entry in entries if entry["scheme"] == scheme]
@@ -89,7 +88,7 @@ def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
 
 
 def robustness_body(content: Mapping[str, Any], spec: RobustnessSpec, figure: str | None) -> list[str]:
-    """Page on robustness: the worst mismatches with their cures, the picture, a table."""
+    """Lines of the robustness study's page: the worst mismatches with their remedies, the picture, a table."""
     lines = [*paragraph(LAW), "", "## The worst at the level of ordinary equipment", ""]
     lines += [*table_lines(["mismatch", "level", "change", "what would cure it"], _worst_rows(content)), ""]
     lines += ["In this order after them: " + ", ".join(f"`{name}`" for name in content["worst"][WORST:]) + ".", ""]
@@ -106,6 +105,7 @@ _HEAD = ["mismatch", "level", "scheme", "agent RMSE [m]", "change", "bound [m]",
 
 
 def _worst_rows(content: Mapping[str, Any]) -> list[list[str]]:
+    """Table rows of the worst mismatches with their remedies."""
     rows = []
     first = content["entries"][0]["scheme"] if content["entries"] else ""
     for name in content["worst"][:WORST]:
@@ -118,6 +118,7 @@ def _worst_rows(content: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _row(content: Mapping[str, Any], entry: Mapping[str, Any]) -> list[str]:
+    """Table row of a mismatch level."""
     name = entry["mismatch"]
     note = f"`{name}`: {content['about'][name]['note']}" if name else "`reference`: nothing is wrong"
     level = _level(content, name, entry["level"]) + ("*" if entry["ordinary"] else "") if name else ""
@@ -130,9 +131,11 @@ def _row(content: Mapping[str, Any], entry: Mapping[str, Any]) -> list[str]:
 
 
 def _level(content: Mapping[str, Any], name: str, level: Any) -> str:
+    """Level of a mismatch with its unit."""
     return f"{level} {content['about'][name]['unit']}".strip()
 
 
 def _label(content: Mapping[str, Any], name: str) -> str:
+    """Label of a mismatch in the figure: name, levels, unit."""
     levels = ", ".join(str(level) for level in content["about"][name]["levels"])
     return f"{name}: {levels} {content['about'][name]['unit']}".strip()

@@ -1,4 +1,4 @@
-"""All rooms in one table: agent, landmarks, walls, map, association, and which aims are met."""
+"""Table, figure and page of the study in many rooms: errors of agent, landmarks and walls, and which aims are met."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
@@ -26,18 +26,18 @@ AIMS: dict[str, float] = {
     "diverged": 0,
     "failed": 0,
 }
-"""Largest value that is good enough."""
+"""Aims: the largest value of each score that is good enough."""
 BOUND_OF = {
     "ris_m": "ris_bound_m",
     "scatterer_m": "scatterer_bound_m",
     "wall_deg": "wall_bound_deg",
     "wall_m": "wall_bound_m",
 }
-"""Bounds of what is no agent."""
+"""Names of the posterior bounds of the errors of landmarks and walls."""
 
 
 def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
-    """Plain data: one entry a room, variant and scheme, and the aims. A series is a scheme in one variant."""
+    """Scores of the study in many rooms as plain data: an entry for each room, variant and scheme, and missed aims."""
     entries = []
     usual = groups[0].point.get("variant", "") if groups else ""
     for group in groups:
@@ -53,8 +53,7 @@ def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
 
 
 def budget(entry: Mapping[str, Any], name: str) -> str:
-    """What limits an aim that is missed in a room: bound, association or filter; the bound, too, if nothing can be
-    heard."""
+    """What limits a score that misses its aim in a room: `bound`, `association`, `filter`, or `not heard` (no path)."""
     if name not in BOUND_OF:
         return what_limits(entry)
     error, bound = entry[name], entry[BOUND_OF[name]]
@@ -66,14 +65,14 @@ def budget(entry: Mapping[str, Any], name: str) -> str:
 
 
 def missed_aims(entry: Mapping[str, Any]) -> list[str]:
-    """Names of the aims that are missed in a room; what is there and was never found misses its own."""
+    """Names of the scores that miss their aim in a room; a panel or scatterer that was never found misses its own."""
     there = {"ris_m": "ris_found", "scatterer_m": "scatterer_found"}
     asked = {name: limit for name, limit in AIMS.items() if name not in there or entry[there[name]] is not None}
     return [name for name, limit in asked.items() if entry[name] is None or entry[name] > limit]
 
 
 def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
-    """Agent's RMSE in every room, the bound as a bar across, and the aim."""
+    """Draw the agent's RMSE of all schemes in every room, with posterior bounds as short bars, and the aim."""
     entries = content["entries"]
     rooms = list(dict.fromkeys(entry["room"] for entry in entries))
     series = {entry["series"]: entry["scheme"] for entry in entries}
@@ -108,7 +107,7 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
 
 
 def rooms_body(content: Mapping[str, Any], spec: RoomsSpec, figure: str | None) -> list[str]:
-    """Markdown: the aims, one table of all rooms."""
+    """Lines of the page of the study in many rooms: the aims, the picture, a table of all rooms."""
     aims = content["aims"]
     text = f"""Aims: agent's RMSE at most {aims["rmse_m"]:g} m and {aims["over_bound"]:g} times its posterior bound,
     panel at most {aims["ris_m"]:g} m, scatterers {aims["scatterer_m"]:g} m, walls {aims["wall_deg"]:g} degrees and
@@ -154,11 +153,11 @@ NAMES = {
     "diverged": "divergence",
     "failed": "failure",
 }
-"""Aims in the page's words."""
+"""Names of the aims on the page."""
 
 
 def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> str:
-    """Error, bound and share of a room's landmarks or walls that were found."""
+    """Table cell: error and bound of a room's landmarks or walls, and the share that was found."""
     bound = entry[BOUND_OF[name]]
     known = "" if bound is None else f"bound {bound:.{digits}f}"
     if entry[name] is None:

@@ -1,4 +1,4 @@
-"""The score card of a study in unseen rooms: page, figure, tables."""
+"""Reports of the study in unseen rooms: score cards, page, figure, tables."""
 
 from rislam_rt.report.unseen.files import write_unseen
 

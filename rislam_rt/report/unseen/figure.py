@@ -1,4 +1,4 @@
-"""Figure of the errors of every run in unseen rooms: by class of motion and of plan, one mark a room."""
+"""Figure of the study in unseen rooms: relative RMSE of every run, by classes of motion and room."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ DIVISIONS = ("motion", "plan", "size", "reflection")
 
 
 def draw_unseen(runs: Mapping[str, Sequence[SchemeRun]]) -> Figure:
-    """Figure of unseen rooms: relative RMSE of every run, crosses where lost, bars at medians and bounds."""
+    """Draw the relative RMSE of every run in unseen rooms by class, crosses where lost, bars at medians and bounds."""
     with styled():
         figure = Figure(figsize=(12.0, 8.0))
         axes = figure.subplots(2, 2, sharey=True).ravel()
@@ -39,6 +39,7 @@ def draw_unseen(runs: Mapping[str, Sequence[SchemeRun]]) -> Figure:
 
 
 def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[SchemeRun]]) -> None:
+    """Draw the relative RMSE of every run by the classes of one property of rooms."""
     of = CLASSES[division]
     order = in_order({of(run.traits) for members in runs.values() for run in members if run.scores})
     width = 0.8 / max(len(runs), 1)
@@ -63,5 +64,5 @@ def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[Scheme
 
 
 def _scatter(count: int, width: float) -> Floats:
-    """Places side by side for the dots of the figure, the same every time."""
+    """Fixed horizontal offsets for the figure's dots, so that they overlap less."""
     return np.asarray(width * ((np.arange(count) * 0.618034) % 1.0 - 0.5))

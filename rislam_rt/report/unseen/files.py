@@ -1,4 +1,4 @@
-"""The files of a study in unseen rooms: page, CSV, JSON and figure, from the cells that there are."""
+"""Writing the files of a study in unseen rooms (page, CSV, JSON, figure) from the cells done so far."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,14 +21,14 @@ def write_unseen(
     rows: Sequence[Row], spec: UnseenSpec, record: Mapping[str, Any], folder: Path, *, tests: int,
     timings: Sequence[Mapping[str, Any]], figures: bool = True,
 ) -> Path | None:  # fmt: skip
-    """Write `<name>.md`, `.csv` (one row a run), `.json` and `figures/<name>.png`; returns the page, None without runs.
+    """Write page, CSV (a row a run), JSON and figure of a study in unseen rooms; return the page, None without runs.
 
     Parameters
     ----------
     tests
-        How often test rooms were run.
+        Number of runs of test rooms so far, from the ledger.
     timings
-        Of the cells, as `sweeps.store.read_timings` gives them.
+        Times of the cells, as `sweeps.store.read_timings` gives them.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def write_unseen(
 
 
 def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Content of the unseen rooms' files as plain data: a card a series, and one a class of it."""
+    """Score cards of a study in unseen rooms as plain data: one for each series, and one for each class of rooms."""
     times = cycle_times(runs, timings)
     cards = {name: {**card(members), "cycle_ms": times[name]} for name, members in runs.items()}
     classes = {name: [_brief(entry) for entry in class_cards(members)] for name, members in runs.items()}
@@ -60,13 +60,13 @@ def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Ma
 
 
 def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """A class's card for the JSON file: what the page's table shows, numbers with six digits."""
+    """Score card of a class of rooms reduced to what the page shows, numbers with six digits."""
     kept = {name: value for name, value in entry.items() if name in SHOWN}
     return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 
 
 def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]:
-    """Rows of the unseen rooms' CSV, one a run: series, room, its classes, its scores with six digits."""
+    """Table rows of all runs in unseen rooms: series, properties of the room, scores with six digits."""
     good = [run for members in runs.values() for run in members if run.scores]
     names = list(dict.fromkeys(name for run in good for name in run.scores))
     entries = []
@@ -77,6 +77,7 @@ def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]
 
 
 def _six(value: Any) -> Any:
+    """Table cell of a value, numbers with six digits."""
     if isinstance(value, float):
         return f"{value:.6g}" if np.isfinite(value) else ""
     return "" if value is None else value

@@ -1,4 +1,4 @@
-"""The page of a study in unseen rooms."""
+"""The page of a study in unseen rooms: score cards, classes of rooms, worst runs, failures."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -21,14 +21,14 @@ from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
 
 MILLI = 1e3
 WORST = 12
-"""Runs that are listed by name."""
+"""Number of the worst runs that are listed."""
 
 
 def unseen_page(
     content: Mapping[str, Any], runs: Mapping[str, Sequence[SchemeRun]], spec: UnseenSpec, about: Sequence[str],
     figure: str | None,
 ) -> str:  # fmt: skip
-    """The page on unseen rooms in Markdown."""
+    """Markdown page of a study in unseen rooms."""
     lines = ["# Unseen rooms", "", *about, "", *_meaning(), ""]
     lines += picture(figure, "Relative error of every run, by class of room and motion")
     lines += ["## Score card", "", *card_table(content["cards"]), ""]
@@ -39,13 +39,13 @@ def unseen_page(
 
 
 def card_table(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Table on the unseen rooms' page, one row a score, one column a series."""
+    """Table of the score cards of a study in unseen rooms, a row a score, a column a series."""
     rows = [[label, *(show(entry) for entry in cards.values())] for label, show in ROWS.items()]
     return table_lines(["", *cards], rows)
 
 
 def class_table(cards: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table on the unseen rooms' page, one row a class of rooms."""
+    """Table of scores by class of unseen rooms, a row a class."""
     head = ["class of", "", *COLUMNS]
     return table_lines(
         head, [[entry["division"], entry["class"], *(show(entry) for show in COLUMNS.values())] for entry in cards]
@@ -53,6 +53,7 @@ def class_table(cards: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _meaning() -> list[str]:
+    """Lines on what the scores mean."""
     text = """Errors of the agent's position, absolute and relative to the true start: the second is without the error
     that the agent was told its start with, which no measurement of an unknown room can mend. Bounds are posterior
     bounds of the same motion, codes and settings, with landmarks and walls unknown, the association known, and white
@@ -72,7 +73,7 @@ def _meaning() -> list[str]:
 
 
 def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: int, wanted: int) -> list[str]:
-    """Lines on the page that say where the unseen rooms' numbers come from."""
+    """Lines on how the numbers of a study in unseen rooms were computed: rooms, cycles, code, count of test runs."""
     config = record["settings"]
     unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
     purpose = "for tests" if spec.is_test else "for development"
@@ -87,7 +88,7 @@ def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: 
 
 
 def _series(spec: UnseenSpec) -> list[str]:
-    """Lines on the page: what each variant sets, and what all run."""
+    """Lines on the schemes of a study in unseen rooms and on the settings of its variants."""
     schemes = spec.run.get("schemes", [])
     lines = [f"- all: schemes {', '.join(f'`{name}`' for name in schemes)} (without a panel, what needs none)"]
     for variant in spec.variants:
@@ -97,11 +98,12 @@ def _series(spec: UnseenSpec) -> list[str]:
 
 
 def _toml(value: Any) -> str:
+    """A setting's value as in TOML."""
     return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
 def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
-    """Table on the page of the unseen runs farthest off, of all series."""
+    """Table of the runs in unseen rooms with the largest relative RMSE."""
     found = [(name, run) for name, members in runs.items() for run in members if run.scores]
     found.sort(key=lambda item: -item[1].scores["relative_rmse_m"])
     head = ["room", "series", "relative RMSE [m]", "bound [m]", "lost", "motion", "plan", "size [m]", "R", "panel"]
@@ -118,6 +120,7 @@ def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
 
 
 def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
+    """Lines on the runs that failed."""
     found = [(name, run) for name, members in runs.items() for run in members if run.failed]
     if not found:
         return ["None."]
@@ -125,7 +128,7 @@ def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
 
 
 def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:
-    """Entry on the page: median, its interval, and the 95th percentile."""
+    """Function that formats a score of a card as median with interval and 95th percentile."""
 
     def show(entry: Mapping[str, Any]) -> str:
         parts = [entry[name], entry[f"{name}_low"], entry[f"{name}_high"], entry[f"{name}_p95"]]
@@ -138,7 +141,7 @@ def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:
 
 
 def _short(name: str, scale: float = 1.0, digits: int = 2) -> Any:
-    """Entry on the page: median and 95th percentile."""
+    """Function that formats a score of a card as median and 95th percentile."""
 
     def show(entry: Mapping[str, Any]) -> str:
         if entry[name] is None:
@@ -149,6 +152,8 @@ def _short(name: str, scale: float = 1.0, digits: int = 2) -> Any:
 
 
 def _share(name: str, between: bool = True) -> Any:
+    """Function that formats a score of a card as a share, with its interval if `between`."""
+
     def show(entry: Mapping[str, Any]) -> str:
         if entry[name] is None:
             return NOTHING
@@ -161,6 +166,7 @@ def _share(name: str, between: bool = True) -> Any:
 
 
 def _number(name: str, digits: int = 2) -> Any:
+    """Function that formats a score of a card as a number."""
     return lambda entry: NOTHING if entry[name] is None else f"{entry[name]:.{digits}f}"
 
 
@@ -195,7 +201,7 @@ ROWS: dict[str, Any] = {
     "GOSPA [m]": _median("gospa_m"),
     "CPU time of the estimator a cycle [ms]": _number("cycle_ms", 1),
 }
-"""Scores of the whole card, in the page's words."""
+"""Scores of a score card by their label on the page: functions that format them."""
 COLUMNS: dict[str, Any] = {
     "runs": lambda entry: str(entry["runs"]),
     "RMSE / bound": _short("ratio"),
@@ -212,11 +218,11 @@ COLUMNS: dict[str, Any] = {
         f"{entry['ghost_walls'] + entry['ghost_points']:.1f}"
     ),
 }  # fmt: skip
-"""Scores of a class."""
+"""Scores of a class of rooms by their column's title: functions that format them."""
 _SPREAD = ("ratio", "relative_rmse_m", "late_relative_rmse_m", "relative_ratio", "nees")
 _PLAIN = ("division", "class", "runs", "failed", "ghost_walls", "ghost_points")
 SHOWN = {
     *_PLAIN, *_SPREAD, *(f"{name}_p95" for name in _SPREAD), "lost", "silent", "births_right", "walls_found",
     "panel_found",
 }  # fmt: skip
-"""Names of what `COLUMNS` reads."""
+"""Names of the scores that `COLUMNS` reads."""

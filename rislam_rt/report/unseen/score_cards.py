@@ -1,4 +1,4 @@
-"""From the cells of a study in unseen rooms to score cards: over all rooms, and by class of room and motion."""
+"""Score cards of a study in unseen rooms: statistics of the scores over all rooms, and by class of room and motion."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -13,27 +13,29 @@ from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.store import DONE
 
 CONSISTENT = (0.7, 2.0)
-"""NEES per degree of freedom, over a run, that counts as consistent."""
+"""Range of a run's NEES per degree of freedom that counts as consistent."""
 
 
 class SchemeRun(NamedTuple):
-    """One scheme in one room."""
+    """Scores of one scheme's run in one unseen room."""
 
     series: str
     """Variant, SNR and scheme, as far as they differ in the study."""
     ident: str
-    """Of its cell."""
+    """Identity of its cell."""
     scheme: str
     room: int
+    """Seed of the room."""
     traits: Mapping[str, Any]
+    """Properties of the room."""
     scores: Mapping[str, Any]
     """Empty if it failed."""
     failed: str
-    """Why; empty if it did not."""
+    """Error message; empty if it did not fail."""
 
 
 def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
-    """All unseen runs that score cards are made of, in the order of the series; cells not run are left out."""
+    """All runs of a study in unseen rooms from its cells, ordered by series and room; missing cells are left out."""
     keys = {key: {row.cell.point.get(key) for row in rows} for key in ("variant", SNR)}
     schemes = {name for row in rows for name in row.result.get("schemes", {})}
     found = []
@@ -61,7 +63,7 @@ def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
 
 
 def _banded(name: str, limits: Sequence[float], unit: str = "") -> Callable[[Mapping[str, Any]], str]:
-    """Class on a score card of a number: below the first limit, between two, from the last on."""
+    """Function that classifies a room by a number: below the first limit, between two, from the last on."""
 
     def band(traits: Mapping[str, Any]) -> str:
         number = int(np.searchsorted(limits, traits[name], side="right"))
@@ -88,11 +90,11 @@ CLASSES: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "scatterers hidden": lambda traits: "some" if traits["hidden"] else "none",
     "speed": _banded("speed", (0.1, 0.25), " m/s"),
 }
-"""Class of a room by name of the division."""
+"""Functions that classify a room by its properties, by name of the property."""
 
 
 def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
-    """The score card of runs: medians with intervals, 95th percentiles, shares with intervals, means a run."""
+    """Score card of runs in unseen rooms: medians with intervals, 95th percentiles, shares with intervals, means."""
     good = [run for run in runs if run.scores]
     entry: dict[str, Any] = {"runs": len(good), "failed": len(runs) - len(good)}
     for name in (
@@ -118,7 +120,7 @@ def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
 
 
 def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
-    """A card for every class of every division."""
+    """Score card of every class of rooms, for all properties by which rooms are classified."""
     known = [run for run in runs if run.traits]
     cards = []
     for division, of in CLASSES.items():
@@ -130,12 +132,12 @@ def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
 
 
 def in_order(names: Iterable[str]) -> list[str]:
-    """Classes on a score card: what is below the first limit, those by name, what is from the last on."""
+    """Sort names of classes of rooms: `below ...` first, `from ...` last, the others by name."""
     return sorted(names, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
 
 
 def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
-    """Runs of each series, for its score card."""
+    """Group runs in unseen rooms by their series."""
     found: dict[str, list[SchemeRun]] = {}
     for run in runs:
         found.setdefault(run.series, []).append(run)
@@ -145,8 +147,7 @@ def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
 def cycle_times(
     runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
 ) -> dict[str, float | None]:
-    """Median CPU time [ms] of the estimator a cycle for score cards, by series; of cells timed more than once the last
-    one counts."""
+    """Median CPU time [ms] of the estimator per cycle, by series; the last of a cell's times counts."""
     told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
     found: dict[str, float | None] = {}
     for name, members in runs.items():
@@ -157,17 +158,18 @@ def cycle_times(
 
 
 def column(runs: Sequence[SchemeRun], name: str) -> Floats:
-    """(R,) a score; NaN where there is none."""
+    """One score of all runs, (R,); NaN where there is none."""
     found = [run.scores.get(name) for run in runs]
     return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
 
 
 def _count(runs: Sequence[SchemeRun], name: str) -> int:
+    """Sum of a score that counts."""
     return int(np.nansum(column(runs, name)))
 
 
 def _spread(name: str, values: Floats) -> dict[str, float | None]:
-    """Median with its 95 % interval, and 95th percentile, for a score card."""
+    """Median with its 95 % interval, and 95th percentile, of a score, by name."""
     known = values[~np.isnan(values)]
     low = high = None
     if len(known) > 1:
@@ -177,6 +179,7 @@ def _spread(name: str, values: Floats) -> dict[str, float | None]:
 
 
 def _share(name: str, count: int, runs: int) -> dict[str, Any]:
+    """Share `count` of `runs` with its interval, by name."""
     found = share_interval(count, runs) if runs and count <= runs else Interval(np.nan, np.nan, np.nan)
     value, low, high = (None if np.isnan(part) else float(part) for part in found)
     return {name: value, f"{name}_low": low, f"{name}_high": high, f"{name}_count": count, f"{name}_of": runs}

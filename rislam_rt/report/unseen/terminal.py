@@ -1,4 +1,4 @@
-"""The score card on the terminal."""
+"""Terminal table of the score cards of a study in unseen rooms."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from rislam_rt.sweeps import Row
 
 
 def print_cards(rows: Sequence[Row], timings: Sequence[Mapping[str, Any]]) -> None:
-    """Print the score cards on the terminal, one column a series."""
+    """Print the score cards of a study in unseen rooms as a table, a column for each series."""
     cards = unseen_content(by_series(read_runs(rows)), timings)["cards"]
     table = Table(title="median (95 % interval); 95th percentile")
     table.add_column("score")

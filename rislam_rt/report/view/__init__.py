@@ -1,2 +1,4 @@
-"""Views in a browser: a room that turns with the paths of a pose, and a run with a slider over its time. Nothing is
-loaded from anywhere: data, styles and script are in the page."""
+"""Interactive views for the browser: a rotatable room with the paths at a pose, and a run with a slider over time.
+
+Data, styles and script are all in the page: nothing is loaded.
+"""

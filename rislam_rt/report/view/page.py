@@ -1,4 +1,4 @@
-"""The view as HTML: a fragment for a page that has others things too, or a page of its own."""
+"""HTML page of an interactive view, or a fragment of it for another page."""
 
 import html
 import json
@@ -10,11 +10,11 @@ from typing import Any
 from rislam_rt.storage.files import MARK
 
 SCRIPTS = ("space.js", "draw.js", "view.js", "beliefs.js", "start.js")
-"""In the order of their needs; the last finds the views of a page and starts them."""
+"""Scripts of a view in the order in which they need each other; the last starts all views of a page."""
 
 
 def view_fragment(data: Mapping[str, Any]) -> str:
-    """The element that becomes a view; the page needs `view_style` and, after it, `view_script` once."""
+    """HTML element with the data of an interactive view; its page needs `view_style` and, after it, `view_script`."""
     # inside a script element only `</` could end it, and `<!--` confuse it; both are strings' business in JSON
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return (
@@ -24,17 +24,17 @@ def view_fragment(data: Mapping[str, Any]) -> str:
 
 
 def view_style() -> str:
-    """Style sheet of the views."""
+    """CSS style sheet of the interactive views."""
     return _asset("viewer.css")
 
 
 def view_script() -> str:
-    """Script of the views."""
+    """JavaScript of the interactive views."""
     return "\n".join(_asset(name) for name in SCRIPTS)
 
 
 def view_page(title: str, about: str, data: Mapping[str, Any]) -> str:
-    """A page of its own."""
+    """HTML page with one interactive view, self-contained."""
     return _asset("page.html").format(
         mark=MARK,
         title=html.escape(title),
@@ -47,4 +47,5 @@ def view_page(title: str, about: str, data: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=16)
 def _asset(name: str) -> str:
+    """Text of a file of this package folder."""
     return files("rislam_rt.report.view").joinpath(name).read_text(encoding="utf-8")

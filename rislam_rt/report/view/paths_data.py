@@ -1,4 +1,4 @@
-"""The paths of some poses along the way as data for the view, with the panels aimed at the agent."""
+"""Data of the interactive view of a scene: its room, and the paths at some poses with the panels aimed at the agent."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,12 +15,13 @@ from rislam_rt.report.style import KIND
 from rislam_rt.report.view.room_data import room_data, rounded, spread
 
 MOST_PATHS = 12_000
-"""Of all poses together: some megabytes."""
+"""Largest number of paths of all poses together: some megabytes."""
 MOST_POSES = 60
+"""Largest number of poses in a view."""
 
 
 def paths_data(scene: Scene, motion: Trajectory, paths: Paths, settings: Settings) -> dict[str, Any]:
-    """A scene, and the paths that were found at the poses of `motion`, a part of its own."""
+    """Data of the interactive view of a scene, with the paths found at the poses `motion` of its trajectory."""
     posed = replace(scene, agent=motion)
     if scene.ris is not None:
         paths = aimed_paths(paths, scene.ris.spec, settings.radio)
@@ -39,11 +40,12 @@ def paths_data(scene: Scene, motion: Trajectory, paths: Paths, settings: Setting
 
 
 def poses_of(scene: Scene, paths_a_pose: int) -> Any:
-    """Rows of the poses to be shown, fewer where each has many paths."""
+    """Cycles whose poses are shown in the interactive view, fewer where each has many paths."""
     return spread(len(scene.agent), max(3, min(MOST_POSES, MOST_PATHS // max(paths_a_pose, 1))))
 
 
 def _pose(scene: Scene, paths: Paths, margin: Floats, pose: int) -> dict[str, Any]:
+    """Data of one pose: position, and class, label, points, length [m], gain and SNR margin [dB] of its paths."""
     found = []
     for path in np.flatnonzero(paths.valid[pose]):
         gain = max(float(np.abs(paths.gain[pose, path])), 1e-20)

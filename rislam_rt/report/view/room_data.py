@@ -1,4 +1,4 @@
-"""A room as data for the view: walls as triangles and outlines, panels, scatterers, the way."""
+"""Data of a room for the interactive views: walls as triangles and outlines, panels, scatterers, trajectory."""
 
 from typing import Any
 
@@ -10,16 +10,17 @@ from rislam_rt.geometry.triangles import outline_edges, triangle_areas, triangle
 from rislam_rt.model import RisPanel, Scene
 
 MOST_TRIANGLES = 8000
-"""Of a view: the walls of the largest surface come first, the rest of a finely meshed room is left out."""
+"""Largest number of triangles in a view: walls with the largest surface come first, the rest is left out."""
 MOST_NAMES = 60
+"""Largest number of wall names in a view."""
 WAY_POINTS = 600
-"""Of the way drawn."""
+"""Largest number of points of the trajectory in a view."""
 DIGITS = 3
-"""Of a metre."""
+"""Decimals of coordinates [m] in a view."""
 
 
 def room_data(scene: Scene) -> dict[str, Any]:
-    """Everything of a room but what moves."""
+    """Data of a scene's static parts for the interactive views: walls, occluders, panels, scatterers, trajectory."""
     way = scene.agent.position
     walls, left_out = _walls(scene)
     meshes = [*scene.occluders, *(s.shade for s in scene.scatterers if s.shade is not None)]
@@ -36,17 +37,17 @@ def room_data(scene: Scene) -> dict[str, Any]:
 
 
 def spread(count: int, most: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
-    """Rows of a view spread evenly over `count`, `most` of them at most, with the first and the last."""
+    """Indices spread evenly over `count` entries, at most `most`, with the first and the last."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.int64))
 
 
 def rounded(points: Floats, digits: int = DIGITS) -> Any:
-    """Nested lists of numbers for a view with so many digits."""
+    """Nested lists of numbers rounded to `digits` decimals, for a view."""
     return (np.round(points, digits) + 0.0).tolist()
 
 
 def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
-    """The room's largest walls for a view, and how many are left out."""
+    """Data of a room's largest walls for a view, and the number of walls left out."""
     walls = build_walls(scene)
     corners = walls.triangles
     area = triangle_areas(corners)
@@ -76,12 +77,13 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
 
 
 def _same_sense(triangles: Floats, normal: Floats) -> Floats:
-    """Triangles (T, 3, 3) of a view's wall all counter-clockwise about a normal, so that no seam shows."""
+    """Triangles (T, 3, 3) of a wall with their corners all counter-clockwise about its normal."""
     sense = triangle_cross(triangles) @ normal
     return np.where((sense < 0.0)[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _panel(panel: RisPanel) -> dict[str, Any]:
+    """Data of a RIS panel for a view: name, centre, corners."""
     spec = panel.spec
     across = 0.5 * spec.cols * spec.spacing[0] * spec.right
     along = 0.5 * spec.rows * spec.spacing[1] * spec.up

@@ -1,4 +1,4 @@
-"""A run as data for the view: what each scheme's agent believed at some of its cycles."""
+"""Data of a run for the interactive view: each scheme's estimates, landmarks and codes at some cycles."""
 
 from typing import Any
 
@@ -10,15 +10,15 @@ from rislam_rt.report.style import scheme_colour
 from rislam_rt.report.view.room_data import room_data, rounded, spread
 
 FRAMES = 150
-"""Moments of a view."""
+"""Largest number of cycles in a view."""
 FINE = 4
-"""Digits of a metre where errors are to be seen."""
+"""Decimals of positions and errors [m] in a view."""
 KNOWN = 0.5
-"""Probability of being the panel above which a landmark is held for it."""
+"""Probability of being the panel above which a landmark is shown as the panel."""
 
 
 def run_data(result: SlamResult) -> dict[str, Any]:
-    """Data of a run's view: room, truth, and every scheme, at up to `FRAMES` cycles spread evenly."""
+    """Data of a run for the interactive view: room, true trajectory and every scheme, at up to `FRAMES` cycles."""
     rows = spread(len(result.scene.agent), FRAMES)
     return room_data(result.scene) | {
         "kind": "run",
@@ -31,7 +31,7 @@ def run_data(result: SlamResult) -> dict[str, Any]:
 
 
 def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[str, Any]:
-    """What the view of a run shows of one scheme: way, ellipses, errors, map."""
+    """Data of one scheme for the view of a run: trajectory, 2 sigma ellipses, errors, landmarks, codes."""
     error = np.linalg.norm(scheme.position - result.scene.agent.position, axis=1)[rows]
     sigma = np.sqrt(np.maximum(np.trace(scheme.covariance[rows, :2, :2], axis1=1, axis2=2), 0.0))
     data = {
@@ -51,21 +51,21 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
 
 
 def _lost(scheme: SchemeResult, rows: Integers) -> str:
-    """For each moment of a run's view 1 if the filter held itself for lost at it or since the moment before."""
+    """Digits, one for each cycle shown: 1 if the filter reported divergence then or since the one shown before."""
     lost = np.array([outcome == "diverged" for outcome in scheme.outcome], dtype=np.int64)
     begins = np.append(0, rows[:-1] + 1)
     return "".join("1" if lost[first : last + 1].any() else "0" for first, last in zip(begins, rows, strict=True))
 
 
 def _ellipse(covariance: Floats) -> list[float]:
-    """Half axes [m] of a run's 2 sigma ellipse in a view and the angle [rad] of the first."""
+    """Half axes [m] of the 2 sigma ellipse of a position covariance (2, 2), and the angle [rad] of the first."""
     value, vector = np.linalg.eigh(covariance)
     half = 2.0 * np.sqrt(np.maximum(value, 0.0))
     return [*rounded(half, FINE + 1), round(float(np.arctan2(vector[1, 0], vector[0, 0])), 3)]
 
 
 def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, Any] | None:
-    """One landmark of a run in a view, from when it is first held to the last; None if it is never."""
+    """Data of one estimated landmark for the view of a run, from its first cycle to its last; None if never mapped."""
     held = scheme.held[rows, column]
     if not held.any():
         return None
@@ -82,8 +82,10 @@ def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, An
 
 
 def _code(scheme: SchemeResult, row: int, shapes: list[list[int]]) -> str:
-    """Levels of a run's code in a view in base 36, panel by panel, `|` between panels, each with as many digits as the
-    largest level has."""
+    """Phase levels of the code applied in a cycle as text in base 36, panel by panel with `|` between.
+
+    Every level has as many digits as the largest.
+    """
     index = scheme.applied[row].ravel()
     digits = len(np.base_repr(scheme.levels - 1, 36))
     sizes = [rows * cols for rows, cols in shapes]
