@@ -106,7 +106,7 @@ def dataset_to_paths(data: "xr.Dataset") -> Paths:
 
 
 def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
-    """NetCDF data set of one scheme's result, with the filter's diagnostics as `info_...`, its last map as `map_...`"""
+    """NetCDF data set of one scheme's result, with filter diagnostics as `info_...` and the last map as `map_...`."""
     content = _arrays(result, SCHEME, "") | _arrays(result.map, MAP, "map_")
     for name, values in result.info.items():
         content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})

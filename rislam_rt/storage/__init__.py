@@ -1,1 +1,1 @@
-"""What lies on the disk: whole files or none, one process at a time, and a checksum that tells of changes."""
+"""Files on disk: written whole or not at all, folders locked by one process at a time, checksums against changes."""

@@ -1,4 +1,4 @@
-"""Writing files so that they are there whole or not at all, and taking away what a killed process was writing."""
+"""Writing of files whole or not at all, by temporary names, and removal of temporary files of killed processes."""
 
 import csv
 import io
@@ -17,16 +17,16 @@ from rislam_rt.errors import StoreError
 
 PREFIX, SUFFIX = ".rislam-rt-", ".tmp"
 TEMPORARY = re.compile(r"\.rislam-rt-[a-z0-9_]{8}\.tmp")
-"""Names under which files grow; nobody else gives such names, and no other file is ever removed."""
+"""Pattern of the names of temporary files; the program removes no other files."""
 
 MARK = "made by rislam-rt"
-"""Stands in every file that a command writes under a name that the user gave."""
+"""Text in every file that a command writes under a name that the user gave, by which it is recognised."""
 RECORDING = (b"RRF", b"rislam_rt")
-"""How a Rerun recording begins, and the application that it names."""
+"""First bytes of a Rerun recording, and the application name in it, by which it is recognised."""
 
 
 def is_own(path: Path) -> bool:
-    """Whether nothing of the user's is lost by writing to a path: no file, an empty one, or one with our mark."""
+    """Whether a path may be written to: there is no file, an empty one, or one that this program made (`MARK`)."""
     if not path.is_file() or path.stat().st_size == 0 or is_device(path):
         return True
     try:
@@ -38,19 +38,19 @@ def is_own(path: Path) -> bool:
 
 
 def json_file(content: Any, *, indent: int = 1, sort_keys: bool = False) -> bytes:
-    """Content of a JSON file, as plain data stand in it; NaN and infinity are refused."""
+    """Encode plain data as the content of a JSON file; NaN and infinity are errors."""
     return (json.dumps(content, indent=indent, sort_keys=sort_keys, allow_nan=False) + "\n").encode()
 
 
 def csv_file(head: Iterable[str], rows: Iterable[Iterable[Any]]) -> bytes:
-    """Content of a CSV file: the names of its columns, then its rows."""
+    """Encode column names and rows as the content of a CSV file."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([head, *rows])
     return text.getvalue().encode(errors="backslashreplace")
 
 
 def write_all(folder: Path, files: Mapping[str, bytes]) -> Path:
-    """Write files, relative name -> content, one after the other, each as `write_atomic`; returns the first.
+    """Write files (relative name -> content) to a folder, each whole or not at all; return the path of the first.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def write_all(folder: Path, files: Mapping[str, bytes]) -> Path:
 
 
 def write_atomic(path: Path, content: bytes) -> None:
-    """Write under a temporary name beside `path`, flush to the disk, rename; what is no file (a device) is written to.
+    """Write a file whole or not at all: to a temporary file beside `path` that is renamed; a device is written to.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def write_atomic(path: Path, content: bytes) -> None:
 
 
 def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
-    """As `write_atomic`, of content that comes in pieces and never is all in memory.
+    """Write a file whole or not at all as `write_atomic` does, from pieces of content that are never all in memory.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
 
 
 def led_to(path: Path) -> Path:
-    """The file that writing to a path makes or replaces: a link stays, what it leads to does not.
+    """Path that writing to `path` creates or replaces: links are resolved, so that they stay.
 
     Raises
     ------
@@ -118,12 +118,12 @@ def led_to(path: Path) -> Path:
 
 
 def is_device(path: Path) -> bool:
-    """Whether a path is a device, a pipe or a standard stream, which a file must not take the place of."""
+    """Whether a path is a device, a pipe or a standard stream, which must not be replaced by a file."""
     return path.exists() and not path.is_dir() and (not path.is_file() or path.parent == Path("/dev"))
 
 
 def remove_temporaries(folders: Iterable[Path]) -> None:
-    """Take away what a killed process was writing, in folders that nobody else is writing to."""
+    """Remove the temporary files of killed processes from folders to which no other process is writing."""
     for folder in folders:
         with suppress(OSError):
             for entry in os.scandir(folder):
@@ -132,7 +132,7 @@ def remove_temporaries(folders: Iterable[Path]) -> None:
 
 
 def make_folders(folder: Path) -> list[Path]:
-    """Make a folder and those above it; returns those that were not there, the outermost first.
+    """Create a folder and those above it; return those that did not exist, the outermost first.
 
     Raises
     ------
@@ -148,12 +148,12 @@ def make_folders(folder: Path) -> list[Path]:
 
 
 def check_writable(folder: Path) -> None:
-    """Refuse a folder, there or not yet, that cannot be written to, before anything is worked out for it.
+    """Check that a folder, which may not exist yet, can be written to, before results for it are computed.
 
     Raises
     ------
     StoreError
-        The disk would refuse.
+        It cannot.
     """
     place = next((one for one in (folder, *folder.absolute().parents) if os.path.lexists(one)), Path("/"))
     try:
@@ -166,12 +166,12 @@ def check_writable(folder: Path) -> None:
 
 
 def remove_empty(folders: Iterable[Path]) -> None:
-    """Remove those of the folders, given with the outermost first, that hold no files."""
+    """Remove those of the folders (outermost first) that are empty."""
     for folder in reversed(list(folders)):
         with suppress(OSError):
             folder.rmdir()
 
 
 def refused(path: Path, error: OSError) -> StoreError:
-    """The disk's refusal to write a file, as one line."""
+    """One-line error for a file that the operating system refused to write."""
     return StoreError(f"{path}: cannot be written ({error.strerror}); check permissions and free space")

@@ -1,7 +1,7 @@
-"""A lock: one process at a time in a folder.
+"""Lock on a folder, so that one process at a time writes there.
 
-The lock is the kernel's (`flock`), which ends with the process however that ends: one that died leaves a file behind,
-and the next takes it over. The file says who holds it.
+The lock is the kernel's (`flock`), which ends with the process however that ends: a process that died leaves a lock
+file behind, and the next one takes it over. The file names the process that holds it.
 """
 
 import fcntl
@@ -19,7 +19,7 @@ LOCK_FILE = ".rislam-rt-lock"
 
 @contextmanager
 def hold(folder: Path, what: str) -> Iterator[None]:
-    """Lock a folder that exists: keep other processes out; `what` is at work in it.
+    """Lock an existing folder against other processes within this context; `what` names the work in error messages.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def hold(folder: Path, what: str) -> Iterator[None]:
 
 
 def _take(file: Path) -> int:
-    """The open and locked file; `BlockingIOError` names who has it."""
+    """Open and lock a lock file, and return its handle; a `BlockingIOError` names the process that holds it."""
     while True:
         handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         try:
@@ -66,6 +66,7 @@ def _take(file: Path) -> int:
 
 
 def _lock(handle: int) -> None:
+    """Take the kernel's lock on an open file, or without such locks rely on the process that the file names."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -77,13 +78,14 @@ def _lock(handle: int) -> None:
 
 
 def _sign(handle: int) -> None:
+    """Write number and machine of this process to a lock file."""
     with suppress(OSError):  # a full disk: the lock holds without a name
         os.ftruncate(handle, 0)
         os.pwrite(handle, json.dumps({"pid": os.getpid(), "host": os.uname().nodename}).encode(), 0)
 
 
 def _holder(handle: int) -> tuple[str, bool]:
-    """Who holds the lock, and whether it lives as far as this machine can tell."""
+    """Name of the process that a lock file names, and whether it is alive as far as this machine can tell."""
     try:
         said = json.loads(os.pread(handle, 1000, 0))
         pid, host = int(said["pid"]), str(said["host"])[:80]

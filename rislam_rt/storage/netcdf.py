@@ -1,4 +1,4 @@
-"""NetCDF files: arrays under names, each with its dimensions, unit and meaning, written whole or not at all."""
+"""NetCDF files: encoding of named arrays with dimensions, units and meanings, writing whole or not at all, reading."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Entry = tuple[tuple[str, ...], str, str]
-"""Dimensions, unit, meaning."""
+"""Dimensions, unit and meaning of a NetCDF variable."""
 
 
 def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str = "") -> dict[str, Any]:
-    """NetCDF variables with attributes; there are no complex numbers, so those become `_real` and `_imag`.
+    """NetCDF variables from arrays by name, with dimensions, units and meanings of `table` as attributes.
 
-    A prefix comes before every name and every dimension but xyz.
+    Complex arrays become two variables, `_real` and `_imag`. `prefix` is put before all names and dimensions but xyz.
     """
     content: dict[str, Any] = {}
     for name, value in values.items():
@@ -34,8 +34,7 @@ def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str
 
 
 def padded(rows: Sequence[Any], fill: Any, dtype: Any = None) -> Any:
-    """Arrays (M_k, ...) of K cycles as one (K, max M, ...) for NetCDF, filled up; of the first one's type by
-    default."""
+    """Stack arrays (M_k, ...) of K cycles in one (K, max M, ...), filled up; type of the first unless given."""
     longest = max((len(row) for row in rows), default=0)
     table = np.full((len(rows), longest, *rows[0].shape[1:]), fill, dtype=dtype or rows[0].dtype)
     for cycle, row in enumerate(rows):
@@ -44,7 +43,7 @@ def padded(rows: Sequence[Any], fill: Any, dtype: Any = None) -> Any:
 
 
 def write_dataset(data: "xr.Dataset", path: Path) -> None:
-    """Write NetCDF whole or not at all.
+    """Write a data set as a NetCDF file, whole or not at all.
 
     Raises
     ------
@@ -55,7 +54,7 @@ def write_dataset(data: "xr.Dataset", path: Path) -> None:
 
 
 def dataset_bytes(data: "xr.Dataset") -> bytes:
-    """A data set as a NetCDF file."""
+    """Encode a data set as the content of a NetCDF file, large variables compressed."""
     squeeze = {"zlib": True, "complevel": 1}
     packed = {name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
     return bytes(data.to_netcdf(engine="h5netcdf", encoding=packed))
@@ -64,17 +63,17 @@ def dataset_bytes(data: "xr.Dataset") -> bytes:
 def read_dataset(
     path: Path, *, missing: str = "give the folder of a completed run", damaged: str = "run again"
 ) -> "xr.Dataset":
-    """Read NetCDF into memory.
+    """Read a NetCDF file into memory.
 
     Parameters
     ----------
     missing, damaged
-        What to do about a file that is not there, or cannot be read.
+        Advice in the error message for a file that does not exist, or cannot be read.
 
     Raises
     ------
     StoreError
-        It is one of these.
+        The file does not exist, or cannot be read.
     """
     import xarray as xr
 

@@ -1,4 +1,4 @@
-"""Seals on plain data, a schema version and a checksum, so that a change on the disk is noticed when it is read."""
+"""Seals on JSON data: a schema version and a checksum, so that a file changed on disk is noticed when it is read."""
 
 import hashlib
 import json
@@ -9,22 +9,22 @@ from typing import Any
 from rislam_rt.errors import ResultError
 
 SCHEMA = 1
-"""Of run folders and sweep folders; another number is another meaning of some entry."""
+"""Schema version of run folders and sweep folders, increased when the meaning of an entry changes."""
 
 
 def seal(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Seal content: with `schema` and `checksum`."""
+    """Add schema version and checksum to plain data."""
     found = {"schema": SCHEMA, **content}
     return {**found, "checksum": checksum(found)}
 
 
 def check_seal(content: Any, file: Path) -> dict[str, Any]:
-    """The content, which must be as `seal` gave it.
+    """Check schema version and checksum of data read from `file`, and return the data.
 
     Raises
     ------
     ResultError
-        It is not.
+        One is missing or does not fit.
     """
     if not isinstance(content, dict) or "schema" not in content or "checksum" not in content:
         raise ResultError(f"{file}: no schema or no checksum, so not written by this version; give another folder")
@@ -37,7 +37,7 @@ def check_seal(content: Any, file: Path) -> dict[str, Any]:
 
 
 def read_sealed(file: Path) -> dict[str, Any]:
-    """A JSON file that holds sealed content.
+    """Read a JSON file, and check its schema version and checksum.
 
     Raises
     ------
@@ -53,9 +53,9 @@ def read_sealed(file: Path) -> dict[str, Any]:
 
 
 def checksum(content: Any) -> str:
-    """Checksum of a seal: SHA-256 of plain data in one spelling, sorted keys, shortest numbers.
+    """SHA-256 of plain data, encoded as JSON with sorted keys and shortest numbers.
 
-    NaN, which no sealed file holds but a damaged one may, has a spelling as well.
+    NaN, which no sealed file holds but a damaged one may, is encoded as well.
     """
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

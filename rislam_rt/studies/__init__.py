@@ -1,4 +1,4 @@
-"""Pipelines other than the main job: a file's `kind` says which; each has its specification and its run here."""
+"""Studies: pipeline files of other kinds than a SLAM run, such as channel comparisons, figures and parameter sweeps."""
 
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.pipeline_kinds import load_any

@@ -1,4 +1,4 @@
-"""The paper's claims against the figures of other studies: what each says, what we found, and whether it holds."""
+"""The paper's claims compared with the results of other studies: claim, our figure, and whether it is reproduced."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -9,30 +9,31 @@ from typing import Any, NamedTuple
 from rislam_rt.errors import ConfigError
 
 FILES = ("fig4a.json", "fig4b.json", "fig4b_lively.json", "fig4c.json")
-"""What the studies leave behind, in the folder of the results."""
+"""Result files of the studies that the claims are checked against, in the folder of the results."""
 SOURCE = ("seed", "scenes", "versions")
-"""Of each study's record, what the claims repeat."""
+"""Entries of each study's record that are repeated in the table of claims."""
 LEAST_GAIN, LEAST_FALL = 0.31, 0.1
-"""The paper: error lower than every benchmark's by this share; and than without a panel by this many metres."""
+"""The paper's claims: RMSE below every benchmark's by this share, and below that without a panel by this much [m]."""
 OURS, RIVALS = "optimized", ("random", "no_ris", "bp_slam", "channel_slam")
+"""Scheme that the claims are about, and the benchmarks that it is compared with."""
 
 
 class Claim(NamedTuple):
-    """One claim, judged."""
+    """One claim of the paper, our result, and whether it is reproduced."""
 
     claim: str
     """In our words."""
     where: str
-    """In the paper."""
+    """Place in the paper."""
     found: str
-    """Our figure, with its interval where it has one."""
+    """Our figure, with its confidence interval where it has one."""
     verdict: str
     """`reproduced`, `reproduced in part`, `not reproduced`, or `not known`."""
     reason: str
 
 
 def read_results(folder: Path) -> dict[str, Mapping[str, Any]]:
-    """What there is of the studies' results, by the name of the study.
+    """Read the result files of the studies that are in a folder, by the name of the study.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def read_results(folder: Path) -> dict[str, Mapping[str, Any]]:
 
 
 def judge(results: Mapping[str, Mapping[str, Any]]) -> list[Claim]:
-    """All claims, in the order of the paper."""
+    """Compare all claims of the paper with the studies' results, in the order of the paper."""
     curves = [content for name, content in results.items() if name.startswith("fig4b")]
     gains, entries = ([entry for content in curves for entry in content[part]] for part in ("gains", "entries"))
     cases = list(dict.fromkeys(gain["case"] for gain in gains))
@@ -75,7 +76,7 @@ def judge(results: Mapping[str, Mapping[str, Any]]) -> list[Claim]:
 
 
 def _fig4a(content: Mapping[str, Any] | None) -> list[Claim]:
-    """Claims on the panel's gain, judged at every place and element pattern of Fig. 4(a)."""
+    """Check the claims on the panel's gain at every place and element pattern of Fig. 4(a)."""
     where = "Fig. 4(a)"
     claims = ("optimised above random codes, intervals apart", "optimised above the sphere")
     if content is None:
@@ -92,7 +93,7 @@ def _fig4a(content: Mapping[str, Any] | None) -> list[Claim]:
 
 
 def _lowest(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
-    """Claim on the order of the curves."""
+    """Check the claim that the optimised codes have the lowest RMSE of all schemes at every SNR."""
     known = [gain for gain in gains if gain["over"] in RIVALS and gain["gain"] is not None]
     above = [gain for gain in known if gain["gain_low"] > 0.0]
     below = [gain for gain in known if gain["gain_high"] < 0.0]
@@ -105,7 +106,7 @@ def _lowest(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
 
 
 def _share(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
-    """Claim of 31 % over every benchmark, SNR by SNR."""
+    """Check the claim of an RMSE 31 % below every benchmark's, SNR by SNR."""
     rows, held = [], []
     for snr, own in _by_snr(gains):
         least = min(own, key=lambda gain: gain["gain"])
@@ -126,7 +127,7 @@ def _share(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
 
 
 def _metres(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
-    """Claim of 0.1 m below the scheme without a panel."""
+    """Check the claim of an RMSE 0.1 m below that of the scheme without a panel."""
     own = [gain for gain in gains if gain["over"] == "no_ris" and gain["lower_by_m"] is not None]
     held = [gain["lower_by_m"] >= LEAST_FALL for gain in own]
     text = "; ".join(
@@ -140,7 +141,7 @@ def _metres(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
 
 
 def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
-    """Claim that errors fall as the SNR grows."""
+    """Check the claim that the RMSE falls as the SNR grows."""
     own = sorted((e for e in entries if e["scheme"] == OURS and e["rmse_m"]), key=lambda e: float(e["snr_db"]))
     if len(own) < 2:
         return []
@@ -152,7 +153,7 @@ def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
 
 
 def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
-    """Claims on the fall of the errors with the panel's size, judged by Fig. 4(c)."""
+    """Check the claims that the RMSE of agent and panel fall with the panel's size, by Fig. 4(c)."""
     where = "Fig. 4(c)"
     what = {"agent": "agent's error falls with the panel's size", "panel": "panel's error falls with the panel's size"}
     own = [] if content is None else [fall for fall in content["falls"] if fall["scheme"] == OURS]
@@ -176,16 +177,18 @@ def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
 
 
 def _by_snr(gains: Sequence[Mapping[str, Any]]) -> list[tuple[float, list[Mapping[str, Any]]]]:
+    """Gains over the benchmarks, grouped by SNR [dB]."""
     known = [gain for gain in gains if gain["over"] in RIVALS and gain["gain"] is not None]
     return [(snr, [g for g in known if g["snr_db"] == snr]) for snr in dict.fromkeys(g["snr_db"] for g in known)]
 
 
 def _pairs(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any]]) -> str:
+    """Benchmarks and SNRs at which a claim does not hold, as text."""
     return ", ".join(f"{gain['over']} at {gain['snr_db']:g} dB" for gain in known if gain not in above)
 
 
 def _bounds(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any]]) -> str:
-    """What the bounds say of a claim where the order does not hold."""
+    """Differences of the posterior bounds where the claimed order of the curves does not hold, as text."""
     limits = [gain["bound_gain"] for gain in known if gain not in above and gain["bound_gain"] is not None]
     if not limits:
         return ""
@@ -193,10 +196,12 @@ def _bounds(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any
 
 
 def _judgement(held: Sequence[bool], some: bool) -> str:
+    """Whether a claim is reproduced, in part or not, in words."""
     if all(held):
         return "reproduced"
     return "reproduced in part" if some else "not reproduced"
 
 
 def _unknown(claim: str, where: str, study: str) -> Claim:
+    """A claim whose study has no results."""
     return Claim(claim, where, "", "not known", f"`pipelines/{study}.toml` has not been run, or not to the end.")

@@ -1,4 +1,4 @@
-"""Comparison of both channels in many rooms, path by path, and one pose of one room to look at."""
+"""Comparison of the ray tracer with the image-source channel in many rooms, path by path, and a pose for a picture."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -16,43 +16,49 @@ from rislam_rt.worker_pool import run_side_by_side
 
 
 class Certificate(NamedTuple):
-    """One pose of a room: both path sets, the tracer's own float32 numbers, and what sets them apart."""
+    """Paths of both channels at one pose of a room, and the report of their differences, for a picture."""
 
     scene: Scene
-    """Its agent stands at the pose."""
+    """Scene whose agent is at the pose."""
     pose: int
-    """Which of the random poses."""
+    """Number of the pose among the random ones."""
     traced: Paths
+    """Paths of the ray tracer in its own float32 numbers."""
     analytic: Paths
+    """Paths of the image-source channel."""
     report: PathReport
 
 
 class Comparison(NamedTuple):
-    """A study of both channels: all rooms, and the certificate of the room that is to be shown."""
+    """Result of comparing both channels in many rooms."""
 
     rows: list[Validation]
+    """By room, for raw and refined numbers of the tracer."""
     certificate: Certificate | None
+    """Of the room that has a picture."""
 
     @property
     def unexplained(self) -> int:
-        """One-sided paths without a proof, over all compared rooms."""
+        """Number of paths that one channel alone has and nothing explains, over all compared rooms."""
         return sum(row.report.unexplained for row in self.rows)
 
     @property
     def breaches(self) -> int:
-        """Errors beyond their limits, over all compared rooms and both kinds of numbers."""
+        """Number of path errors beyond their limits, over all compared rooms."""
         return sum(row.report.num_breaches for row in self.rows)
 
     @property
     def passed(self) -> bool:
-        """Whether every room's comparison passed."""
+        """Whether the channels agree in every room."""
         return all(row.report.passed for row in self.rows)
 
 
 def run_comparison(
     scenes: Sequence[Scene], spec: CompareSpec, *, jobs: int = 1, progress: Tell = tell_nobody
 ) -> Comparison:
-    """Compare both channels in the rooms of a specification, given in its order; `jobs` rooms at a time.
+    """Compare the ray tracer with the image-source channel in all rooms of a specification, `jobs` rooms at a time.
+
+    `scenes` are the rooms in the specification's order.
 
     Raises
     ------
@@ -85,12 +91,12 @@ def run_comparison(
 def compare_room(
     name: str, rooms: Mapping[str, tuple[Scene, int]], radio: RadioConfig, poses: int, seed: int, tell: Tell
 ) -> list[Validation]:
-    """Compare both channels in one room: the tracer's own numbers, and the refined ones."""
+    """Compare both channels in one room, with the tracer's own float32 numbers and with the refined ones."""
     return validate_rooms([rooms[name]], radio, poses=poses, seed=seed)
 
 
 def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, seed: int) -> Certificate:
-    """The pose with the most one-sided paths among those of the comparison, the first one if there are none."""
+    """Compare both channels at the pose of a room where most paths are found by one alone, or else the first pose."""
     traced, analytic, motion = trace_both(
         scene, radio, poses=poses, depth=depth, rng=room_rng(scene, seed), refine=False
     )
@@ -104,7 +110,7 @@ def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, se
 
 
 def comparison_table(comparison: Comparison) -> list[dict[str, Any]]:
-    """Comparison of every room as plain data, each one-sided path with its proof."""
+    """Comparison of both channels in every room as plain data for JSON, one-sided paths with their explanations."""
     return [
         {
             "scene": row.scene,

@@ -1,4 +1,4 @@
-"""Fig. 4(a): gain of the direct path over the panel against distance, and that of a sphere in the panel's place."""
+"""Fig. 4(a) of the paper: gain of the direct path over the panel against distance, beside that of a sphere."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,24 +19,24 @@ from rislam_rt.studies.spec import Fig4aSpec
 
 
 class Fig4a(NamedTuple):
-    """The curves over K places, nearest place last."""
+    """Curves of Fig. 4(a): panel gain against distance at K places, nearest place last, and that of a sphere."""
 
     position: Floats
-    """(K, 3) [m] the agent's midpoint."""
+    """(K, 3) [m] positions of the agent."""
     distance: Floats
-    """(K,) [m] from the midpoint to the panel's centre."""
+    """(K,) [m] from the agent to the panel's centre."""
     levels: int
-    """Phase levels of an element."""
+    """Number of phase levels of an element."""
     curves: Mapping[str, GainCurves]
-    """By element pattern."""
+    """Panel gains by element pattern."""
     sphere: Floats
-    """(K,) gain of the sphere [dB]."""
+    """(K,) gain of the path over the sphere [dB]."""
     radius: float
-    """Of the sphere [m]."""
+    """Radius of the sphere [m]."""
 
 
 def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
-    """Check that scene and specification of Fig. 4(a) fit.
+    """Check that the scene has the one RIS panel that Fig. 4(a) needs, and the agent starts farther than `closest_m`.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def check_fig4a(scene: Scene, spec: Fig4aSpec) -> None:
 
 
 def lone_panel(scene: Scene) -> RisPanel:
-    """The room's one panel, as Fig. 4(a) needs it.
+    """The one RIS panel of a scene for Fig. 4(a).
 
     Raises
     ------
@@ -63,7 +63,7 @@ def lone_panel(scene: Scene) -> RisPanel:
 
 
 def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progress: Tell = tell_nobody) -> Fig4a:
-    """Run Fig. 4(a): trace the places and design, draw and bound the panel's gain at each of them.
+    """Compute Fig. 4(a): gain of the direct panel path at each place under designed, random and optimal phase codes.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
 
 
 def walk_to_panel(scene: Scene, places: int, closest: float) -> Trajectory:
-    """Places on the straight line from the trajectory's start to `closest` [m] short of the panel, at one height."""
+    """Places on a straight, level line from the trajectory's start towards the RIS panel, to `closest` [m] from it."""
     start = scene.agent.position[0]
     way = np.append(lone_panel(scene).center[:2] - start[:2], 0.0)
     reach = float(np.linalg.norm(way))
@@ -109,7 +109,7 @@ def walk_to_panel(scene: Scene, places: int, closest: float) -> Trajectory:
 def place_problems(
     scene: Scene, motion: Trajectory, radio: RadioConfig, element: str, channel: str
 ) -> list[DesignProblem]:
-    """The design problem of the direct panel path at every place, for one element pattern."""
+    """Code design problem of the direct panel path at every place of Fig. 4(a), for one element pattern."""
     panel = lone_panel(scene)
     panel = replace(panel, spec=replace(panel.spec, element=element))
     paths = build_channel(channel, replace(scene, ris=panel), radio, 0).paths(motion)
@@ -121,7 +121,7 @@ def place_problems(
 
 
 def sphere_gain(scene: Scene, motion: Trajectory, radio: RadioConfig, radius: float, channel: str) -> Floats:
-    """Gain (K,) [dB] of a sphere in the panel's place, its centre a radius in front of the panel's plane."""
+    """Gain (K,) [dB] of the path over a sphere in the panel's place, which touches the panel's plane."""
     panel = lone_panel(scene)
     center = panel.center + radius * panel.spec.normal
     ball = Scatterer(panel.name, center, np.pi * radius**2, radius)
@@ -138,7 +138,7 @@ def longer_side(panel: RisPanel) -> float:
 
 
 def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
-    """Column of a landmark's direct path, which must be there at every place of Fig. 4(a)."""
+    """Column of a landmark's direct path; an error if it is hidden at some place of Fig. 4(a)."""
     column = int(np.flatnonzero(paths.landmark == landmark)[0])
     hidden = np.flatnonzero(~paths.valid[:, column])
     if len(hidden):
@@ -148,7 +148,7 @@ def _check_seen(paths: Paths, landmark: int, motion: Trajectory) -> int:
 
 
 def _joined(parts: list[GainCurves]) -> GainCurves:
-    """Curves of Fig. 4(a) of one place each, as curves over all places."""
+    """Join the gain curves of single places of Fig. 4(a)."""
     optimized, random = (
         GainInterval(*np.concatenate([getattr(part, name) for part in parts], axis=1))
         for name in ("optimized", "random")

@@ -1,4 +1,4 @@
-"""Which kind of pipeline a file is."""
+"""Kinds of pipeline files: the specification of each, and reading a file of any kind."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ from rislam_rt.studies.unseen.spec import UnseenSpec
 AnySpec = PipelineSpec | CompareSpec | Fig4aSpec | SweptSpec | ClaimsSpec | ClassifierSpec
 
 MAIN_KIND = "slam"
-"""Of a file that does not say its kind."""
+"""Kind of a pipeline file that does not state one: a SLAM run."""
 KINDS: Mapping[str, tuple[type[AnySpec], Callable[[Any], object]]] = {
     MAIN_KIND: (PipelineSpec, build_settings),
     "compare_channels": (CompareSpec, lambda spec: build_radio(spec.radio)),
@@ -26,11 +26,11 @@ KINDS: Mapping[str, tuple[type[AnySpec], Callable[[Any], object]]] = {
     "claims": (ClaimsSpec, lambda spec: None),
     "train_classifier": (ClassifierSpec, lambda spec: (build_radio(spec.radio), build_receiver(spec.receiver))),
 }
-"""What `kind` may say: the specification of such a file, and what tries it."""
+"""For each `kind` of a pipeline file, its specification and a check of the settings in SI units."""
 
 
 def load_any(path: str | Path, overrides: Sequence[str] = ()) -> AnySpec:
-    """The specification of a file of any kind, `key=value` settings (dotted keys) put over it first.
+    """Read a pipeline file of any kind as a specification, with `key=value` settings (dotted keys) put over it first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sweeps of the main job: a pipeline file, axes over its settings, and what comes out at every point of them."""
+"""Sweeps of a pipeline: SLAM runs over axes of its settings and over seeds, and the RMSE at every point."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -32,12 +32,13 @@ class SweepSection(Section):
     """The table `[sweep]` of a pipeline file; the command line comes first."""
 
     repeat: Annotated[int, Field(ge=1, le=1_000_000)] = 5
-    """Runs with different seeds at every point of the axes."""
+    """Number of runs with different seeds at every point of the axes."""
     paired: list[str] | None = None
     """Axes along which a repetition draws the same noise; all of them by default."""
     time_limit_s: Positive | None = None
+    """Longest time one run may take."""
     axes: dict[str, list[Scalar | list[Scalar]]] = Field(default={})
-    """Values by dotted key."""
+    """Values of the settings to vary, by dotted key."""
 
 
 class _File(Section):
@@ -45,26 +46,29 @@ class _File(Section):
 
 
 class SchemeScore(NamedTuple):
-    """One scheme at one point of the axes, over all repetitions."""
+    """RMSE of one scheme at one point of a sweep over all repetitions, and counts of failures."""
 
     point: Mapping[str, Value]
+    """Values along the axes, by key."""
     scheme: str
     rmse: tuple[float, ...]
-    """Of each repetition that ended [m]."""
+    """Position RMSE [m] of each repetition that ended."""
     interval: tuple[float, float] | None
     """95 % bootstrap interval of the RMSE over the repetitions [m]; None for a single one."""
     diverged: int
+    """Number of repetitions that diverged."""
     failed: int
+    """Number of repetitions that failed."""
     missing: int
-    """Repetitions that have not run yet."""
+    """Number of repetitions that have not run yet."""
 
     @property
     def overall(self) -> float | None:
-        """RMSE of a pipeline's sweep over all repetitions that ended [m]; None if none did."""
+        """Position RMSE [m] over all repetitions that ended; None if none did."""
         return float(rms_over_runs(np.array(self.rmse))) if self.rmse else None
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, one level deep but for the list of errors."""
+        """Scores as plain data, one level deep but for the list of RMSEs."""
         low, high = self.interval or (None, None)
         counts = {"runs": len(self.rmse), "diverged": self.diverged, "failed": self.failed, "missing": self.missing}
         scores = {"rmse_m": self.overall, "low_m": low, "high_m": high, **counts, "each_m": list(self.rmse)}
@@ -72,7 +76,7 @@ class SchemeScore(NamedTuple):
 
 
 def load_section(path: Path, overrides: Sequence[str] = ()) -> SweepSection:
-    """The table `[sweep]` of a pipeline file.
+    """Read the table `[sweep]` of a pipeline file.
 
     Raises
     ------
@@ -87,7 +91,7 @@ def slam_sweep(
     path: Path, overrides: Sequence[str] = (), axes: Sequence[str] = (), *, scene: Path | None = None,
     repeat: int | None = None,
 ) -> Sweep:  # fmt: skip
-    """The sweep of a pipeline file, every cell of which has been checked to be one that can run.
+    """Sweep of a pipeline file over axes of its settings and over seeds; all settings are checked beforehand.
 
     Parameters
     ----------
@@ -96,9 +100,9 @@ def slam_sweep(
     axes
         `key=v1,v2,...`, over those of the file.
     scene
-        Folder that comes before the one that the pipeline names.
+        Scene folder, instead of the one that the pipeline names.
     repeat
-        Repetitions, before those of the file.
+        Number of repetitions, instead of the file's.
 
     Raises
     ------
@@ -139,7 +143,7 @@ def slam_sweep(
 
 
 def typed_axis(axis: Axis) -> Axis:
-    """The axis with values as the pipeline has them: whole numbers become real, single values lists, where need be."""
+    """Axis with its values in the type of the pipeline's setting: whole numbers become real, or values lists."""
     model: Any = PipelineSpec
     *parents, leaf = axis.key.split(".")
     for part in parents:
@@ -159,7 +163,7 @@ def typed_axis(axis: Axis) -> Axis:
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """The scores of one run, its times apart; what its settings say already is left out."""
+    """Do one cell of a pipeline's sweep: simulate a SLAM run and return its scores, those that are times apart."""
     plain = dict(settings)
     beside = Path(plain.pop("beside"))
     spec = PipelineSpec.model_validate({**plain, "seed": seed})
@@ -171,7 +175,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 
 def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
-    """Scores of a pipeline's sweep in the order of the axes; failures are counted, never dropped."""
+    """Scores of every scheme at every point of a pipeline's sweep; failures are counted, never dropped."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
@@ -190,7 +194,7 @@ def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
 
 
 def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
-    """Write a pipeline sweep's `scores.csv` and `scores.json` beside the table of the cells.
+    """Write the scores of a pipeline's sweep as `scores.csv` and `scores.json` beside the table of its cells.
 
     Raises
     ------
@@ -202,7 +206,7 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
 
 
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """Room and versions that a cell's result depends on; says what is wrong with the cell, if anything is."""
+    """Function that checks a cell's settings, and returns the scene's hash and versions that its result depends on."""
     load = cache(load_scene)
     versions = library_versions()
 
@@ -226,7 +230,7 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
 
 
 def _kinds(annotation: Any) -> list[type]:
-    """All plain types in an annotation."""
+    """All plain types in a type annotation, such as those of a union."""
     parts = get_args(annotation)
     if not parts:
         return [annotation] if isinstance(annotation, type) else []
@@ -234,7 +238,7 @@ def _kinds(annotation: Any) -> list[type]:
 
 
 def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
-    """What of a summary comes from the clock, or all else."""
+    """Entries of a run's scores that are times, or all others."""
     kept: dict[str, Any] = {}
     for name, value in summary.items():
         clock = name.endswith("seconds") or name == "over_budget"
@@ -247,6 +251,7 @@ def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
 
 
 def _interval(rmse: Sequence[float]) -> tuple[float, float] | None:
+    """Bootstrap interval of the RMSE over repetitions."""
     if len(rmse) < 2:
         return None
     found = bootstrap(np.array(rmse), rng=np.random.default_rng(0), statistic=rms_over_runs)

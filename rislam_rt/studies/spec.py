@@ -1,4 +1,4 @@
-"""Specification of a study: what its pipeline file may say."""
+"""Specification of a study: settings of the pipeline files of kinds `compare_channels`, `fig4a` and `claims`."""
 
 from typing import Annotated, Any, Literal
 
@@ -15,37 +15,37 @@ Seed = Annotated[int, Field(ge=0, lt=2**63)]
 
 
 class ComparedRoomSection(Section):
-    """One room of a comparison."""
+    """One room in which both channels are compared."""
 
     scene: str
     """Scene folder, relative to the pipeline file, or a built-in room's name."""
     depth: Depth = 3
     """Largest number of wall bounces on a path, both legs together."""
     picture: bool = False
-    """Whether the certificate's picture is of this room."""
+    """Whether the picture of the paths at one pose is of this room."""
 
 
 class StudySpec(Section):
-    """What all studies share."""
+    """Settings that all studies share."""
 
     kind: str
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     name: Name
-    """Of folders and pages."""
+    """Name of the study, in folders and on pages."""
     description: str = ""
-    """For readers alone."""
+    """Text for readers alone."""
     seed: Seed = 7
-    """Of every random draw."""
+    """Seed of every random draw."""
     radio: RadioSection = RadioSection()
 
 
 class CompareSpec(StudySpec):
-    """Traced against analytic paths at random poses of many rooms."""
+    """Comparison of the ray tracer's paths with exact image sources at random poses in many rooms."""
 
     kind: Literal["compare_channels"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     poses: Annotated[int, Field(ge=1, le=100_000)] = 200
-    """Random poses in each room."""
+    """Number of random poses in each room."""
     rooms: Annotated[list[ComparedRoomSection], Field(min_length=1)]
     """The rooms: `scene`, `depth`, `picture`."""
 
@@ -62,25 +62,25 @@ class Fig4aSpec(StudySpec):
     """Gain of the direct path over the panel against distance, as in Fig. 4(a)."""
 
     kind: Literal["fig4a"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     scene: str | None = None
     """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
     channel: Literal["traced", "image_source"] = "traced"
-    """Ray tracer, or exact image sources."""
+    """Channel model: ray tracer, or exact image sources."""
     elements: list[Literal["tang", "energy"]] = Field(default=["tang", "energy"], min_length=1)
     """Element patterns, one after the other, whatever the scene's panel has."""
     places: Annotated[int, Field(ge=2, le=10_000)] = 25
-    """On the straight line from the trajectory's start to the panel, at the start's height."""
+    """Number of places on the straight line from the trajectory's start to the panel, at the start's height."""
     closest_m: Positive = 0.2
     """Horizontal distance from the panel at the last place."""
     sphere_radius_m: Positive | None = None
-    """Of the sphere in the panel's place; half the panel's longer side by default."""
+    """Radius of the sphere in the panel's place; half the panel's longer side by default."""
     seeds: Count = 10
-    """How often the designer runs at each place."""
+    """Number of runs of the code designer at each place."""
     draws: Count = 1000
-    """Random codes at each place."""
+    """Number of random codes at each place."""
     coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
-    """Of the intervals over seeds and over draws."""
+    """Level of the intervals over seeds and over draws."""
     design: DesignerSection = DesignerSection()
 
     @model_validator(mode="after")
@@ -91,20 +91,20 @@ class Fig4aSpec(StudySpec):
 
 
 class ClaimsSpec(Section):
-    """The paper's claims against the figures that other studies left behind."""
+    """Check of the paper's claims against the results of other studies."""
 
     kind: Literal["claims"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     name: Name
-    """Of folders and pages."""
+    """Name of the study, in folders and on pages."""
     description: str = ""
-    """For readers alone."""
+    """Text for readers alone."""
     results: str = "../docs/results"
     """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
 
 
 def study_record(spec: Any, scenes: list[Scene], **more: Any) -> dict[str, Any]:
-    """What is needed to repeat a study: configuration, seed, versions, the hash of every scene, and `more`."""
+    """Record for JSON of what is needed to repeat a study: configuration, seed, versions, hashes of scenes, `more`."""
     return {
         "kind": spec.kind,
         "name": spec.name,

@@ -1,4 +1,4 @@
-"""The sweep engine: any importable function over any settings, one file a cell, resumed where it stopped."""
+"""The sweep engine: evaluates a function over axes of settings and seeds, with a file for each cell, resumable."""
 
 from rislam_rt.sweeps.axes import Axis, parse_axis
 from rislam_rt.sweeps.cost import SweepCost

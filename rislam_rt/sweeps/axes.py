@@ -1,4 +1,4 @@
-"""Axes that a sweep goes through: typed values of any setting, repetitions, and the cells that they make."""
+"""Axes of a sweep: the values of one setting each, checked, and their notation on the command line."""
 
 import json
 import math
@@ -10,17 +10,17 @@ from rislam_rt.toml import parse_toml, parse_value
 
 Scalar = str | int | float | bool
 Value = Scalar | list[Scalar]
-"""What an axis may hold."""
+"""Type of an axis value: text, number, boolean, or a list of these."""
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Values of one setting."""
+    """Axis of a sweep: the values that one setting takes."""
 
     key: str
-    """Dotted, as `slam.sigma_a`."""
+    """Dotted key of the setting, as `slam.sigma_a`."""
     values: tuple[Value, ...]
-    """All of one type (whole numbers pass for real ones), each once."""
+    """Values, all of one type (whole numbers pass for real ones), each once."""
 
     def __post_init__(self) -> None:
         if not self.key or not all(self.key.split(".")):
@@ -38,7 +38,7 @@ class Axis:
 
 
 def parse_axis(text: str) -> Axis:
-    """An axis from `key=v1,v2,...`: each value as in TOML, and what is no TOML as text.
+    """Axis of a sweep from text `key=v1,v2,...`: values in TOML notation, anything else is text.
 
     Raises
     ------
@@ -59,10 +59,12 @@ def parse_axis(text: str) -> Axis:
 
 
 def _plain(value: Any) -> bool:
+    """Whether a value is text, a finite number or a boolean."""
     return isinstance(value, Scalar) and not (isinstance(value, float) and not math.isfinite(value))
 
 
 def _kind(value: Value) -> str:
+    """Type of an axis value in words."""
     if isinstance(value, bool):
         return "booleans"
     if isinstance(value, list):

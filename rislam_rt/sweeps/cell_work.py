@@ -1,4 +1,4 @@
-"""One cell: what a worker is given, and what became of it."""
+"""Work on one cell of a sweep: calls the function in a worker process, and records its result or failure."""
 
 import os
 from collections.abc import Mapping
@@ -10,37 +10,43 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.sweeps.plain_data import plain_result
 
 RAISED, DIED, HUNG, LOST = "raised", "died", "hung", "lost"
-"""Causes of a failure: an exception; the end of the process; the time limit; a blow from outside, which the cell may
-not have deserved, so that it is tried again."""
+"""Causes of a cell's failure: an exception; the end of its process; the time limit; a signal from outside, after which
+the cell is tried again."""
 
 
 class Task(NamedTuple):
-    """All that a worker needs to know."""
+    """Work order for one cell of a sweep: function, settings and seed."""
 
     function: str
+    """`module:function`."""
     settings: Mapping[str, Any]
     seed: int
 
 
 class CellOutcome(NamedTuple):
-    """What became of a cell: plain data, ready for the wire."""
+    """Result or failure of one cell of a sweep and its time, as plain data that can be sent between processes."""
 
     result: Mapping[str, Any] | None = None
-    """If it ended well."""
+    """Result of the function; None if it failed."""
     cause: str = ""
-    """Empty if it ended well, else `RAISED`, `DIED`, `HUNG` or `LOST`."""
+    """Empty if it did not fail, else `RAISED`, `DIED`, `HUNG` or `LOST`."""
     message: str = ""
-    """One line; nothing in it differs from run to run unless the failure does."""
+    """One line on the failure; the same failure has the same message in every run."""
     seconds: float = 0.0
-    """On the clock."""
+    """Elapsed time [s]."""
     cpu_seconds: float = 0.0
+    """CPU time [s]."""
     host: str = ""
+    """Name of the machine."""
     timing: Mapping[str, Any] | None = None
-    """What the function itself says of its times."""
+    """Times that the function itself returned."""
 
 
 def attempt(task: Task, tell: object = None) -> CellOutcome:
-    """Do one cell's work; an exception is an outcome. A cell has no progress to `tell` of."""
+    """Call the function of one cell with its settings and seed, and return its result or, if it raised, the error.
+
+    `tell`, the worker pool's report of progress, is not used.
+    """
     begin, cpu = perf_counter(), process_time()
     result, cause, message, timing = None, "", "", None
     try:
@@ -57,7 +63,7 @@ def attempt(task: Task, tell: object = None) -> CellOutcome:
 
 
 def find_function(name: str) -> Any:
-    """The function of `module:function` that does a cell's work.
+    """Import the function of a sweep's cells by its name `module:function`.
 
     Raises
     ------
@@ -75,7 +81,7 @@ def find_function(name: str) -> Any:
 
 
 def one_line(error: BaseException) -> str:
-    """Kind and first line of an exception in a cell's work."""
+    """Type and first line of an exception, as the message of a failed cell."""
     text = str(error).strip().splitlines()
     kind = "" if isinstance(error, RislamError) else f"{type(error).__name__}: "
     return (kind + (text[0] if text else "")).rstrip(": ")[:500]

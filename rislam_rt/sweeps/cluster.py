@@ -1,4 +1,4 @@
-"""Cells on a Dask cluster: each thread of a Dask worker leads a worker of ours, so that a cell can do it no harm."""
+"""Running the cells of a sweep on a Dask cluster, each in a process of its own that a Dask worker's thread starts."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -11,17 +11,17 @@ from rislam_rt.sweeps.local_pool import SAME_BITS, Run, outcome_of
 from rislam_rt.worker_pool import Pool
 
 CONNECT_SECONDS = 3
-"""How long to wait for the scheduler, which is there already: it only has to answer."""
+"""Time [s] to wait for the Dask scheduler to answer."""
 
 _POOL = Pool(SAME_BITS)
-"""Of the Dask worker that this module is imported in."""
+"""Worker processes of the Dask worker that imports this module."""
 
 
 @contextmanager
 def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]:
-    """Workers of the cluster at `address`, as many at a time as it has threads, and that number.
+    """Connect to the Dask cluster at `address`; yields a function that runs a sweep's cells, and the number of threads.
 
-    Its machines need this package and the cell's function, importable, and the folders that the settings name.
+    The cluster's machines need this package, the cells' function and the folders that the settings name.
 
     Raises
     ------
@@ -54,12 +54,12 @@ def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]
 
 
 def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
-    """Do one cell on a worker of the Dask cluster; the outcome as plain data."""
+    """Run one cell of a sweep in a process of a Dask worker, and return its outcome as plain data."""
     return tuple(outcome_of(_POOL.do(attempt, (Task(*task),), limit), limit))
 
 
 def _outcome(future: Any, address: str) -> CellOutcome:
-    """What the cluster says. It tries a cell whose machine is lost on others, and gives up after some."""
+    """Outcome of a cell from its Dask future; `LOST` if the cluster gave up after losing several workers with it."""
     if future.status == "finished":
         return CellOutcome(*future.result())
     if future.status == "error":
@@ -68,5 +68,5 @@ def _outcome(future: Any, address: str) -> CellOutcome:
 
 
 def dismiss_idle() -> None:
-    """End the cluster's workers that wait for nothing."""
+    """End the idle worker processes of a Dask worker."""
     _POOL.dismiss()

@@ -1,4 +1,4 @@
-"""What a sweep will cost, from what its cells have cost so far."""
+"""Estimate of a sweep's cost, the time that is left, from the times of the cells done so far."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,20 +7,21 @@ from rislam_rt.sweeps.sweep import Cell
 
 
 class SweepCost(NamedTuple):
-    """Of the cells that are left."""
+    """Estimated time of the cells of a sweep that are left."""
 
     cells: int
+    """Number of cells left."""
     cell_seconds: float | None
-    """Mean time of one [s]; None while nothing is known."""
+    """Mean time of one cell [s]; None before any is done."""
     seconds: float | None
-    """Time until all are done [s], so many at a time."""
+    """Time until all are done [s]; None before any is done."""
 
 
 def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], width: int) -> SweepCost:
-    """Cost of the cells that are left, in time, `width` at a time: the mean of those at the most similar settings.
+    """Estimate the time of the cells left, run `width` at a time, each from the mean of done cells of similar settings.
 
-    Similar is who has the most values of the axes in common: if the number of particles is an axis, cells with as many
-    particles tell more than the others.
+    The most similar cells share the most values along the axes: if the number of particles is an axis, cells with the
+    same number count rather than others.
     """
     if not left:
         return SweepCost(0, None, 0.0)
@@ -38,6 +39,7 @@ def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], widt
 
 
 def _similar(point: Mapping[str, Any], known: Sequence[Mapping[str, Any]]) -> float:
+    """Mean time [s] of the known cells that share the most values along the axes with a point."""
     shared = [sum(other["point"].get(key) == value for key, value in point.items()) for other in known]
     most = max(shared)
     seconds = [float(other["seconds"]) for other, number in zip(known, shared, strict=True) if number == most]

@@ -1,4 +1,4 @@
-"""A local pool: cells by workers on this machine, and what a worker's end says of its cell."""
+"""Local pool: runs the cells of a sweep in worker processes on this machine, and tells why a process ended."""
 
 import signal
 from collections.abc import Callable, Iterable, Iterator
@@ -9,19 +9,19 @@ from rislam_rt.sweeps.cell_work import DIED, HUNG, LOST, CellOutcome, Task, atte
 from rislam_rt.worker_pool import Lost, open_pool
 
 Run = Callable[[Iterable[tuple[str, Task]]], Iterator[tuple[str, CellOutcome]]]
-"""Does tasks and gives their outcomes as they come, each with its name."""
+"""Function that runs named tasks, and yields the name and outcome of each as it ends."""
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "RISLAM_RT_THREADS")
 SAME_BITS = {**dict.fromkeys(_THREADS, "1"), "PYTHONHASHSEED": "0"}
-"""Environment of every worker: cells share the cores, and sums and sets have one order."""
+"""Environment of every worker process: one thread each, so that results are equal to the last bit, and a fixed hash."""
 
 FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-"""Signals that a process does not send itself when it breaks: a user, a queue, or a kernel out of memory did."""
+"""Signals that a user, a queue or the kernel sends: the cell is not to blame, and is tried again."""
 
 
 @contextmanager
 def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
-    """Workers on this machine, `jobs` at a time. Leaving ends them, in the middle of their cells if need be."""
+    """Start worker processes for the cells of a sweep, `jobs` at a time; leaving the context ends them."""
     with open_pool(attempt, jobs, limit=limit, environment=SAME_BITS) as run:
 
         def run_cells(tasks: Iterable[tuple[str, Task]]) -> Iterator[tuple[str, CellOutcome]]:
@@ -32,7 +32,7 @@ def local_pool(jobs: int, limit: float | None) -> Iterator[Run]:
 
 
 def outcome_of(found: Any, limit: float | None) -> CellOutcome:
-    """Outcome of a worker of the local pool: what it gave, or how it ended."""
+    """Outcome of a cell from what its worker process returned, or from how the process ended."""
     if isinstance(found, CellOutcome):
         return found
     assert isinstance(found, Lost)

@@ -1,4 +1,4 @@
-"""Plain data: a cell's result as JSON has it, the same on every machine, at every time."""
+"""Plain data: conversion of a cell's result to numbers, text, lists and mappings as in JSON, and its dotted names."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from rislam_rt.errors import RislamError
 
 
 def plain_result(result: Any) -> dict[str, Any]:
-    """A function's result as JSON has it: arrays as lists, NaN and infinity as null.
+    """Convert the result of a cell's function to plain data as in JSON: arrays to lists, NaN and infinity to None.
 
     Raises
     ------
@@ -21,6 +21,7 @@ def plain_result(result: Any) -> dict[str, Any]:
 
 
 def _plain(name: str, value: Any) -> Any:
+    """One value of a cell's result as plain data."""
     if hasattr(value, "tolist"):  # of numpy, which a worker does not import by itself: cells that need it do
         value = value.tolist()
     if value is None or isinstance(value, bool | int | str):

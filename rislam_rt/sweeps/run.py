@@ -1,4 +1,4 @@
-"""Running a sweep: what is there already is not done again, what fails is written down, and the rest goes on."""
+"""Running a sweep: does the cells that have no file yet, records failures, keeps the table of results up to date."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -26,25 +26,25 @@ from rislam_rt.sweeps.store import (
 from rislam_rt.sweeps.sweep import Cell, Sweep, build_cells
 
 TABLE_SECONDS = 1.0
-"""Least time between two writings of the growing table."""
+"""Least time [s] between two updates of the table of results."""
 TABLE_SHARE = 0.1
-"""Largest share of the time that goes into the growing table, and into what is drawn from it."""
+"""Largest share of the time spent on updates of the table, and of figures drawn from it."""
 
 
 @dataclass(frozen=True, slots=True)
 class SweepOptions:
-    """How to run, which never changes what comes out."""
+    """How a sweep is run: number of processes, cluster, time limit; the results do not depend on it."""
 
     jobs: int = 1
-    """Cells at a time on this machine."""
+    """Number of cells at a time on this machine."""
     dask: str | None = None
-    """Address of a Dask scheduler; its workers do the cells instead."""
+    """Address of a Dask scheduler, whose workers run the cells instead."""
     time_limit: float | None = None
-    """Longest time a cell may take [s]; what a limit stops is a failure, and that does change what comes out."""
+    """Longest time a cell may take [s]; a cell that is stopped counts as failed, in the results as well."""
     retry: bool = False
-    """Whether cells that failed before are done again; those that were killed from outside are in any case."""
+    """Whether cells that failed before are run again; those killed by a signal from outside always are."""
     only_estimate: bool = False
-    """Whether to stop once the cost is known: after one cell, if nothing else tells it."""
+    """Whether to stop once the cost is estimated, which may take one cell."""
 
     def __post_init__(self) -> None:
         if self.jobs < 1:
@@ -54,25 +54,26 @@ class SweepOptions:
 
 
 class SweepProgress(NamedTuple):
-    """Where a sweep stands: given when its cost is known, and after every cell."""
+    """Progress of a sweep: numbers of cells done and failed, and the estimated time left."""
 
     done: int
-    """Cells that ended well, in this run or before."""
+    """Number of cells done without failure, in this run or before."""
     failed: int
+    """Number of cells that failed."""
     total: int
     cost: SweepCost
-    """Of what is left."""
+    """Estimated cost of the cells left."""
     last: Row | None
-    """The cell that just ended."""
+    """The cell that just ended; None at the start."""
 
 
 @dataclass(frozen=True, slots=True)
 class SweepReport:
-    """All cells in their order."""
+    """Result of a sweep: state and result of every cell in its order, and the estimated cost of those left."""
 
     rows: tuple[Row, ...]
     cost: SweepCost
-    """Of what is left, if the sweep was to stop at the estimate."""
+    """Estimated cost of the cells left, if the sweep was to stop at the estimate."""
 
     @property
     def failed(self) -> tuple[Row, ...]:
@@ -88,17 +89,17 @@ def run_sweep(
     tell: Callable[[SweepProgress], None] | None = None,
     grow: Callable[[Sequence[Row]], None] | None = None,
 ) -> SweepReport:
-    """Do all cells that are not there yet and leave one file for each in `folder`.
+    """Run all cells of a sweep that have no file in `folder` yet, and write a file for each.
 
-    Whenever it is stopped, and however, another call goes on from the cells that are there; the files are the same,
-    byte for byte, as those of a run that was never stopped, on one process or many, here or on a cluster.
+    A sweep that was stopped in any way goes on from the cells that are there when it is called again; the files are the
+    same, byte for byte, as those of a sweep that was never stopped, on one process or many, here or on a cluster.
 
     Parameters
     ----------
     tell
         Called when the cost is known and after every cell.
     grow
-        Called with all rows whenever the table is written, at the end too: draws figures that grow.
+        Called with all rows whenever the table is written, at the end too: to draw figures of the results so far.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def run_sweep(
         hired = _hire(stack, effort) if left and effort.dask is not None else None
         shown = effort.only_estimate and (folder / "table.csv").is_file()  # tables of what was run stay as they are
         stack.enter_context(open_folder(folder, sweep, keep=shown))
-        board = _Board(sweep, folder, effort, cells, tell, grow, keep=shown)
+        board = _SweepState(sweep, folder, effort, cells, tell, grow, keep=shown)
         stack.callback(board.write)
         if board.left:
             run, board.width = hired or _hire(stack, effort)
@@ -132,7 +133,7 @@ def run_sweep(
 
 
 def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
-    """Who runs a sweep's cells, and how many at a time."""
+    """Start the local or Dask workers of a sweep; return the function that runs cells, and how many run at a time."""
     if effort.dask is None:
         return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
     from rislam_rt.sweeps.cluster import cluster_pool
@@ -140,8 +141,8 @@ def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
     return stack.enter_context(cluster_pool(effort.dask, effort.time_limit))
 
 
-def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
-    """All of a sweep that is to be run; one cell first, if nothing else says what the rest will cost."""
+def _shares(board: "_SweepState") -> Iterator[list[tuple[str, Task]]]:
+    """Cells of a sweep that are to be run, in batches: one alone first if no known time tells the cost."""
     tasks = list(board.left.items())
     if board.cost().seconds is None:
         yield tasks[:1]
@@ -151,8 +152,8 @@ def _shares(board: "_Board") -> Iterator[list[tuple[str, Task]]]:
         yield tasks
 
 
-class _Board:
-    """The state of a run: what is done, what is left, and who wants to know."""
+class _SweepState:
+    """State of a running sweep: results of its cells, cells left and their cost; writes them and reports progress."""
 
     def __init__(
         self,
@@ -179,7 +180,7 @@ class _Board:
         self.known: tuple[float, SweepCost] | None = None
 
     def take(self, ident: str, outcome: CellOutcome) -> None:
-        """A cell has ended."""
+        """Store the outcome of a cell that has ended, and report progress."""
         cell = self.rows[ident].cell
         self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.function, outcome)
         append_timing(self.folder, cell, outcome)
@@ -190,14 +191,14 @@ class _Board:
         self.show(row)
 
     def cost(self) -> SweepCost:
-        """Cost of what is left of a sweep, worked out anew at most once in `TABLE_SECONDS`."""
+        """Estimated cost of the cells left, computed anew at most once in `TABLE_SECONDS`."""
         if self.known is None or self.known[1].seconds is None or not self.left or monotonic() >= self.known[0]:
             left = [self.rows[ident].cell for ident in self.left]
             self.known = monotonic() + TABLE_SECONDS, estimate_cost(left, self.timings, self.width)
         return self.known[1]
 
     def show(self, last: Row | None) -> None:
-        """Tell where the sweep stands."""
+        """Report the sweep's progress; `last` is the cell that just ended."""
         if self.tell is not None:
             states = [row.state for row in self.rows.values()]
             done = states.count(DONE)
@@ -205,7 +206,7 @@ class _Board:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Bring a running sweep's table up to date, unless it is one to keep."""
+        """Write the table of all cells and draw the figures of the results so far, unless the old ones are kept."""
         if self.keep:
             return
         begin = monotonic()

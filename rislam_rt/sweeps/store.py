@@ -1,8 +1,8 @@
-"""The store of a sweep: one file a cell, what differs from run to run apart, and a table that grows.
+"""Storage of a sweep's results: a folder with a file for each cell, a table of all cells, and their times.
 
-sweep.json               what is swept
-cells/<ident>.json       what a cell gave, or how it failed, with a checksum; the same bytes from every run
-table.csv, table.json    all cells in their order, those that are missing too; the same bytes from every run
+sweep.json               function, axes, base settings and seed of the sweep
+cells/<ident>.json       result or failure of a cell, with a checksum; the same bytes from every run
+table.csv, table.json    all cells in their order, missing ones too; the same bytes from every run
 timings.jsonl            seconds and machine of every cell that ran, in the order in which they ended
 """
 
@@ -29,41 +29,41 @@ from rislam_rt.sweeps.cell_work import CellOutcome
 from rislam_rt.sweeps.sweep import Cell, Sweep
 
 SWEEP_FILE = "sweep.json"
-"""The folder's marker."""
+"""Name of the file by which a sweep folder is recognised."""
 
 MISSING, DONE = "missing", "done"
-"""States of a cell, beside the causes of a failure."""
+"""States of a cell, beside the causes of a failure (`sweeps.cell_work`)."""
 
 FIXED = ("repetition", "seed", "state", "message")
-"""Columns of every table, between the axes and the results."""
+"""Columns of every table of cells, between the axes and the results."""
 
 
 class Row(NamedTuple):
-    """One cell in the table."""
+    """One cell of a sweep with its state and result: a row of the table."""
 
     cell: Cell
     state: str
-    """`missing`, `done`, or why it failed: `raised`, `died`, `hung`, `lost`."""
+    """`missing`, `done`, or the cause of its failure: `raised`, `died`, `hung`, `lost`."""
     message: str
-    """Of a failure; else empty."""
+    """One line on the failure; else empty."""
     result: Mapping[str, Any]
-    """Empty unless done."""
+    """Result of the function; empty unless done."""
 
     @property
     def failed(self) -> bool:
-        """Whether a stored cell ran and did not end well."""
+        """Whether the cell ran and failed."""
         return self.state not in (MISSING, DONE)
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder that holds something else than a sweep: nothing of anybody else's may be replaced.
+    """Check that a folder is a sweep's, empty or not there, so that no other files are replaced.
 
     Raises
     ------
     ConfigError
-        It does.
+        It holds something else.
     ResultError
-        `sweep.json` is not as it was written.
+        `sweep.json` was changed since it was written.
     """
     try:
         names = [entry.name for entry in folder.iterdir()]
@@ -79,8 +79,9 @@ def check_folder(folder: Path) -> None:
 
 @contextmanager
 def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None]:
-    """Make the folder, say what is swept (unless what it says is to be kept), keep other sweeps out, and remove what a
-    killed one was writing.
+    """Create a sweep's folder, lock it within this context, remove temporary files and write `sweep.json`.
+
+    With `keep` the `sweep.json` that is there stays.
 
     Raises
     ------
@@ -103,7 +104,7 @@ def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None
 
 
 def write_sweep(folder: Path, sweep: Sweep) -> None:
-    """Store what is swept; the file is the folder's marker.
+    """Write function, axes, base settings and seed of a sweep to `sweep.json`, by which the folder is recognised.
 
     Raises
     ------
@@ -123,7 +124,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
-    """Store a cell's file, whole.
+    """Write the result or failure of a cell to its file, and return its row of the table.
 
     Raises
     ------
@@ -137,7 +138,7 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) ->
 
 
 def read_row(folder: Path, cell: Cell) -> Row:
-    """What there is of a cell; a file that is not as it was written, or another cell's, counts as missing."""
+    """Read state and result of a cell from its file; a file that was changed or is another cell's counts as missing."""
     file = _file(folder, cell)
     try:
         found = read_sealed(file)
@@ -149,7 +150,7 @@ def read_row(folder: Path, cell: Cell) -> Row:
 
 
 def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
-    """Remember how long a cell took, and where; losing a line costs nothing but an estimate."""
+    """Append the time and machine of a cell to `timings.jsonl`, from which costs are estimated; errors are ignored."""
     line = {
         "ident": cell.ident,
         "point": dict(cell.point),
@@ -164,7 +165,7 @@ def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
 
 
 def read_timings(folder: Path) -> list[dict[str, Any]]:
-    """All lines of the stored timings that are whole."""
+    """Read the times of all cells that ran, from the complete lines of `timings.jsonl`."""
     found = []
     with suppress(OSError):
         for line in (folder / "timings.jsonl").read_text(encoding="utf-8").splitlines():
@@ -175,7 +176,7 @@ def read_timings(folder: Path) -> list[dict[str, Any]]:
 
 
 def write_table(folder: Path, rows: Sequence[Row]) -> None:
-    """The table as CSV and JSON, in the order of the cells; nested names are dotted, lists stay in the cells' files.
+    """Write the table of all cells as CSV and JSON, in their order; nested names are dotted, lists are left out.
 
     Raises
     ------
@@ -193,10 +194,11 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
 
 
 def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
-    """A table whose columns are those of the first row, in its order; lists with semicolons."""
+    """Encode rows as CSV with the columns of the first row; lists are joined by semicolons."""
     rows = ([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()] for entry in entries)
     return csv_file(entries[0] if entries else (), rows)
 
 
 def _file(folder: Path, cell: Cell) -> Path:
+    """Path of a cell's file in a sweep folder."""
     return folder / "cells" / f"{cell.ident}.json"

@@ -1,4 +1,4 @@
-"""A sweep as it is asked for, and the cells that it makes: one evaluation each, with its settings and seed."""
+"""Definition of a sweep (function, axes, base settings), and its cells: one evaluation each, with settings and seed."""
 
 import hashlib
 import json
@@ -14,23 +14,27 @@ from rislam_rt.toml import put_dotted
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """A function, its settings, and what to vary. Nothing here depends on the order of axes or values but the table."""
+    """Definition of a sweep: a function, its base settings, the axes to vary and the number of repetitions.
+
+    Only the order of the table depends on the order of axes and values.
+    """
 
     function: str
-    """`module:function`, importable in every worker. It takes (settings, seed) and returns a mapping of names to
-    numbers, text, lists and mappings of these. What differs from run to run (times) goes under the name `timing`."""
+    """Name `module:function`, importable in every worker process. The function takes (settings, seed) and returns a
+    mapping of names to numbers, text, lists and mappings of these; times, which differ from run to run, are under
+    `timing`."""
     axes: tuple[Axis, ...] = ()
     base: Mapping[str, Any] = field(default_factory=dict)
     """Settings common to all cells: nested mappings of plain values, as from a TOML file."""
     repetitions: int = 1
     seed: int = 0
-    """Of the whole sweep."""
+    """Seed of the whole sweep."""
     paired: tuple[str, ...] = ()
-    """Axes that leave the seed alone, so that cells which differ in them only draw the same numbers."""
+    """Axes that the cells' seeds do not depend on, so that cells which differ in them only draw the same numbers."""
     local: Mapping[str, Any] = field(default_factory=dict)
-    """Settings that results do not depend on, as folders: the function gets them, no file has them."""
+    """Settings that results do not depend on, such as folders: the function gets them, no file has them."""
     depends: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
-    """What else a cell's result depends on, from its settings: versions, the hash of a room."""
+    """Function that returns what else a cell's result depends on: versions, the hash of a scene."""
     name: str = "sweep"
 
     def __post_init__(self) -> None:
@@ -50,22 +54,24 @@ class Sweep:
 
 
 class Cell(NamedTuple):
-    """One evaluation of the function."""
+    """One cell of a sweep: one evaluation of its function, with settings and seed."""
 
     ident: str
-    """32 hexadecimal digits, from a hash of all below and the function's name: the name of its file."""
+    """Name of its file: 32 hexadecimal digits of a hash over the function's name and all entries below."""
     point: Mapping[str, Value]
-    """Its values along the axes."""
+    """Values along the axes, by key."""
     repetition: int
+    """Number of the repetition, from 0."""
     settings: Mapping[str, Any]
-    """Base and point, nested."""
+    """Base settings with the point's values, nested."""
     seed: int
     """63 bits, from a hash of the sweep's seed, the repetition, and the values along the axes that are not paired."""
     depends: Mapping[str, Any]
+    """What else the result depends on: versions, the hash of a scene."""
 
 
 def build_cells(sweep: Sweep) -> list[Cell]:
-    """All cells of a sweep: the last axis varies fastest, repetitions faster still.
+    """List all cells of a sweep with settings and seeds; the last axis varies fastest, repetitions faster still.
 
     Raises
     ------
@@ -88,7 +94,7 @@ def build_cells(sweep: Sweep) -> list[Cell]:
 
 
 def _digest(content: Any) -> bytes:
-    """SHA-256 of plain data in one spelling: sorted keys, shortest numbers that read back the same."""
+    """SHA-256 of plain data, encoded as JSON with sorted keys and shortest numbers that read back the same."""
     try:
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError) as error:

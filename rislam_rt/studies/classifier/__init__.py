@@ -1,1 +1,1 @@
-"""Training of the classifier of multipath components, on some rooms, and its score on others."""
+"""Training of the classifier of multipath components (landmark or wall return), and its test in other rooms."""

@@ -1,4 +1,4 @@
-"""How a walk sets the panel: codes of several policies, the same for all scores."""
+"""Phase codes of the panel along the random walks on which the classifier is trained: several policies."""
 
 import numpy as np
 
@@ -7,16 +7,16 @@ from rislam_rt.model import DataSheet, PathKind, Paths, RisCode
 from rislam_rt.ris import rephase
 
 POLICIES = ("random", "held", "aimed", "exact")
-"""A random code each cycle; one random code; the best for the direct path from the middle of the walk, held; the best
-for the direct path in each cycle."""
+"""Code policies: a random code each cycle; one random code throughout; the best code for the direct panel path at the
+middle of the walk, throughout; the best for that path in each cycle."""
 AIMED = tuple(POLICIES.index(name) for name in ("aimed", "exact"))
-"""Those that know where the agent is."""
+"""Indices of the code policies that know where the agent is."""
 
 
 def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.random.Generator) -> Paths:
-    """The paths of a walk under the codes of a policy; as they are without a panel.
+    """True paths of a walk with gains under the phase codes of a policy; unchanged without a RIS panel.
 
-    With no direct path among them, the policies that aim take one random code.
+    Where no path over the panel is without walls, the policies that aim take one random code.
     """
     if panel is None or paths.ris is None:
         return paths
@@ -30,6 +30,6 @@ def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.ran
 
 
 def _middle(paths: Paths) -> int:
-    """Cycle at which a code is aimed: the middle one of those with a direct path over the panel."""
+    """Cycle at which the code of the policy `aimed` is designed: the middle one of those with a direct panel path."""
     there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
     return int(there[len(there) // 2]) if len(there) else 0

@@ -1,4 +1,4 @@
-"""Gathering labelled tracks from walks: what the receiver reports, tracked as the agent would, and what each was."""
+"""Gathering training examples of the classifier from walks: tracked components with their features and true classes."""
 
 from typing import NamedTuple
 
@@ -12,56 +12,56 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 from rislam_rt.slam.classify import FEATURES, Sightings, track_features
 
 WINDOW = 40
-"""Cycles that a track is judged by, as many as the filter keeps."""
+"""Number of cycles of a track that its features are computed from, as in the filter's window."""
 LOS_MARGIN = 0.1
-"""Length [m] beyond the baseline below which a component is the direct path, as in the filter."""
+"""Length [m] beyond the Tx-Rx baseline below which a component counts as the direct path (LOS), as in the filter."""
 VELOCITY_STD = 0.01
-"""Error [m/s] of the agent's own velocity in each axis, constant over a walk."""
+"""Standard deviation [m/s] of the error of the agent's assumed velocity in each axis, constant over a walk."""
 CLUTTER = -1
-"""In `Examples.kind`."""
+"""Value of `Examples.kind` for false components."""
 OVER_RX, OVER_TX = 1, 2
-"""In `Examples.legs`, added up: walls between landmark and Rx, walls between Tx and landmark."""
+"""Values of `Examples.legs`, added up: walls on the leg to the Rx, walls on the leg from the Tx."""
 
 
 class Examples(NamedTuple):
-    """N components of tracks, one row a component and cycle."""
+    """Training examples of the classifier: N tracked components in single cycles with features and true classes."""
 
     features: Floats
-    """(N, F), 0 where `near`."""
+    """(N, F) features of the track, 0 where `near`."""
     kind: Integers
-    """(N,) `PathKind`, or `CLUTTER`."""
+    """(N,) true `PathKind`, or `CLUTTER`."""
     legs: Integers
-    """(N,) over walls on which legs a landmark's path ran: 0, `OVER_RX`, `OVER_TX`, or both together."""
+    """(N,) legs with walls of a landmark's path: 0, `OVER_RX`, `OVER_TX`, or their sum."""
     age: Integers
-    """(N,) measurements of its track within the window."""
+    """(N,) number of the track's measurements within the window."""
     ratio: Floats
-    """(N,) amplitude over that of free space of the same length."""
+    """(N,) amplitude over that of a free-space path of the same length."""
     walk: Integers
     """(N,) number of the walk."""
     policy: Integers
-    """(N,) index into `POLICIES`, -1 without a panel: the same walk under other codes is another one to a track."""
+    """(N,) code policy, an index into `POLICIES`; -1 without a panel. Tracks of other policies are other tracks."""
     track: Integers
-    """(N,) label of its track within walk and policy, whose examples are in the order of time."""
+    """(N,) label of the track within walk and policy, whose examples are in the order of time."""
     near: Booleans
-    """(N,) as short as the direct path is: removed by its length, before any rule looks."""
+    """(N,) whether the component is as short as the direct path: removed by its length, before it is classified."""
 
     @property
     def keep(self) -> Booleans:
-        """(N,) whether a gathered example came over a landmark."""
+        """Whether each example (N,) is a path over a landmark, which the classifier should keep."""
         return self.kind >= PathKind.PS
 
     @property
     def labelled(self) -> Booleans:
-        """(N,) whether a gathered example was a path, and not clutter."""
+        """Whether each example (N,) is a path, not clutter."""
         return self.kind != CLUTTER
 
     def pick(self, rows: Booleans | Integers) -> "Examples":
-        """Some of the gathered examples."""
+        """Training examples of these rows."""
         return Examples._make(field[rows] for field in self)
 
 
 def join(parts: list[Examples]) -> Examples:
-    """Several sets of gathered examples as one."""
+    """Join several sets of the classifier's training examples."""
     return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
 
 
@@ -69,10 +69,13 @@ def gather_walk(
     paths: Paths, motion: Trajectory, radio: RadioConfig, receiver: ReceiverConfig, name: tuple[int, int], stride: int,
     *, rng: np.random.Generator
 ) -> Examples:  # fmt: skip
-    """Examples of one walk, every `stride`-th cycle of it; `name` is its number and that of its policy."""
+    """Training examples of one walk at every `stride`-th cycle: measure, track, compute features, label by truth.
+
+    `name` holds the number of the walk and that of its code policy.
+    """
     believed = motion.position + np.outer(motion.time, rng.standard_normal(3) * [VELOCITY_STD, VELOCITY_STD, 0.0])
     baseline = float(np.linalg.norm(motion.body.tx_offset - motion.body.rx_offset))
-    state, config, memory = init_tracks(), TrackingConfig(), _Memory()
+    state, config, memory = init_tracks(), TrackingConfig(), _TrackHistory()
     shift, found = doppler_shift(paths, motion, radio.wavelength), []
     for cycle in range(len(motion)):
         heard = measure(paths, cycle, float(motion.heading[cycle]), radio, receiver, None, shift[cycle], rng=rng)
@@ -100,29 +103,31 @@ def gather_walk(
 
 
 def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:
-    """`Examples.kind` and `.legs` of gathered components that are these columns of the paths, -1 for clutter."""
+    """True class (`Examples.kind`) and `.legs` of components by their columns of the paths, -1 for clutter."""
     over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
     over = np.where(paths.kind >= PathKind.PS, over, 0)
     true = column >= 0
     return np.where(true, paths.kind[column], CLUTTER), np.where(true, over[column], 0)
 
 
-class _Memory:
-    """The last measurements of each living label: the tracker itself keeps none."""
+class _TrackHistory:
+    """Measurements of each track that is alive, by cycle, as the tracker itself keeps none."""
 
     def __init__(self) -> None:
         self.rows: dict[int, dict[int, Floats]] = {}
 
     def add(self, labels: Integers, rows: Floats, cycle: int) -> None:
+        """Store one measurement of each labelled track in a cycle."""
         for label, row in zip(labels.tolist(), rows, strict=True):
             self.rows.setdefault(label, {})[cycle] = row
 
     def forget(self, living: Integers) -> None:
+        """Drop the measurements of all tracks but the `living`."""
         alive = set(living.tolist())
         self.rows = {label: held for label, held in self.rows.items() if label in alive}
 
     def sightings(self, labels: Integers, cycle: int, position: Floats, heading: Floats) -> Sightings:
-        """What the labels of gathered tracks have shown in the window that ends at a cycle."""
+        """Measurements of the tracks with these labels in the window that ends at a cycle, with the agent's poses."""
         first = max(0, cycle - WINDOW + 1)
         table = np.zeros((len(labels), cycle - first + 1, 7))
         table[..., 3:6] = 1.0

@@ -1,4 +1,4 @@
-"""A run of the training: gather examples in random rooms, train and choose on them, score once on the named rooms."""
+"""A run of the classifier's training: gather examples in random rooms, train, choose, score once on the named rooms."""
 
 from typing import NamedTuple
 
@@ -21,26 +21,27 @@ from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import train_network
 
 ALL, DRAWN, RANDOM = "all test rooms", "drawn rooms", "random rooms (validation)"
+"""Names of the joint sets of examples that are scored beside the named rooms."""
 
 
 class Training(NamedTuple):
-    """The network and what it is worth."""
+    """Trained network of the component classifier, its training and test sets, and its scores."""
 
     network: Network
     sets: Sets
     scores: dict[str, dict[str, ClassifierScore]]
-    """By named room (and `ALL`, `DRAWN`, `RANDOM`), by rule."""
+    """Scores by named room (and `ALL`, `DRAWN`, `RANDOM`), then by classification rule."""
     mean: dict[str, Floats]
-    """Mean (3,) over the test rooms' F1 with its interval, by rule."""
+    """Mean (3,) over the test rooms' F1 with its interval, by classification rule."""
     restarts: list[tuple[float, float]]
-    """Of each random start's network: mean over the path classes of the share told rightly on the random rooms for
-    validation, which chooses, and F1 on all test rooms."""
+    """For each random start: mean share classified correctly over the path classes of the validation rooms, by which
+    the network is chosen, and F1 on all test rooms."""
     importance: dict[str, Floats]
-    """Loss of F1 on all test rooms, feature by feature, several shuffles each."""
+    """Loss of F1 on all test rooms when a feature is shuffled, by feature, several shuffles each."""
 
 
 def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
-    """Fit from several random starts, keep the best on the validation rooms, score it on all."""
+    """Train the classifier from several random starts, keep the best on the validation rooms, score it on all sets."""
     starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
     networks = [_fit(sets.train, spec, rng=child) for child in starts]
     tested = sets.tested
@@ -65,7 +66,7 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
 
 
 def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """One network of the classifier, trained from one random start."""
+    """Train one network of the classifier from one random start."""
     known, section = examples.pick(examples.labelled & ~examples.near), spec.network
     return train_network(
         known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
@@ -73,10 +74,9 @@ def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) 
 
 
 def balance(examples: Examples) -> Floats:
-    """Weights (N,) of the classifier's examples: keep and remove count alike, and so does every path class of either,
-    however rare.
+    """Weights (N,) of the classifier's training examples: the two answers weigh the same, and so do their path classes.
 
-    Within a class an example counts by one over the root of its walk's number of examples.
+    Within a class an example's weight is one over the root of the number of examples of its walk.
     """
     _, row, count = np.unique(examples.walk, return_inverse=True, return_counts=True)
     weight = 1.0 / np.sqrt(count[row])
@@ -89,5 +89,6 @@ def balance(examples: Examples) -> Floats:
 
 
 def _f1_of(examples: Examples, network: Network) -> float:
+    """F1 of a network on the examples that are paths."""
     known = examples.pick(examples.labelled)
     return f1(known.keep, rules(network)["network"](known))

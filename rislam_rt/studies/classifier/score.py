@@ -1,4 +1,4 @@
-"""Scores of a classifier: F1 of "keep", intervals over walks, what each feature is worth."""
+"""Scores of the component classifier: F1 of "keep" with intervals over walks, and the importance of each feature."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -13,23 +13,27 @@ from rislam_rt.studies.classifier.codes import POLICIES
 from rislam_rt.studies.classifier.gather import Examples
 
 AMPLITUDE_RULE = 0.35
-"""Amplitude over that of free space above which the plain rule removes (`SlamConfig.specular_ratio`)."""
+"""Ratio of amplitude to free-space amplitude above which the amplitude rule removes (`SlamConfig.specular_ratio`)."""
 LEGS = ("", "", " reciprocal", " both legs")
-"""What a path class over walls is called by the legs they are on: none, Rx, Tx, both."""
+"""Suffix of a path class's name by the legs with walls: none, Rx, Tx, both."""
 NUM_RESAMPLES = 1000
+"""Bootstrap resamples of an interval."""
 NUM_SHUFFLES = 5
+"""Shuffles of a feature for its importance."""
 
 Rule = Callable[[Examples], Booleans]
-"""Which examples are kept."""
+"""Classification rule: which examples (N,) are kept as paths over landmarks."""
 
 
 class ClassifierScore(NamedTuple):
-    """Of one rule on one set of examples; clutter counts in `clutter_kept` alone."""
+    """Scores of one classification rule on one set of examples; clutter counts in `clutter_kept` alone."""
 
     f1: float
-    """2 TP / (2 TP + FP + FN) of keep; NaN-free: 1 where there is nothing to keep and nothing was kept."""
+    """2 TP / (2 TP + FP + FN) of keep; 1 where there is nothing to keep and nothing was kept."""
     low: float
+    """Lower end of the interval of F1."""
     high: float
+    """Upper end of the interval of F1."""
     precision: float
     recall: float
     removed: float
@@ -39,7 +43,10 @@ class ClassifierScore(NamedTuple):
 
 
 def rules(network: Network) -> dict[str, Rule]:
-    """The network and what it is compared with; what is near is removed by all of them."""
+    """Classification rules by name: the network over a track's life or cycle by cycle, geometry, amplitude.
+
+    All of them remove components as short as the direct path.
+    """
     return {
         "network": lambda e: ~e.near & (odds_over_life(e, network) > 0.0),
         "single": lambda e: ~e.near & (log_odds(e.features, network) > 0.0),
@@ -49,7 +56,7 @@ def rules(network: Network) -> dict[str, Rule]:
 
 
 def odds_over_life(examples: Examples, network: Network) -> Floats:
-    """Log odds (N,) of keep, blended over the looks that each track has had so far."""
+    """Log odds (N,) that a component is to be kept, averaged over the classifications of its track so far."""
     fresh = log_odds(examples.features, network)
     found, held = np.empty(len(fresh)), dict[tuple[int, int, int], tuple[float, int]]()
     names = zip(examples.walk.tolist(), examples.policy.tolist(), examples.track.tolist(), strict=True)
@@ -61,7 +68,7 @@ def odds_over_life(examples: Examples, network: Network) -> Floats:
 
 
 def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Generator) -> ClassifierScore:
-    """F1 with its interval by resampling walks, which are independent of each other as single cycles are not."""
+    """Scores of a classification rule, with a bootstrap interval of F1 over walks, which are independent."""
     kept = rule(examples)
     labelled, tables = examples.labelled, _tables(examples, kept)
     draws = rng.integers(len(tables), size=(NUM_RESAMPLES, len(tables)))
@@ -81,7 +88,7 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
 
 
 def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
-    """Mean (3,) of the rooms' F1 with its interval, walks resampled within each room."""
+    """Mean over rooms of a classification rule's F1, (3,) with its interval, walks resampled within each room."""
     draws = []
     for examples in rooms:
         tables = _tables(examples, rule(examples))
@@ -93,7 +100,7 @@ def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: 
 
 
 def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
-    """Score of a feature: loss of F1 (S,) when it is shuffled among the examples, S times."""
+    """Importance of each feature of the classifier: loss of F1 (S,) when it is shuffled among the examples, S times."""
     known = examples.pick(examples.labelled & ~examples.near)
     full = f1(known.keep, odds_over_life(known, network) > 0.0)
     lost: dict[str, Floats] = {}
@@ -108,7 +115,7 @@ def importance(examples: Examples, network: Network, *, rng: np.random.Generator
 
 
 def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
-    """Score F1, and how many examples, in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
+    """F1 of a classification rule and number of examples in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
     kept, known = rule(examples), examples.labelled & ~examples.near
     bins = {}
     for low, high in pairwise(edges):
@@ -120,7 +127,7 @@ def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ..
 
 
 def path_classes(examples: Examples) -> dict[str, Booleans]:
-    """Which examples (N,) to score are of each path class, those over walls apart by the legs with walls."""
+    """Which examples (N,) are of each path class, by name; paths with walls are split by the legs that have them."""
     found = {}
     for kind in PathKind:
         over_walls = kind in (PathKind.VS, PathKind.VRIS)
@@ -132,38 +139,38 @@ def path_classes(examples: Examples) -> dict[str, Booleans]:
 
 
 def mistakes(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
-    """Score of mistakes by path class: how many examples are wrong, and how many there are."""
+    """Number of misclassified examples and of all examples, by path class."""
     wrong = rule(examples) != examples.keep
     return {name: (int(np.sum(wrong & rows)), int(np.sum(rows))) for name, rows in path_classes(examples).items()}
 
 
 def right_by_class(examples: Examples, rule: Rule) -> float:
-    """Mean over the path classes of the share that is told rightly: a rare class counts as a common one does."""
+    """Mean over the path classes of the share of examples classified correctly, rare classes counting in full."""
     kept = rule(examples)
     shares = [np.mean((kept == examples.keep)[examples.kind == kind]) for kind in PathKind if kind in examples.kind]
     return float(np.mean(shares)) if shares else 1.0
 
 
 def panel_dropped(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
-    """Looks at the panel's direct path in which it is removed, and all of them, by the policy of the codes."""
+    """Number of examples of the direct panel path that a rule removes, and of all such examples, by code policy."""
     dropped, panel = ~rule(examples), examples.kind == PathKind.RIS
     rows = {name: panel & (examples.policy == number) for number, name in enumerate(POLICIES)}
     return {name: (int(np.sum(dropped & own)), int(np.sum(own))) for name, own in rows.items()}
 
 
 def f1(keep: Booleans, kept: Booleans) -> float:
-    """Score F1 of keep."""
+    """F1 of the components kept against those to keep, both (N,)."""
     return float(_f1(np.array(_counts(kept, keep, np.ones(len(keep), dtype=np.bool_)))[None])[0])
 
 
 def _tables(examples: Examples, kept: Booleans) -> Integers:
-    """Score counts (walks, 4) of each walk, clutter left out."""
+    """Confusion counts (walks, 4) of each walk as `_counts` gives them, clutter left out."""
     walks = np.unique(examples.walk)
     return np.array([_counts(kept, examples.keep, examples.labelled & (examples.walk == walk)) for walk in walks])
 
 
 def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
-    """Score counts: kept rightly, kept wrongly, removed wrongly, removed rightly."""
+    """Confusion counts among `rows`: kept rightly, kept wrongly, removed wrongly, removed rightly."""
     return (
         int(np.sum(rows & kept & keep)),
         int(np.sum(rows & kept & ~keep)),
@@ -173,9 +180,11 @@ def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, i
 
 
 def _f1(tables: Any) -> Floats:
+    """F1 of confusion counts (..., 4)."""
     hit, false, missed = tables[:, 0], tables[:, 1], tables[:, 2]
     return np.asarray(np.where(hit + false + missed > 0, 2.0 * hit / np.maximum(2 * hit + false + missed, 1), 1.0))
 
 
 def _share(part: float, whole: float) -> float:
+    """Ratio of two counts; 1 of none."""
     return float(part / whole) if whole else 1.0

@@ -1,4 +1,4 @@
-"""Sets of examples to learn from, to choose by and to test on: walks through random rooms and through named ones."""
+"""Training, validation and test sets of the component classifier, from walks through random and named rooms."""
 
 import zlib
 from collections.abc import Sequence
@@ -21,35 +21,35 @@ from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec, buil
 from rislam_rt.studies.classifier.walks import random_walk
 
 DEPTH = 2
-"""Wall bounces, both legs together, in random rooms."""
+"""Largest number of wall bounces on a path in random rooms, both legs together."""
 BLIND = tuple(number for number in range(len(POLICIES)) if number not in AIMED)
-"""Policies that know nothing of the agent."""
+"""Indices of the code policies that do not know where the agent is."""
 _TRIES = 20
 
 
 class Sets(NamedTuple):
-    """Examples to learn from, to choose by, and to test on."""
+    """Training, validation and test sets of the component classifier."""
 
     train: Examples
     validation: Examples
     test: dict[str, Examples]
-    """By named room."""
+    """Test examples by named room."""
     drawn: dict[str, Examples]
-    """By room of `scene.random_rooms`, none of which was learnt from."""
+    """Test examples by room of `scene.random_rooms`; none of these rooms is in the training set."""
 
     @property
     def tested(self) -> Examples:
-        """Test set of all named rooms together."""
+        """Test examples of all named rooms together."""
         return join(list(self.test.values()))
 
     @property
     def all_drawn(self) -> Examples:
-        """Set of all drawn rooms together."""
+        """Test examples of all drawn rooms together."""
         return join(list(self.drawn.values()))
 
 
 def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Sets:
-    """All sets of examples that a specification asks for; its seed decides all draws.
+    """Gather the training, validation and test sets of the classifier; the specification's seed decides all draws.
 
     Raises
     ------
@@ -75,8 +75,11 @@ def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell
 
 
 def gather_random(number: int, spec: ClassifierSpec) -> Examples:
-    """Examples of one walk through the random room of a number: under a code that knows the agent, and one that does
-    not. Every other room is one of `scene.random_rooms`, with the motion that is drawn there."""
+    """Training examples of one walk through the random room of that number, under one aimed and one blind code policy.
+
+    Rooms of odd number are those of `scene.random_rooms` with the motion that is drawn there, the others boxes with a
+    random walk.
+    """
     rng = np.random.default_rng([spec.seed, number])
     snr = float(rng.uniform(spec.snr_low_db, spec.snr_high_db))
     radio, policies = with_reference_snr(build_radio(spec.radio), snr), (rng.choice(BLIND), rng.choice(AIMED))
@@ -94,7 +97,7 @@ def gather_random(number: int, spec: ClassifierSpec) -> Examples:
 
 
 def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
-    """Set of examples of the room of a seed along its own motion, under every policy."""
+    """Test examples of the room of `scene.random_rooms` with that seed on its own motion, under every code policy."""
     scene, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
     policies = range(len(POLICIES))
     return gather_motion(
@@ -103,7 +106,10 @@ def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
 
 
 def gather_room(scene: Scene, depth: int, spec: ClassifierSpec) -> Examples:
-    """Examples of walks through a named room under every policy; they depend on its name and the seed alone."""
+    """Test examples of random walks through a named room under every code policy.
+
+    The walks depend on the room's name and the seed alone.
+    """
     name, radio = zlib.crc32(scene.name.encode()), build_radio(spec.radio)
     parts = []
     for walk in range(spec.walks):
@@ -117,7 +123,7 @@ def gather_motion(
     scene: Scene, motion: Trajectory, depth: int, radio: RadioConfig, spec: ClassifierSpec, walk: int,
     policies: Sequence[int], *, rng: np.random.Generator,
 ) -> Examples:  # fmt: skip
-    """Examples along a motion, once for each policy of the panel; once in a room without one."""
+    """Examples of the classifier along a motion, once for each code policy; once in a room without a RIS panel."""
     paths = build_channel(spec.channel, replace(scene, agent=motion), radio, depth).paths(motion)
     receiver, panel = build_receiver(spec.receiver), None if scene.ris is None else scene.ris.spec
     parts = []
@@ -128,6 +134,6 @@ def gather_motion(
 
 
 def first_cycles(scene: Scene, cycles: int) -> Trajectory:
-    """The first cycles of a room's own motion."""
+    """First `cycles` of a scene's own trajectory."""
     agent, rows = scene.agent, slice(cycles)
     return replace(agent, **{name: getattr(agent, name)[rows] for name in ("time", "position", "velocity", "heading")})

@@ -1,4 +1,4 @@
-"""Specification of a classifier's training: what its pipeline file may say."""
+"""Specification of the classifier's training: settings of a pipeline file of kind `train_classifier`."""
 
 from typing import Annotated, Literal
 
@@ -12,70 +12,70 @@ from rislam_rt.scene.random_rooms import CYCLES
 from rislam_rt.studies.spec import ComparedRoomSection, StudySpec
 
 LEARNT_FIRST = 1_000_000
-"""Drawn rooms from this number on are learnt from; those below it never are."""
+"""Number of the first drawn room that may be in the training set; those below it never are."""
 
 Share = Annotated[float, Field(ge=0.0, le=100.0)]
 
 
 def build_receiver(section: ReceiverSection) -> ReceiverConfig:
-    """The receiver's settings by the specification of a classifier's training.
+    """Receiver configuration from the table `[receiver]` of a classifier's training.
 
     Raises
     ------
     ConfigError
-        A value is out of the range that the record itself checks.
+        A value is out of range.
     """
     return ReceiverConfig(**section.model_dump())
 
 
 class TestedRoom(ComparedRoomSection):
-    """One room, for testing alone; `picture` has no meaning here."""
+    """One named room to test the classifier in; `picture` has no meaning here."""
 
     depth: Annotated[int, Field(ge=0, le=4)] = 2
 
 
 class NetworkSection(Section):
-    """The network and its fit."""
+    """Size of the classifier's network, and settings of its training."""
 
     hidden: Annotated[int, Field(ge=1, le=256)] = 12
     """Width of both hidden layers."""
     penalty: Positive = 1e-3
-    """Times half the squared weights."""
+    """Weight decay: factor of half the sum of squared weights in the loss."""
     iterations: Count = 400
-    """Most steps of a fit."""
+    """Largest number of L-BFGS iterations."""
     restarts: Annotated[int, Field(ge=1, le=50)] = 5
-    """Random starts; the best on the random rooms for validation is kept."""
+    """Number of random starts; the best on the validation rooms is kept."""
 
 
 class ClassifierSpec(StudySpec):
     """Training of the classifier of multipath components on random rooms, and its score on named ones."""
 
     kind: Literal["train_classifier"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     channel: Literal["traced", "image_source"] = "image_source"
-    """Ray tracer, or exact image sources."""
+    """Channel model: ray tracer, or exact image sources."""
     train: Annotated[int, Field(ge=2, le=10_000)] = 160
-    """Random rooms to learn from, one walk through each."""
+    """Number of random rooms in the training set, one walk through each."""
     validation: Annotated[int, Field(ge=2, le=10_000)] = 40
-    """More random rooms, by which the best of the random starts is chosen."""
+    """Number of further random rooms, by which the best of the random starts is chosen."""
     rooms: Annotated[list[TestedRoom], Field(min_length=1)]
-    """Rooms to test on, once everything is chosen."""
+    """Named rooms to test on, once everything is chosen."""
     walks: Annotated[int, Field(ge=2, le=1000)] = 8
-    """Random walks through each of them."""
+    """Number of random walks through each named room."""
     cycles: Annotated[int, Field(ge=20, le=CYCLES)] = 120
-    """Length of a walk; a drawn room's own motion has no more."""
+    """Cycles of a walk; a drawn room's own motion has no more."""
     drawn_first: Annotated[int, Field(ge=0, lt=LEARNT_FIRST // 2)] = 200
     """First of the drawn rooms (`scene.random_rooms`) to test on, as in the study of unseen rooms."""
     drawn: Annotated[int, Field(ge=2, le=LEARNT_FIRST // 2)] = 40
-    """How many of them."""
+    """Number of drawn rooms to test on."""
     stride: Annotated[int, Field(ge=1, le=100)] = 4
-    """Every so many cycles the tracks are examples."""
+    """Cycles from one example of a track to the next."""
     snr_low_db: Share = 0.0
-    """Range of the reference SNR of random rooms; the rooms of the test have the radio's own."""
+    """Lower end of the range of reference SNRs in random rooms; test rooms have the radio's own."""
     snr_high_db: Share = 30.0
-    """Its upper end."""
+    """Upper end of the range of reference SNRs in random rooms."""
     coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-    """Of the intervals, by resampling whole walks."""
+    """Confidence level of the intervals, by resampling whole walks."""
     radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
     network: NetworkSection = NetworkSection()

@@ -1,4 +1,4 @@
-"""Training of the network: penalised cross-entropy by L-BFGS, gradients by back-propagation."""
+"""Training of the component classifier's network: penalised cross-entropy by L-BFGS, gradients by back-propagation."""
 
 from itertools import pairwise
 
@@ -13,7 +13,9 @@ def train_network(
     features: Floats, keep: Booleans, weight: Floats, hidden: int, penalty: float, iterations: int,
     *, rng: np.random.Generator
 ) -> Network:  # fmt: skip
-    """The network of least weighted cross-entropy plus `penalty` times half the squared weights (without biases).
+    """Fit a network to examples by least weighted cross-entropy plus `penalty` times half the squared weights.
+
+    Biases are not penalised.
 
     `features` (N, F), `keep` (N,), `weight` (N,) of the examples (scaled to mean 1). Starts from Glorot's uniform
     distribution; the result depends on `rng` through that alone.
@@ -40,7 +42,7 @@ def train_network(
 def loss_and_slope(
     flat: Floats, shapes: list[tuple[int, ...]], inputs: Floats, target: Floats, share: Floats, penalty: float
 ) -> tuple[float, Floats]:
-    """Penalised cross-entropy of the network with weights `flat` (P,), and its gradient (P,)."""
+    """Penalised cross-entropy of the classifier's network with weights `flat` (P,), and its gradient (P,)."""
     arrays = _unpack(flat, shapes)
     values = [inputs]
     for layer in range(0, len(arrays), 2):
@@ -58,5 +60,6 @@ def loss_and_slope(
 
 
 def _unpack(flat: Floats, shapes: list[tuple[int, ...]]) -> list[Floats]:
+    """Weight matrices and biases of all layers from one vector."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
     return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), shapes, strict=True)]

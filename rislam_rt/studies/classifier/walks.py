@@ -1,4 +1,4 @@
-"""Random walks through a room."""
+"""Random walks of the agent through a room, for the training of the component classifier."""
 
 import numpy as np
 
@@ -9,23 +9,23 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Scene, Trajectory
 
 CLEARANCE = 0.2
-"""Distance [m] from every surface that a walk keeps."""
+"""Least distance [m] of a walk from every surface."""
 CYCLE = 0.1
-"""Time [s] between cycles."""
+"""Time [s] between cycles of a walk."""
 SPEED, TURN_RATE = (0.05, 0.2), 0.15
-"""Range of speeds [m/s]; standard deviation of the rate at which a walk turns [rad/s]."""
+"""Range of speeds [m/s], and standard deviation of the turn rate [rad/s], of random walks."""
 LOW, HIGH = 0.1, 0.6
-"""Range of a walk's height as shares of the room's."""
+"""Range of a walk's height as shares of the room's height."""
 _TRIES = 40
 
 
 def random_walk(scene: Scene, cycles: int, *, rng: np.random.Generator) -> Trajectory:
-    """A walk of constant height and speed on an arc, clear of all surfaces, its heading along the motion.
+    """Draw a trajectory of constant height and speed on an arc, clear of all surfaces, its heading along the motion.
 
     Raises
     ------
     SceneError
-        The room is too full for one.
+        No free one was found: the room is too full.
     """
     surfaces = np.concatenate([r.triangles for r in scene.reflectors])
     floor, ceiling = scene.bounds[:, 2]
@@ -40,7 +40,7 @@ def random_walk(scene: Scene, cycles: int, *, rng: np.random.Generator) -> Traje
 
 
 def _arc(scene: Scene, start: Floats, cycles: int, rng: np.random.Generator) -> Trajectory:
-    """Walk at constant speed and rate of turn from a start."""
+    """Trajectory from `start` (3,) [m] with random constant speed and turn rate."""
     time = CYCLE * np.arange(cycles, dtype=np.float64)
     speed, rate = rng.uniform(*SPEED), TURN_RATE * rng.standard_normal()
     heading = rng.uniform(-np.pi, np.pi) + rate * time

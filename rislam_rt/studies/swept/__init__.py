@@ -1,4 +1,4 @@
-"""Studies that go through settings and seeds on the sweep engine: their specifications, cells and scores."""
+"""Swept studies: SLAM runs over settings and seeds on the sweep engine, their specifications, cells and statistics."""
 
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.swept.collect import Group, group_rows, paired_difference, paired_gain, spread

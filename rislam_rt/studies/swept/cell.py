@@ -1,4 +1,4 @@
-"""One cell of a swept study: one room and seed, traced once, and every scheme in it under the same noise."""
+"""One cell of a swept study: one room and seed, paths found once, every scheme simulated with the same noise."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -22,11 +22,14 @@ from rislam_rt.toml import put_dotted
 
 FUNCTION = f"{__name__}:run_cell"
 CLOCK = ("seconds", "step_seconds", "over_budget")
-"""Scores that differ from run to run."""
+"""Scores that are times, which differ when a run is repeated."""
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Run a cell of a swept study: scores of all schemes; one that fails costs no other, and says why."""
+    """Do one cell of a swept study: simulate all schemes in one room and return their scores.
+
+    A scheme that fails has its error in place of scores; the others go on.
+    """
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
     scene = load_scene(room_beside(Path(settings["beside"]), str(settings["scene"])))
@@ -47,7 +50,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 
 def cell_spec(settings: Mapping[str, Any], path: Path | None = None) -> PipelineSpec:
-    """The main job that a cell runs: the study's `run`, then the panel's size, then what the variant sets.
+    """Specification of the SLAM run of one cell: the study's `run`, changed by the panel's size, then by the variant.
 
     Raises
     ------
@@ -63,7 +66,7 @@ def cell_spec(settings: Mapping[str, Any], path: Path | None = None) -> Pipeline
 
 
 def _paper_snr(setup: RunSetup, spec: PipelineSpec) -> float:
-    """SNR [dB] of a cell as the paper has it, of the mean power at some twenty places of the way, panel at level 0."""
+    """SNR [dB] in the paper's definition, of the mean power over some twenty cycles, RIS panel at phase level 0."""
     settings, rows = build_settings(spec), np.arange(len(setup.scene.agent))
     rows = rows[:: max(1, len(rows) // 20)]
     per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")

@@ -1,4 +1,4 @@
-"""Collecting the cells of a swept study as numbers with intervals. Failures are counted, never dropped."""
+"""Collecting the cells of a swept study: RMSEs over repetitions with confidence intervals, and counts of failures."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -12,54 +12,58 @@ from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.store import DONE, MISSING
 
 LEVEL = 0.95
-"""Confidence of every interval."""
+"""Confidence level of every interval."""
 
 
 class Group(NamedTuple):
-    """All repetitions at one point."""
+    """Results of all repetitions of a swept study at one point of its axes."""
 
     point: Mapping[str, Any]
+    """Values along the axes, by key."""
     results: tuple[Mapping[str, Any] | None, ...]
-    """One a repetition; None where the cell has not ended well."""
+    """One a repetition; None where the cell failed or has not run."""
     missing: int = 0
-    """Repetitions that have not run yet."""
+    """Number of repetitions that have not run yet."""
 
     @property
     def schemes(self) -> list[str]:
-        """Names, in the order of `SCHEMES`: what is read back from a cell's file has lost its own; others last."""
+        """Names of the schemes that ran, in the order of `SCHEMES`, as cells' files do not keep theirs; others last."""
         ran = {name for result in self.results if result for name in result["schemes"]}
         return [name for name in SCHEMES if name in ran] + sorted(ran - set(SCHEMES))
 
     def column(self, scheme: str, *name: str) -> Floats:
-        """(R,) a score by its names, outermost first, e.g. `"landmarks", "ris", "rmse_m"`; NaN where there is none."""
+        """One score of a scheme over all repetitions, (R,); NaN where there is none.
+
+        `name` are the nested keys, e.g. `"landmarks", "ris", "rmse_m"`.
+        """
         return np.array([_look(result, scheme, name) for result in self.results], dtype=np.float64)
 
     def parts(self, scheme: str, name: str) -> list[str]:
-        """What a score holds in any repetition: the landmarks of `landmarks`, the walls of `walls`."""
+        """Keys that a nested score of a scheme has in any repetition: names of landmarks (`landmarks`) or `walls`."""
         found = [result["schemes"].get(scheme, {}).get(name, {}) for result in self.results if result]
         return list(dict.fromkeys(part for entry in found for part in entry))
 
     @property
     def reasons(self) -> list[str]:
-        """Why schemes failed in a collected group, each reason once."""
+        """Error messages of the schemes that failed, each once."""
         entries = [(name, entry) for result in self.results if result for name, entry in result["schemes"].items()]
         return list(dict.fromkeys(f"{name}: {entry['failed']}" for name, entry in entries if "failed" in entry))
 
     def failed(self, scheme: str) -> int:
-        """Repetitions in a collected group without a score of the scheme: it failed, or its cell did."""
+        """Number of repetitions in which a scheme failed, or its whole cell did."""
         return int(np.isnan(self.column(scheme, "rmse_m")).sum()) - self.missing
 
     def diverged(self, scheme: str) -> int:
-        """Repetitions in a collected group in which the estimate was lost."""
+        """Number of repetitions in which a scheme's estimate diverged."""
         return int(np.nansum(self.column(scheme, "diverged")))
 
     def mean(self, name: str) -> float:
-        """Mean in a collected group of a number that belongs to the cell and to no scheme."""
+        """Mean over the repetitions of a number that the schemes of a cell share, such as the SNR."""
         return float(np.mean([result[name] for result in self.results if result]))
 
 
 def group_rows(rows: Sequence[Row]) -> list[Group]:
-    """Collect rows by their point, both in their order."""
+    """Group the cells of a swept study by their point on the axes, all in their order."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
@@ -74,7 +78,7 @@ def group_rows(rows: Sequence[Row]) -> list[Group]:
 
 
 def spread(values: Floats) -> Interval | None:
-    """RMS over the collected runs that have a value, with its interval; None if none has."""
+    """RMS over repetitions of their RMSEs, with a bootstrap interval; NaN values are left out, None if all are NaN."""
     known = values[~np.isnan(values)]
     if not len(known):
         return None
@@ -84,7 +88,10 @@ def spread(values: Floats) -> Interval | None:
 
 
 def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
-    """By which share our RMSE is below theirs, `1 - ours / theirs`, from the seeds that both have; None below two."""
+    """Relative reduction of our RMSE against theirs, `1 - ours / theirs`, with its interval, over seeds that both have.
+
+    None for fewer than two seeds.
+    """
     both = ~(np.isnan(ours) | np.isnan(theirs))
     if both.sum() < 2:
         return None
@@ -93,7 +100,7 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
-    """By how much [m] our RMSE is below theirs, from the seeds that both have; None below two."""
+    """Difference [m] of their RMSE and ours, with its interval, over seeds that both have; None of fewer than two."""
     both = ~(np.isnan(ours) | np.isnan(theirs))
     if both.sum() < 2:
         return None
@@ -107,6 +114,7 @@ def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def _look(result: Mapping[str, Any] | None, scheme: str, name: Sequence[str]) -> float:
+    """One score of a scheme by nested keys; NaN if there is none."""
     found: Any = result["schemes"].get(scheme) if result else None
     for part in name:
         found = found.get(part) if isinstance(found, Mapping) else None

@@ -1,4 +1,4 @@
-"""One cell of a study of the front end: what the receiver reports at some places, and what of it is so."""
+"""One cell of the hardware study: the receiver alone at some places, its components compared with the true paths."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,13 +23,13 @@ from rislam_rt.shipped import room_beside
 from rislam_rt.studies.swept.cell import cell_spec
 
 HALF = 0.683
-"""Share of a normal error within one standard deviation."""
+"""Probability that a normal error is within one standard deviation."""
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Run a cell of a receiver study: false components, panel's direct path heard, errors over reported deviations.
+    """Do one cell of the hardware study: false components, detection of the panel, errors over reported stds.
 
-    Once as set, and once more with an estimator that is told of the faults, on the same front end and noise.
+    Once as set, and once more with a receiver that knows the front end's impairments, on the same front end and noise.
     """
     begin, spec = process_time(), cell_spec(settings)
     prepare_channel(spec.channel)
@@ -58,7 +58,7 @@ def _look(
     paths: Paths, motion: Trajectory, cycle: int, made: Settings, front_end: FrontEnd | None,
     *, rng: np.random.Generator
 ) -> dict[str, Any]:  # fmt: skip
-    """Counts and whitened errors of the receiver in one cycle."""
+    """Numbers of components and normalised angle errors of the receiver in one cycle, by comparison with true paths."""
     heading, shift = float(motion.heading[cycle]), doppler_shift(paths, motion, made.radio.wavelength)[cycle]
     measurement, truth = measure(
         paths, cycle, heading, made.radio, made.receiver, None, shift, front_end, rng=rng
@@ -77,6 +77,7 @@ def _look(
 
 
 def _scores(looks: list[dict[str, Any]]) -> dict[str, Any]:
+    """Means of the receiver's counts over some cycles, and the quantile `HALF` of its normalised errors."""
     error: Floats = np.abs(np.concatenate([look["error"] for look in looks]))
     return {
         "false": float(np.mean([look["false"] for look in looks])),

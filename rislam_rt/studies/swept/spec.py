@@ -1,4 +1,4 @@
-"""Specification of a swept study: what its pipeline file may say."""
+"""Specifications of swept studies: settings of the pipeline files of kinds `fig4b`, `fig4c`, `rooms` and others."""
 
 from collections import Counter
 from typing import Annotated, Any, Literal
@@ -10,38 +10,38 @@ from rislam_rt.studies.spec import Seed
 
 
 class VariantSection(Section):
-    """Settings of the main job under a name."""
+    """Named variant of the SLAM run in a study: the settings that it changes."""
 
     name: Name
     group: str = ""
-    """Heading under which it stands in a table."""
+    """Heading under which the variant is listed in a table."""
     note: str = ""
-    """One line on what it means."""
+    """One line on what the variant means."""
     set: dict[str, Any] = Field(default={})
     """Values by dotted key, as `slam.use_vt`."""
 
 
 class SweptSpec(Section):
-    """What all swept studies share."""
+    """Settings that all swept studies share."""
 
     kind: str
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     name: Name
-    """Of folders and pages."""
+    """Name of the study, in folders and on pages."""
     description: str = ""
-    """For readers alone."""
+    """Text for readers alone."""
     seed: Seed = 7
-    """Of every random draw."""
+    """Seed of every random draw."""
     repetitions: Annotated[int, Field(ge=1, le=100_000)] = 20
-    """Runs with different seeds at every point; a repetition has the same motion and noise at all of them."""
+    """Number of runs with different seeds at every point; a repetition has the same motion and noise at all points."""
     time_limit_s: Positive | None = None
-    """Longest time one cell may take; it counts as failed then."""
+    """Longest time one cell may take; beyond it the cell counts as failed."""
     run: dict[str, Any] = Field(default={})
-    """Settings of the main job, with its own defaults."""
+    """Settings of the SLAM run, those of a pipeline file of kind `slam`."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """Variants that the study goes through; none by default."""
+        """Variants of the SLAM run in the study; none by default."""
         return []
 
     @model_validator(mode="after")
@@ -51,51 +51,55 @@ class SweptSpec(Section):
 
 
 class _OneRoom(SweptSpec):
+    """Settings of swept studies in a single room."""
+
     scene: str | None = None
     """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
 
 
 class Fig4bSpec(_OneRoom):
-    """Error against SNR, as in Fig. 4(b)."""
+    """Study of the position RMSE against SNR for all schemes, as in Fig. 4(b) of the paper."""
 
     kind: Literal["fig4b"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     snr_db: list[Decibel] = Field(default=[-10.0, 0.0, 10.0, 20.0, 30.0], min_length=1)
-    """SNR of the paper's sphere at 3 m, integrated over the signal and all antennas."""
+    """Reference SNRs: of the paper's sphere at 3 m, integrated over the signal and all antennas."""
     cases: Annotated[list[VariantSection], Field(min_length=1)]
-    """Motions and starts, a part of the figure each."""
+    """Variants of motion and start, each a part of the figure."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """The cases."""
+        """Variants of motion and start."""
         return self.cases
 
 
 class Fig4cSpec(_OneRoom):
-    """Error of agent and panel against the panel's size, as in Fig. 4(c)."""
+    """Study of the RMSE of agent and panel against the panel's size, as in Fig. 4(c) of the paper."""
 
     kind: Literal["fig4c"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     sizes: list[Annotated[int, Field(ge=1, le=256)]] = Field(default=[4, 6, 8, 10, 12, 16], min_length=1)
-    """Elements along one side of a square panel."""
+    """Numbers of elements along one side of a square panel."""
 
 
 class MismatchSection(Section):
-    """One quantity that is not as the belief is told, at several levels."""
+    """One quantity of the assumed model or of the hardware that is wrong, at several levels."""
 
     name: Name
     note: str = ""
-    """What is wrong."""
+    """Description of the mismatch."""
     cure: str = ""
-    """What would take it away."""
+    """What would remove the mismatch."""
     key: str
-    """Dotted key of the main job that the levels set."""
+    """Dotted key of the SLAM run's setting that the levels are values of."""
     levels: Annotated[list[float | int | str], Field(min_length=1)]
+    """Values of the mismatch."""
     ordinary: float | int | str
-    """The level that ordinary equipment has; mismatches are ranked by it."""
+    """Level of ordinary equipment, by which mismatches are ranked."""
     source: str = ""
-    """Why that is ordinary."""
+    """Reason or reference for the ordinary level."""
     unit: str = ""
+    """Unit of the levels."""
     set: dict[str, Any] = Field(default={})
     """Further values by dotted key, at every level."""
 
@@ -106,41 +110,41 @@ class MismatchSection(Section):
         return self
 
     def variant(self, level: float | int | str) -> "VariantSection":
-        """Settings of a mismatch in a study's specification at a level."""
+        """Variant of the SLAM run with this mismatch at a level."""
         values = {**self.set, self.key: level}
         return VariantSection(name=f"{self.name}_{level}", group=self.name, note=self.note, set=values)
 
 
 class RobustnessSpec(_OneRoom):
-    """One quantity at a time that is not as the belief is told, all else right."""
+    """Study of model mismatch: the RMSE with one quantity of the assumed model wrong at a time."""
 
     kind: Literal["robustness"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     mismatches: Annotated[list[MismatchSection], Field(min_length=1)]
-    """One quantity that the belief is told each, and how wrong it is."""
+    """Quantities of the assumed model, and how wrong each is."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """The reference, in which all is as it is told, and then every level of every mismatch."""
+        """The reference without mismatch, and then every level of every mismatch."""
         levels = [mismatch.variant(level) for mismatch in self.mismatches for level in mismatch.levels]
         return [VariantSection(name="reference"), *levels]
 
 
 class HardwareSpec(_OneRoom):
-    """What faults of the front end do to the receiver, one at a time, before and after calibration."""
+    """Study of the front end's impairments: errors of the receiver with one at a time, with and without calibration."""
 
     kind: Literal["hardware"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     places: Annotated[int, Field(ge=1, le=1000)] = 4
-    """Cycles that are looked at, evenly over the last half of the run, panel focused on the agent."""
+    """Number of cycles evaluated, evenly over the last half of the run, panel focused on the agent."""
     calibration_cycles: Annotated[int, Field(ge=2, le=1000)] = 12
-    """Of the variants with calibration."""
+    """Cycles of calibration, in the variants that have one."""
     faults: Annotated[list[MismatchSection], Field(min_length=1)]
-    """One setting of `[hardware]` each, or several at a time."""
+    """Impairments: one setting of `[hardware]` each, or several at a time."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """An ideal front end, and every level of every fault, as built and calibrated."""
+        """An ideal front end, and every level of every impairment, without and with calibration."""
         variants = [VariantSection(name="reference")]
         for fault in self.faults:
             for level in fault.levels:
@@ -151,36 +155,36 @@ class HardwareSpec(_OneRoom):
 
 
 CALIBRATED = "_calibrated"
-"""End of the name of a variant with calibration."""
+"""Suffix of the name of a variant with calibration."""
 
 
 class RoomsSpec(SweptSpec):
-    """All schemes in many rooms."""
+    """Study of all schemes in many rooms."""
 
     kind: Literal["rooms"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     scenes: Annotated[list[str], Field(min_length=1)]
     """Scene folders, relative to the pipeline file."""
     variants: list[VariantSection] = Field(default=[])
-    """Settings under which every room is run; the main job's alone by default."""
+    """Variants of the SLAM run in every room; `run` alone by default."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """The variants."""
+        """Variants of the SLAM run in every room."""
         return self.variants
 
 
 class AblationsSpec(_OneRoom):
-    """One setting changed at a time."""
+    """Ablation study: the RMSE with one setting of the SLAM run changed at a time."""
 
     kind: Literal["ablations"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     variants: Annotated[list[VariantSection], Field(min_length=1)]
-    """The first one is the reference that the others are compared with."""
+    """Variants of the SLAM run; the first is the reference that the others are compared with."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """The variants."""
+        """Variants of the SLAM run, the reference first."""
         return self.variants
 
 
@@ -192,11 +196,11 @@ SWEPT: dict[str, type[SweptSpec]] = {
     "robustness": RobustnessSpec,
     "hardware": HardwareSpec,
 }
-"""Swept studies by the `kind` of their file."""
+"""Specifications of the swept studies by the `kind` of their pipeline file."""
 
 
 def check_names(variants: list[VariantSection]) -> None:
-    """Refuse a study's specification with variants of one name."""
+    """Raise an error if two variants of a study have the same name."""
     twice = [name for name, count in Counter(variant.name for variant in variants).items() if count > 1]
     if twice:
         raise ValueError(f"the name '{twice[0]}' comes twice, of a variant or of a level; give each once")

@@ -1,4 +1,4 @@
-"""A swept study as a sweep: its axes, what its cells depend on, a check of all of them beforehand, and its record."""
+"""Conversion of a swept study to a sweep: its axes, what its cells depend on, a check of all settings, its record."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -25,20 +25,20 @@ from rislam_rt.studies.swept.spec import (
 from rislam_rt.sweeps import Axis, Sweep
 
 RECEIVER = "rislam_rt.studies.swept.receiver:run_cell"
-"""Of a cell that looks at the receiver alone."""
+"""Function of the hardware study's cells, which simulate the receiver alone."""
 SNR = "run.radio.reference_snr_db"
-"""Axis of Fig. 4(b)."""
+"""Key of the SNR axis of Fig. 4(b)."""
 
 
 def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> Sweep:
-    """The sweep of a study. All axes are paired: a repetition has the same motion and noise at every point.
+    """Build the sweep of a swept study; a repetition has the same motion and noise at every point of the axes.
 
     Parameters
     ----------
     pipeline
         The study's file, which scene folders are relative to.
     scene
-        Folder that comes before the one that the file names.
+        Scene folder, instead of the one that the file names.
 
     Raises
     ------
@@ -68,12 +68,12 @@ def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> S
 
 
 def check_swept(spec: SweptSpec) -> None:
-    """Whether the settings of the main job, and every variant of them, are such; rooms are looked at by the sweep.
+    """Check a swept study's settings of the SLAM run under every variant; its rooms are checked by the sweep.
 
     Raises
     ------
     ConfigError
-        They are not. The message begins with the field.
+        A setting is unknown, or its value unusable. The message begins with the field.
     """
     variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
     for name in variants or [""]:
@@ -85,6 +85,7 @@ def check_swept(spec: SweptSpec) -> None:
 
 
 def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
+    """Axes of a swept study by its kind: SNR, panel size, scenes, variants."""
     if isinstance(spec, Fig4bSpec):
         return Axis("variant", tuple(case.name for case in spec.cases)), Axis(SNR, tuple(spec.snr_db))
     if isinstance(spec, Fig4cSpec):
@@ -97,7 +98,7 @@ def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """All settings of a swept study's cell, defaults filled in, its room and the versions."""
+    """Function that checks a cell's settings, and returns all that its result depends on: settings, scene, versions."""
     load, versions = cache(load_scene), library_versions()
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -115,7 +116,7 @@ def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str,
 
 
 def swept_record(spec: SweptSpec, sweep: Sweep, pipeline: Path) -> dict[str, Any]:
-    """Configuration, the main job's settings with defaults filled in, seed, versions, and the hash of every scene."""
+    """Record for JSON of what is needed to repeat a swept study, with the SLAM run's settings, defaults filled in."""
     named = next((axis.values for axis in sweep.axes if axis.key == "scene"), [sweep.base.get("scene")])
     scenes = [load_scene(room_beside(pipeline.parent, str(name))) for name in named]
     return study_record(spec, scenes, settings=cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"))

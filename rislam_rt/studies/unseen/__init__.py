@@ -1,4 +1,4 @@
-"""Rooms that no estimator was built on: run one in many of them, score it, and leave its inputs for others."""
+"""Study in unseen random rooms: runs estimators in many of them, scores them, and records their inputs for others."""
 
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, Recorder, answers_from_arrays, replay

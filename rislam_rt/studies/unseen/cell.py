@@ -1,4 +1,4 @@
-"""One cell: one room at one SNR under one variant, every scheme in it; the room is traced once for all its cells."""
+"""One cell of the study in unseen rooms: every scheme in one random room at one SNR under one variant."""
 
 import json
 from collections.abc import Mapping
@@ -25,13 +25,14 @@ from rislam_rt.sweeps.cell_work import one_line
 
 FUNCTION = f"{__name__}:run_cell"
 SEEN_BY_TRACER_NOT = ("name", "description", "scene", "seed", "schemes", "receiver", "design", "slam")
-"""Settings that the true motion and the paths do not depend on, beside those of the rivals and the noise."""
+"""Settings that true motion and paths do not depend on, beside those of the other estimators and the noise."""
 
 
 def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Run a cell of unseen rooms: score cards of all schemes; one that fails costs no other, and says why.
+    """Do one cell of the study in unseen rooms: simulate all schemes in one random room and return their scores.
 
-    All randomness comes of the room's own seed, so that every variant and SNR has the same motion and noise.
+    A scheme that fails has its error in place of scores; the others go on. All random numbers come from the room's own
+    seed, so that every variant and SNR has the same motion and noise.
     """
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
@@ -48,19 +49,19 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 
 class KeptOutputs(NamedTuple):
-    """What is left of a run beside its scores."""
+    """Which outputs of a run in an unseen room are saved beside its scores, and where."""
 
     what: str
     """As `UnseenSpec.save`."""
     folder: Path
     label: str
-    """Of the cell, in the names of files."""
+    """Label of the cell in the names of files."""
 
 
 def _run(
     name: str, setup: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: KeptOutputs
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Scores and times of one scheme in a cell of unseen rooms."""
+    """Simulate one scheme in an unseen room, save its outputs if asked, and return scores and times."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
     result = run_scheme(name, setup, spec, tell_nobody, recorder.estimator)
     truth = build_truth(setup.scene, setup.paths, result, spec)
@@ -76,14 +77,14 @@ def _run(
 
 
 def cell_label(settings: Mapping[str, Any]) -> str:
-    """Label of a cell by variant and SNR, for names of files."""
+    """Label of a cell from its variant and SNR, for the names of saved files."""
     snr = settings["run"].get("radio", {}).get("reference_snr_db")
     parts = [str(settings["variant"])] if settings.get("variant") else []
     return "".join(f"{part}_" for part in [*parts, *([f"{snr:g}dB"] if snr is not None else [])])
 
 
 def scheme_here(asked: str, room: RandomRoom) -> str:
-    """Scheme of a cell, or, in a room without a panel, that of the same estimator which needs none."""
+    """Name of the scheme to run: the one asked for or, in a room without a panel, that of its estimator without."""
     scheme = SCHEMES[asked]
     if room.scene.ris is not None or not scheme.panel:
         return asked
@@ -91,7 +92,7 @@ def scheme_here(asked: str, room: RandomRoom) -> str:
 
 
 def trace_key(spec: PipelineSpec) -> str:
-    """Key of a cell's trace: the settings that decide true motion and paths, as text."""
+    """Settings that true motion and paths depend on, as text: the key under which they are cached."""
     content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, *ESTIMATOR_SECTIONS})
     content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
     return json.dumps(content, sort_keys=True)
@@ -99,13 +100,13 @@ def trace_key(spec: PipelineSpec) -> str:
 
 @lru_cache(maxsize=2)
 def find_setup(seed: int, key: str) -> tuple[RandomRoom, RunSetup]:
-    """A room, its true motion and its paths; the last ones are kept, as cells of one room follow each other."""
+    """Draw the random room of a seed, its true motion and its paths; the last two are cached for further cells."""
     spec = PipelineSpec.model_validate({**json.loads(key), "name": "trace", "schemes": ["no_ris"]})
     room = draw_room(seed)
     return room, prepare_setup(room.scene, spec, rng=np.random.default_rng(seed))
 
 
 def room_traits(room: RandomRoom) -> dict[str, Any]:
-    """Traits of a cell's room: its classes, plain."""
+    """Properties of a random room as plain data: seed, shape and other classes, number of scatterers."""
     traits = {field.name: getattr(room, field.name) for field in fields(room) if field.name != "scene"}
     return {**traits, "scatterers": len(room.scene.scatterers)}

@@ -1,4 +1,4 @@
-"""A recorded run as one NetCDF file: what an estimator is given, and, kept apart by name, the truth."""
+"""File of a recorded run in NetCDF: inputs of the estimator and, with names of their own, truth and scores."""
 
 import json
 from collections.abc import Mapping
@@ -30,26 +30,26 @@ TRUTH: dict[str, Entry] = {
     "bound": (("time",), "m", "posterior bound of the position, RMS"),
     "relative_bound": (("time",), "m", "the same with the start exactly known"),
 }
-"""What is for scoring alone; in the file each name begins with `true_`."""
+"""Variables of a recorded run that are for scoring alone; in the file each name begins with `true_`."""
 
 
 class Recording(NamedTuple):
-    """One run as it lies in a file."""
+    """Recorded run of one scheme in an unseen room: inputs of its estimator, truth, settings and scores."""
 
     inputs: Inputs
     truth: Truth
     scheme: str
-    """That ran, and chose the codes."""
+    """Name of the scheme, which chose the codes."""
     config: Mapping[str, Any]
-    """The specification of the run."""
+    """Specification of the run."""
     traits: Mapping[str, Any]
-    """The room's seed and classes."""
+    """Seed and classes of the room."""
     scores: Mapping[str, Any]
-    """The card of the estimator that ran."""
+    """Scores of the scheme's own estimator."""
 
 
 def write_recording(recording: Recording, path: Path) -> None:
-    """Write one file, whole or not at all.
+    """Write a recorded run to a NetCDF file, whole or not at all.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def write_recording(recording: Recording, path: Path) -> None:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Read the file that `write_recording` wrote.
+    """Read a recorded run from a NetCDF file that `write_recording` wrote.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def read_recording(path: str | Path) -> Recording:
 
 
 def recording_to_dataset(recording: Recording) -> "xr.Dataset":
-    """Variables of `INPUTS` and, with `true_` before them, of `TRUTH`; the rest as attributes."""
+    """NetCDF data set of a recorded run: `INPUTS`, `TRUTH` with names from `true_` on, the rest as attributes."""
     truth = recording.truth
     about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
     data = inputs_to_dataset(recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel))
@@ -92,7 +92,7 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
 
 
 def dataset_to_recording(data: "xr.Dataset") -> Recording:
-    """Recording of a file's data set; the inverse of `recording_to_dataset`."""
+    """Recorded run from a NetCDF data set that `recording_to_dataset` made."""
     marks = data.attrs
     values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
     for name in ("landmark_audible", "wall_audible"):

@@ -1,4 +1,4 @@
-"""Files to save beside a cell's scores: recorded runs, rooms, samples."""
+"""Save the outputs of runs in unseen rooms: recorded runs, rooms as scene folders, samples of received signals."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +18,7 @@ from rislam_rt.studies.unseen.file import Recording, write_recording
 
 
 def save_run(recording: Recording, folder: Path, label: str) -> Path:
-    """Save the recorded run as `<room>/<label>.nc`; returns the file.
+    """Save a recorded run as `<room>/<label>.nc`, and return the file's path.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def save_run(recording: Recording, folder: Path, label: str) -> Path:
 
 
 def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
-    """Save the room as a scene folder, with the motion of the runs, once.
+    """Save an unseen room as a scene folder with the true motion as its trajectory, unless it is there.
 
     Raises
     ------
@@ -46,9 +46,9 @@ def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
 def save_signals(
     setup: RunSetup, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
 ) -> None:
-    """Samples of the received signal under the codes that were applied, as `<room>/<label>_signals.nc`.
+    """Save samples of the received signal under the codes that a run applied, as `<room>/<label>_signals.nc`.
 
-    The noise is drawn anew from the room's seed: these are other looks at the same run than the recorded components.
+    The noise is drawn anew from the room's seed: it is not that of the recorded components.
 
     Raises
     ------
@@ -68,5 +68,5 @@ def save_signals(
 
 
 def room_folder(folder: Path, traits: Mapping[str, Any]) -> Path:
-    """Where all saved files of a room lie."""
+    """Folder of all saved files of an unseen room, named by its seed."""
     return folder / f"room_{int(traits['seed']):05d}"

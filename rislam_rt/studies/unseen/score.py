@@ -1,4 +1,4 @@
-"""The score card of one run of one estimator: error, ratio to the bounds, consistency, births, walls, ghosts."""
+"""Scores of one estimator in one unseen room: RMSE over its bound, NEES, divergence, walls, landmarks, births."""
 
 from typing import Any, NamedTuple
 
@@ -21,28 +21,33 @@ from rislam_rt.pipeline.scores.audible import heard_long
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0
-"""[s] after which the error is counted once more: time for births."""
+"""[s] Time after which the RMSE is computed once more, when landmarks have been born."""
 LOST, FAR_OVER, LASTING = 0.1, 5.0, 1.0
-"""Lost is a relative error beyond `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] without a break."""
+"""A run is lost once its relative error exceeds `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] on end."""
 NEAR_POINT = 1.0
-"""Distance [m] from a true landmark within which an estimate stands for it. For it and for walls the truth is laid into
-the map's frame first, by the start's own error."""
+"""Largest distance [m] of an estimated point from the true landmark that it is matched with.
+
+For landmarks and walls the truth is first shifted to the map's frame, by the error of the start prior."""
 GOOD_ANGLE, GOOD_OFFSET = 1.0, 0.02
-"""[deg] and [m] within which a wall is found well."""
+"""[deg] and [m] Largest errors of a wall that counts as well estimated."""
 MIN_PARTS = 3
-"""Components that a landmark must have got for its kind to be judged."""
+"""Least number of components associated with a landmark for its kind to be scored."""
 
 
 class Errors(NamedTuple):
-    """Position errors over K cycles [m]."""
+    """Absolute position errors, and errors relative to the true start, over K cycles [m]."""
 
     absolute: Floats
+    """(K,) distance of estimate and true position."""
     relative: Floats
-    """To the true start: without the error that the agent was told its start with, which nothing can mend."""
+    """(K,) the same without the error of the start prior, which no measurement reduces."""
 
 
 def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
-    """All scores, plain data; None where there is nothing to score."""
+    """Score the estimates of one run against its truth: RMSE, bounds, NEES, divergence, walls, landmarks, births.
+
+    None where there is nothing to score.
+    """
     told = inputs.start.position - truth.position[0]
     errors = _errors(truth, answers, told)
     late = inputs.time >= SETTLED
@@ -65,9 +70,9 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
 
 
 def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outcomes: list[Any]) -> dict[str, Any]:
-    """Score of being lost: whether the estimate was, when, and whether it was so in silence.
+    """Score of divergence: whether the estimate was lost, when, and whether the estimator did not notice ("silent").
 
-    It is not in silence if an outcome says so from then on, or if the believed deviation `own` (K,) [m] does.
+    It noticed if an outcome says so from then on, or if its own standard deviation `own` (K,) [m] covers the error.
     """
     far = relative > np.maximum(LOST, FAR_OVER * bound)
     lost = _lasting(far, time)
@@ -80,14 +85,14 @@ def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outc
 
 
 def _lasting(flag: Booleans, time: Floats) -> Booleans:
-    """Cycles of a score from which on a flag (K,) stays for `LASTING` seconds."""
+    """Cycles from which on a flag (K,) is set for `LASTING` seconds without a break."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else LASTING
     length = max(1, round(LASTING / step))
     return np.asarray(np.convolve(flag, np.ones(length), "valid") >= length) if len(flag) >= length else flag[:0]
 
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:
-    """Walls found at the end of those heard, how well, how soon, and planes that stand for none."""
+    """Scores of walls: how many detectable ones the last map has, their errors and delays, and ghost walls."""
     heard, walls = heard_long(truth.wall_audible, time), truth.walls(told)
     first = np.full(len(heard), -1)
     match = np.full(len(heard), -1)
@@ -111,7 +116,7 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
 
 
 def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Floats) -> dict[str, Any]:
-    """Landmarks found at the end of those heard, how well, how soon; the panel apart; points that stand for none."""
+    """Scores of landmarks: how many detectable ones the last map has, errors and delays, panel, ghost points, GOSPA."""
     there = truth.landmark[: len(truth.landmark) - (truth.panel and inputs.panel is None)]
     audible = truth.landmark_audible[:, : len(there)]
     heard = heard_long(audible, inputs.time)
@@ -143,10 +148,10 @@ def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Fl
 
 
 def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict[str, Any]:
-    """Score of birth kinds: how many landmarks were born, and of how many the kind was right.
+    """Scores of births: how many landmarks were born, and of how many the kind (point or mirror image) is right.
 
-    A point is right if most of its components came straight from a landmark; an image, over a wall from one; what got
-    fewer than `MIN_PARTS` components is not judged.
+    A point is right if most of its components are paths over a landmark without walls; an image, over a landmark and
+    walls. Landmarks with fewer than `MIN_PARTS` components are not scored.
     """
     parts: dict[int, list[int]] = {}
     for cycle, info in enumerate(answers.infos):
@@ -168,18 +173,19 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
 
 
 def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:
+    """Position errors of a run; `told` (3,) [m] is the error of the start prior."""
     offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
     return Errors(np.linalg.norm(offset, axis=1), np.linalg.norm(offset - told, axis=1))
 
 
 def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
-    """Score of a run: RMSE, RMS bound and their ratio."""
+    """Position RMSE [m], RMS posterior bound and their ratio, by name."""
     rmse, least = root_mean_square(errors), root_mean_square(bound)
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
 def _nees(truth: Truth, answers: Answers) -> float | None:
-    """Score of consistency: mean NEES over the cycles, per degree of freedom, of the absolute error."""
+    """Mean NEES of the absolute position error over the cycles, per degree of freedom; None if no axis is filtered."""
     covariance = np.array([estimate.covariance for estimate in answers.estimates])
     axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :3, :3]).min(axis=0) > 0.0)
     if not len(axes):
@@ -190,11 +196,14 @@ def _nees(truth: Truth, answers: Answers) -> float | None:
 
 
 def _delay(first: Integers, audible: Booleans, time: Floats) -> float | None:
-    """Score of delay: median time [s] from the first audible cycle to the first match, of what was ever matched and
-    audible."""
+    """Median time [s] from the first cycle in which a landmark or wall is detectable to the first that has it mapped.
+
+    None if none is both.
+    """
     known = (first >= 0) & audible.any(axis=0)
     return _median(time[first[known]] - time[np.argmax(audible[:, known], axis=0)])
 
 
 def _median(values: Floats) -> float | None:
+    """Median; None of no values."""
     return float(np.median(values)) if len(values) else None

@@ -1,4 +1,4 @@
-"""Specification of a study in unseen rooms: what its pipeline file may say."""
+"""Specification of a study in unseen rooms: settings of a pipeline file of kind `unseen`."""
 
 from typing import Annotated, Literal
 
@@ -8,38 +8,38 @@ from rislam_rt.pipeline.specification.section import Count, Decibel
 from rislam_rt.studies.swept.spec import SweptSpec, VariantSection, check_names
 
 TEST = 10_000
-"""Rooms below are for development; those from here on are for tests, and every run of them is counted."""
+"""Seed of the first test room, every run of which is counted; rooms with smaller seeds are for development."""
 
 
 class UnseenSpec(SweptSpec):
-    """An estimator in many random rooms."""
+    """Study of estimators in many random rooms on which they were not developed."""
 
     kind: Literal["unseen"]
-    """Which study the file is."""
+    """Kind of the pipeline file."""
     repetitions: Literal[1] = 1
     """Each room is run once: other draws are other rooms."""
     first: Annotated[int, Field(ge=0, lt=2**31)] = 0
     """Seed of the first room."""
     rooms: Count = 60
-    """How many, with seeds one after the other."""
+    """Number of rooms, with consecutive seeds."""
     snr_db: list[Decibel] = Field(default=[13.0], min_length=1)
-    """SNR of the paper's sphere at 3 m, integrated over the signal and all antennas."""
+    """Reference SNRs: of the paper's sphere at 3 m, integrated over the signal and all antennas."""
     variants: list[VariantSection] = Field(default=[])
-    """Settings under which every room is run; the main job's alone by default."""
+    """Variants of the SLAM run in every room; `run` alone by default."""
     save: Literal["nothing", "components", "signals"] = "nothing"
-    """What is left of every run as a data set: nothing but its scores; what the estimator was given and the truth; the
-    samples of the received signal as well."""
+    """What is saved of every run beside its scores: nothing; the estimator's inputs and the truth; the samples of the
+    received signal as well."""
     ledger: str = "unseen_tests.csv"
     """File beside the pipeline's in which runs of test rooms are counted."""
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """The variants."""
+        """Variants of the SLAM run in every room."""
         return self.variants
 
     @property
     def is_test(self) -> bool:
-        """Whether the unseen rooms are those for tests."""
+        """Whether the rooms are test rooms."""
         return self.first >= TEST
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""A study in unseen rooms as a sweep: rooms outermost, so that each is traced once for all that is asked of it."""
+"""Conversion of a study in unseen rooms to a sweep over rooms, variants and SNRs, and the ledger of test runs."""
 
 import csv
 import hashlib
@@ -22,20 +22,22 @@ from rislam_rt.sweeps import Axis, Sweep
 
 SNR = "run.radio.reference_snr_db"
 LEDGER = ("date", "first", "rooms", "snr_db", "variants", "code", "settings")
-"""Columns of the ledger of test runs."""
+"""Columns of the ledger in which runs of test rooms are counted."""
 CODE_DIGITS = 16
-"""Of the code's hash in the ledger."""
+"""Number of digits of the code's hash in the ledger."""
 
 
 def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
-    """The sweep of a study. Nothing but the room's seed is drawn from.
+    """Build the sweep of a study in unseen rooms, rooms outermost, so that the paths of each are found once.
+
+    All random numbers come from the rooms' seeds.
 
     Parameters
     ----------
     pipeline
         The study's file.
     data
-        Folder for the data sets, if there are to be any.
+        Folder of the saved outputs, if there are to be any.
     """
     seeds = range(spec.first, spec.first + spec.rooms)
     axes = [Axis("room", tuple(seeds))]
@@ -51,7 +53,10 @@ def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
 
 
 class _Depends:
-    """All settings of a cell with defaults filled in, its room, the versions, and the code that makes the numbers."""
+    """Function that checks a cell's settings, and returns all that its result depends on.
+
+    These are the settings with defaults filled in, the hash of the room, the versions and the hash of the code.
+    """
 
     def __init__(self, pipeline: Path, local: Mapping[str, Any]) -> None:
         self.pipeline, self.local = pipeline, local
@@ -71,7 +76,9 @@ class _Depends:
 
 
 def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
-    """How often test rooms were run, this time included if they are to be; the same run that goes on counts once.
+    """Add a run of test rooms to the ledger unless it is there, and return how often test rooms were run in all.
+
+    Runs of development rooms are not added.
 
     Raises
     ------
@@ -97,8 +104,7 @@ def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
 
 
 def unseen_record(spec: UnseenSpec) -> dict[str, Any]:
-    """What is needed to repeat a study in unseen rooms: configuration, the main job's settings with defaults filled in,
-    versions, code."""
+    """Record for JSON of what is needed to repeat a study in unseen rooms: settings, versions, hash of the code."""
     return {
         "kind": spec.kind,
         "name": spec.name,

@@ -1,4 +1,4 @@
-"""The truth that a run's score is measured against: motion, landmarks, walls, when each could be heard, the bounds."""
+"""The truth that a run in an unseen room is scored against: motion, landmarks, walls, when detectable, the bounds."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -17,43 +17,47 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
 
 class Truth(NamedTuple):
-    """K cycles, N landmarks, W planes, P paths, up to M components a cycle."""
+    """True motion, landmarks, walls, paths and posterior bounds of a run, against which estimates are scored.
+
+    K cycles, N landmarks, W planes, P paths, up to M components a cycle.
+    """
 
     position: Floats
-    """(K, 3) [m]."""
+    """(K, 3) [m] true position of the agent."""
     velocity: Floats
-    """(K, 3) [m/s]."""
+    """(K, 3) [m/s] true velocity."""
     landmark: Floats
-    """(N, 3) [m], the panel last if there is one."""
+    """(N, 3) [m] true landmarks, the panel last if there is one."""
     panel: bool
+    """Whether there is a panel."""
     landmark_audible: Booleans
-    """(K, N) whether one of its paths is above the detection threshold."""
+    """(K, N) whether a path over the landmark is above the detection threshold."""
     wall_middle: Floats
     """(W, 3) [m] centroid of each plane's surface; walls in one plane are one."""
     wall_normal: Floats
-    """(W, 3)."""
+    """(W, 3) unit normal of each plane."""
     wall_spread: Floats
-    """(W, 3, 3) [m^2] covariance of the points of its surface."""
+    """(W, 3, 3) [m^2] covariance of the points of each plane's surface."""
     wall_audible: Booleans
-    """(K, W) whether a path over it is above the threshold."""
+    """(K, W) whether a path over the plane is above the detection threshold."""
     path_kind: Integers
-    """(P,)."""
+    """(P,) `PathKind` of each path."""
     path_landmark: Integers
-    """(P,)."""
+    """(P,) landmark of each path, -1 for LOS and VT."""
     component_path: Integers
     """(K, M) path of each component, -1 clutter, -9 beyond their number."""
     bound: Floats
-    """(K,) least RMS position error [m]."""
+    """(K,) [m] posterior bound on the RMS position error."""
     relative_bound: Floats
-    """(K,) the same of the position relative to the start: the start taken as the origin."""
+    """(K,) [m] the same relative to the start, which then has no error."""
 
     def walls(self, shift: Floats) -> Surfaces:
-        """The walls, moved by `shift` (3,) [m]."""
+        """Surfaces of the true walls, moved by `shift` (3,) [m]."""
         return Surfaces(self.wall_middle + shift, self.wall_normal, self.wall_spread)
 
 
 def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> Truth:
-    """The truth of one scheme in one run, under the codes that it applied."""
+    """Truth of one scheme's run for scoring, with detectability and bounds under the phase codes that it applied."""
     settings, walls = build_settings(spec), build_walls(scene)
     audible = audible_paths(paths.with_gain(result.gain), settings)
     group = coplanar(walls)
@@ -77,12 +81,11 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
 
 
 def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
-    """Bounds to hold a run against: least RMS position errors (K,) [m], absolute, and relative to the start.
+    """Posterior bounds on the RMS position errors (K,) [m] of a run, absolute, and relative to the start.
 
-    The motion's law is white acceleration of the root mean squares that this motion truly has, across and upwards, so
-    that a lively one has a looser bound; what a filter is told of it does not count. Nobody is told the height after
-    the start: that of an agent that climbs is not known. No measurement of an unknown room tells where it lies:
-    relative to the start is what remains when the start is known exactly.
+    The motion model is white acceleration with the RMS that the true motion has, horizontally and vertically, whatever
+    a filter assumes. The height after the start is not known if the agent climbs. In an unknown room no measurement
+    tells the absolute position: the bound relative to the start is that with the start known exactly.
     """
     problem = bound_problem(scene, paths, result.gain, result.scheme, spec.model_dump(mode="json"))
     axes, time = problem.motion.axes, scene.agent.time
