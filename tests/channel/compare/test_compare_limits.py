@@ -160,12 +160,12 @@ def test_compare_exits_1_for_a_gain_error_put_in(capsys, monkeypatch, tmp_path):
     import json
     import sys
 
-    from rislam_rt.channel.compare import both_channels
+    from rislam_rt.channel.compare import channel_comparison
     from rislam_rt.cli import main
 
     scene = Path(__file__).parents[3] / "scenes" / "empty_box"
     command = ["rislam-rt", "compare", str(scene), "--poses", "3", "--depth", "1", "--json", str(tmp_path / "out.json")]
-    honest = both_channels.trace_both
+    honest = channel_comparison.trace_both
 
     def off(*arguments, **options):
         traced, analytic, trajectory = honest(*arguments, **options)
@@ -176,7 +176,7 @@ def test_compare_exits_1_for_a_gain_error_put_in(capsys, monkeypatch, tmp_path):
         )
 
     for replaced, code in ((honest, 0), (off, 1)):
-        monkeypatch.setattr(both_channels, "trace_both", replaced)
+        monkeypatch.setattr(channel_comparison, "trace_both", replaced)
         monkeypatch.setattr(sys, "argv", command)
         with pytest.raises(SystemExit) as left:
             main()
