@@ -137,7 +137,7 @@ def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
 
 
 def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> TraceResult:
-    """Find all paths along a scene's trajectory with the RIS panel at phase level 0; written to a file if one is given."""
+    """Find all paths along a scene's trajectory, RIS panel at phase level 0, and write them to a file if given."""
     from time import perf_counter
 
     from rislam_rt.pipeline.dataset import paths_to_dataset

@@ -150,7 +150,7 @@ def print_validation(rows: Sequence["Validation"]) -> None:
 
 
 def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], target: str) -> None:
-    """Print the phase code designs of one position by method: gain of the target path, gap to the optimum, CRLB, time."""
+    """Print the phase code designs of one position by method: gain of the target path, gap to the optimum, CRLB."""
     at = ", ".join(f"{x:g}" for x in point)
     title = f"{name}, agent at ({at}) m, target {target}"
     table = Table("method", "gain \\[dB]", "gap \\[dB]", "CRLB \\[m]", "time \\[ms]")
