@@ -1,4 +1,4 @@
-"""`rislam-rt check SCENE`."""
+"""The command `rislam-rt check SCENE`: checks a scene folder, and predicts which landmarks a run will detect."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

@@ -1,4 +1,4 @@
-"""`rislam-rt compare SCENE`."""
+"""The command `rislam-rt compare SCENE`: compares traced with image-source paths at random poses in a scene."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""`rislam-rt config [PIPELINE]`."""
+"""The command `rislam-rt config [PIPELINE]`: prints all settings of a pipeline with units, ranges and meanings."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any

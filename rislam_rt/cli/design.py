@@ -1,4 +1,4 @@
-"""`rislam-rt design SCENE`."""
+"""The command `rislam-rt design SCENE`: designs the panel's phase code for one position of the agent."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""`rislam-rt doctor`."""
+"""The command `rislam-rt doctor`: checks that this machine has what the ray tracer needs."""
 
 import typer
 

@@ -1,4 +1,4 @@
-"""`rislam-rt export SCENE --xml FOLDER`."""
+"""The command `rislam-rt export SCENE --xml FOLDER`: writes a scene in the XML format of Mitsuba and Sionna RT."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""`rislam-rt new SCENE`."""
+"""The command `rislam-rt new SCENE`: makes a scene folder from a built-in or random room, a file or a floor plan."""
 
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,4 +1,4 @@
-"""`rislam-rt pipelines`."""
+"""The command `rislam-rt pipelines`: lists the built-in pipelines and rooms."""
 
 import typer
 

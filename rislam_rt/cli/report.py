@@ -1,4 +1,4 @@
-"""`rislam-rt report RUN`."""
+"""The command `rislam-rt report RUN`: scores a completed run again, draws its page, exports a GIF or Rerun file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

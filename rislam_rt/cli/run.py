@@ -1,4 +1,4 @@
-"""`rislam-rt run PIPELINE`."""
+"""The command `rislam-rt run PIPELINE`: runs a SLAM pipeline or a study, or goes on with one that was stopped."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any

@@ -1,4 +1,4 @@
-"""`rislam-rt show SCENE`."""
+"""The command `rislam-rt show SCENE`: describes a scene, and draws it as a picture or an interactive page."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

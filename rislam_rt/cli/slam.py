@@ -1,4 +1,4 @@
-"""`rislam-rt slam MEASUREMENTS`."""
+"""The command `rislam-rt slam MEASUREMENTS`: estimates pose and map from a user's own or recorded measurements."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`rislam-rt sweep PIPELINE`."""
+"""The command `rislam-rt sweep PIPELINE`: runs a SLAM pipeline over axes of settings and over seeds."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

@@ -1,4 +1,4 @@
-"""`rislam-rt trace SCENE`."""
+"""The command `rislam-rt trace SCENE`: finds all paths along a scene's trajectory, and writes paths or signals."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -29,7 +29,7 @@ FUNCTION = f"{__name__}:run_cell"
 
 
 class SweepSection(Section):
-    """The table `[sweep]` of a pipeline file; the command line comes first."""
+    """Settings of a pipeline's sweep, the table `[sweep]` of its file: axes, repetitions, time limit."""
 
     repeat: Annotated[int, Field(ge=1, le=1_000_000)] = 5
     """Number of runs with different seeds at every point of the axes."""

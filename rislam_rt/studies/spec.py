@@ -47,7 +47,7 @@ class CompareSpec(StudySpec):
     poses: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Number of random poses in each room."""
     rooms: Annotated[list[ComparedRoomSection], Field(min_length=1)]
-    """The rooms: `scene`, `depth`, `picture`."""
+    """Rooms in which both channels are compared: `scene`, `depth`, `picture`."""
 
     @model_validator(mode="after")
     def _each_room_once(self) -> "CompareSpec":
@@ -59,7 +59,7 @@ class CompareSpec(StudySpec):
 
 
 class Fig4aSpec(StudySpec):
-    """Gain of the direct path over the panel against distance, as in Fig. 4(a)."""
+    """Study of the gain of the direct path over the panel against distance, as in Fig. 4(a) of the paper."""
 
     kind: Literal["fig4a"]
     """Kind of the pipeline file."""

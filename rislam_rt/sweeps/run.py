@@ -77,7 +77,7 @@ class SweepReport:
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """Cells of a sweep's run that failed, now or before."""
+        """Cells that failed, in this run of the sweep or before."""
         return tuple(row for row in self.rows if row.failed)
 
 

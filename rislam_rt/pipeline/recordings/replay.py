@@ -35,7 +35,7 @@ class ReplayDiagnostics(NamedTuple):
     """Diagnostics of an external estimator in one cycle: its data association, and whether it holds itself for lost."""
 
     landmark: Integers
-    """(M,) number of the landmark that each component went to, -1 for none."""
+    """(M,) number of the landmark that each component was associated with, -1 for none."""
     outcome: str = "ok"
     """`diverged` where the estimator holds itself for lost."""
 

@@ -15,11 +15,11 @@ class DiffuseSection(Section):
     diffraction: bool = False
     """Whether edges of walls, objects and openings diffract."""
     depth: Annotated[int, Field(ge=1, le=3)] = 1
-    """Most interactions of such a path."""
+    """Largest number of interactions of a diffuse or diffracted path."""
     samples: Annotated[int, Field(ge=100, le=1_000_000)] = 2000
     """Rays shot in every cycle; the mean power does not depend on them, its fluctuation does."""
 
     @property
     def wanted(self) -> bool:
-        """Whether diffuse or diffracted paths are wanted."""
+        """Whether diffuse or diffracted paths are to be traced."""
         return self.diffuse or self.diffraction

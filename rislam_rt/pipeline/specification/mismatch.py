@@ -16,56 +16,56 @@ class AssumedSection(Section):
     """
 
     compass_bias_deg: Degrees = 0.0
-    """Compass reading less true heading."""
+    """Bias of the compass: its reading minus the true heading."""
     compass_noise_deg: NotNegative = 0.0
-    """Standard deviation of the compass, white from cycle to cycle."""
+    """Standard deviation of the compass's noise, white from cycle to cycle."""
     start_scale: NotNegative = 1.0
-    """True errors of the start over the standard deviations that are told of it."""
+    """Ratio of the true errors of the start prior to its assumed standard deviations."""
     start_heading_deg: Degrees = 0.0
-    """Start heading as told less the true one, where the heading is estimated."""
+    """Assumed minus true heading at the start, where the heading is estimated."""
     height_m: Real = 0.0
-    """Height at the start as told less the true one."""
+    """Assumed minus true height at the start."""
     process_noise_scale: Positive = 1.0
-    """Acceleration that every estimator reckons with over the one that it would be told."""
+    """Ratio of the process noise (`sigma_a`) that every estimator assumes to the one set for it."""
     time_scale: Annotated[float, Field(ge=0.01, le=100.0)] = 1.0
-    """Time between cycles as told over the true one."""
+    """Ratio of the assumed to the true time between cycles."""
     tilt_deg: Degrees = 0.0
-    """By how much the body's front truly lies above its back (rotation about body y); it is held to be level."""
+    """True pitch of the body, front up (rotation about body y); it is assumed to be level."""
     wobble_deg: NotNegative = 0.0
-    """Standard deviation of the body's true pitch and roll each, white from cycle to cycle. It turns the array; the
-    ends, some centimetres from the middle, are held to stay where they are."""
+    """Standard deviation of the body's true pitch and roll each, white from cycle to cycle. It turns the array; Tx and
+    Rx, some centimetres from the middle, stay where they are."""
     baseline_m: Real = 0.0
-    """By how much the Tx is held to be farther from the agent's middle than it is."""
+    """Error of the assumed Tx-Rx baseline: by how much the Tx is assumed farther from the Rx than it is."""
     clock_offset_ns: Real = 0.0
-    """Delays as measured less the true ones: Tx and Rx clock apart."""
+    """Offset between Tx and Rx clock: measured minus true delays."""
     clock_drift_ns_s: Real = 0.0
-    """Growth of that offset [ns/s] from the first cycle on."""
+    """Drift of the clock offset [ns/s] from the first cycle on."""
     noise_db: Decibel = 0.0
-    """N0 as told less the true one."""
+    """Assumed minus true noise power density N0."""
     gain_db: Decibel = 0.0
-    """Transmit power and antenna gains as told less the true ones."""
+    """Assumed minus true gain of transmit power and antennas."""
     antennas: Literal["", "iso"] = ""
-    """Antennas as told: `iso`, isotropic and vertical, whatever they are. Must be given where they are others, as no
-    estimator can be told of those."""
+    """Assumed antennas: `iso`, isotropic and vertical, whatever the true ones are. Must be given where those are
+    others, which no estimator can assume."""
     std_scale: Positive = 1.0
-    """Standard deviations of delays, cosines and amplitudes as reported over those that the receiver worked out."""
+    """Ratio of reported standard deviations of delays, cosines and amplitudes to those that the receiver computed."""
     threshold_db: Annotated[float, Field(ge=-20.0, le=20.0)] = 0.0
-    """Detection threshold as told less the true one."""
+    """Assumed minus true detection threshold."""
     clutter_scale: Positive = 1.0
-    """Density of false components as told over the one that the filter would reckon with."""
+    """Ratio of the assumed density of false components to the receiver model's."""
     array_scale: Positive = 1.0
-    """True element spacing over the one that cosines are worked out with: cosines come out larger by it."""
+    """Ratio of the array's true to its assumed element spacing, by which direction cosines come out larger."""
     array_bias: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.0
-    """Added to both cosines: what the phase errors of an array that is not calibrated do, to first order."""
+    """Bias of both direction cosines, the first-order effect of phase errors in an array that is not calibrated."""
     bounces_less: Annotated[int, Field(ge=0, le=2)] = 0
-    """By how many wall bounces the paths that the filter looks for fall short of `slam.max_bounces`."""
+    """By how many wall bounces the filter's path models fall short of `slam.max_bounces`."""
     panel_tilt_deg: Degrees = 0.0
-    """By how much the panel's normal as told is turned away, about the panel's `right`."""
+    """Error of the panel's assumed normal: its rotation about the panel's `right`."""
     panel_turn_deg: Degrees = 0.0
-    """By how much the panel as told is turned in its own plane, about its normal."""
+    """Error of the panel's assumed orientation in its plane: its rotation about the normal."""
     panel_spacing_scale: Positive = 1.0
-    """Spacing of the elements as told over the true one."""
+    """Ratio of the assumed to the true spacing of the panel's elements."""
     panel_element: Literal["", "tang", "energy"] = ""
-    """Element pattern as told; the true one if not given."""
+    """Assumed pattern of the panel's elements; the true one if not given."""
     panel_gain_db: Annotated[float, Field(ge=-60.0, le=0.0)] = 0.0
-    """Gain of an element as told less the true one."""
+    """Assumed minus true gain of a panel's element."""

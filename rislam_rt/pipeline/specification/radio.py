@@ -18,13 +18,13 @@ class ArraySection(Section):
     """Settings of the receive array: antennas, spacing, pattern."""
 
     rows: Side = 4
-    """Antennas along the body's x axis, forward."""
+    """Number of antennas along the body's x axis, forward."""
     cols: Side = 4
-    """Antennas along the body's y axis."""
+    """Number of antennas along the body's y axis."""
     spacing_wavelengths: Annotated[float, Field(ge=1e-3, le=100.0)] = 0.5
-    """Between neighbours, in wavelengths of the carrier."""
+    """Spacing of neighbouring antennas, in wavelengths of the carrier."""
     pattern: Literal["upper", "isotropic"] = "upper"
-    """`upper` hears nothing from below the array's plane."""
+    """Half-space that the array receives from: all (`isotropic`), or nothing from below its plane (`upper`)."""
 
 
 class RadioSection(Section):

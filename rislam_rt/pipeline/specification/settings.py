@@ -31,7 +31,7 @@ class Setting(NamedTuple):
     """One setting of a pipeline file: key, default, type, range, unit, meaning."""
 
     key: str
-    """Dotted."""
+    """Dotted key, as `slam.sigma_a`."""
     default: Any
     required: bool
     kind: str

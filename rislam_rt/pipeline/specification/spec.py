@@ -64,7 +64,7 @@ class SlamSection(_Filter):  # type: ignore[misc, valid-type]
 
 
 class NestedSection(_Nested):  # type: ignore[misc, valid-type]
-    """Settings of the filter `nested` beside those of `slam`, SI units."""
+    """Settings of the nested particle filter (`slam.filter = "nested"`) beside those of `slam`, SI units."""
 
 
 class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
@@ -130,13 +130,13 @@ class BudgetSection(Section):
     """Time budget [s] of the cycle's four steps; their sum is the scene's cycle time."""
 
     optimise_s: NotNegative = 0.04
-    """To design the code."""
+    """Time budget of the code design."""
     communicate_s: NotNegative = 0.01
-    """To send it to the panel's controller."""
+    """Time budget of sending the code to the panel's controller."""
     measure_s: NotNegative = 0.01
-    """To sound the channel."""
+    """Time budget of sounding the channel."""
     localise_s: NotNegative = 0.04
-    """To localise and map."""
+    """Time budget of localising and mapping."""
 
 
 class ControlSection(Section):
@@ -179,9 +179,9 @@ class PanelSection(Section):
     phase_std_deg: NotNegative = 0.0
     """Standard deviation of an element's phase."""
     dead: Probability = 0.0
-    """Probability that an element reflects nothing."""
+    """Probability that an element of the panel reflects nothing."""
     stuck: Probability = 0.0
-    """Probability that an element stays at a level of its own."""
+    """Probability that an element of the panel stays at a random phase level."""
     bit_flip: Probability = 0.0
     """Probability that a bit of a control message arrives flipped."""
 
@@ -199,7 +199,7 @@ class RoomSection(Section):
     panel_cols: Annotated[int, Field(ge=1, le=256)] | None = None
     """Columns of elements of the panel. Spacing of the elements and centre of the panel stay as they are."""
     panel_levels: Annotated[int, Field(ge=2, le=65536)] | None = None
-    """Phase levels of an element."""
+    """Number of phase levels of the panel's elements."""
     scatterers: Annotated[int, Field(ge=0, le=100)] | None = None
     """Number of scatterers: the scene's first ones, and then spheres at places drawn for every seed
     (`pipeline.room`)."""

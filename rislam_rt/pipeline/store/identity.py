@@ -25,7 +25,7 @@ NO_NUMBERS = ("cli", "report")
 
 
 class RunIdentity(NamedTuple):
-    """All that a run's numbers depend on: runs of one identity have one result."""
+    """Identity of a run: settings, scene, code and library versions; runs of equal identity have equal results."""
 
     content: Mapping[str, Any]
     """`config` (every setting, defaults filled in), `scene` (name, SHA-256 of its files), `versions` of the libraries,

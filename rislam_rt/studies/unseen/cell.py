@@ -52,7 +52,7 @@ class KeptOutputs(NamedTuple):
     """Which outputs of a run in an unseen room are saved beside its scores, and where."""
 
     what: str
-    """As `UnseenSpec.save`."""
+    """`nothing`, `components` or `signals`, as in `UnseenSpec.save`."""
     folder: Path
     label: str
     """Label of the cell in the names of files."""
