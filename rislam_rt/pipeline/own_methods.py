@@ -27,7 +27,7 @@ from rislam_rt.model import (
     SlamEstimate,
     Trajectory,
 )
-from rislam_rt.pipeline.own_files import own_digest
+from rislam_rt.pipeline.own_method_files import own_digest
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
