@@ -2,7 +2,7 @@
 
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, Recorder, answers_from_arrays, replay
-from rislam_rt.studies.unseen.file import read_recording
+from rislam_rt.studies.unseen.recording_file import read_recording
 from rislam_rt.studies.unseen.score import score_run
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.studies.unseen.sweep import build_unseen, count_tests

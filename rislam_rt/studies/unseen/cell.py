@@ -17,7 +17,7 @@ from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSp
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
 from rislam_rt.studies.swept.cell import cell_spec
-from rislam_rt.studies.unseen.file import Recording
+from rislam_rt.studies.unseen.recording_file import Recording
 from rislam_rt.studies.unseen.save import save_room, save_run, save_signals
 from rislam_rt.studies.unseen.score import score_run
 from rislam_rt.studies.unseen.truth import build_truth

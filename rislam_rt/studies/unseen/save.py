@@ -14,7 +14,7 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene
 from rislam_rt.storage.netcdf import write_dataset
-from rislam_rt.studies.unseen.file import Recording, write_recording
+from rislam_rt.studies.unseen.recording_file import Recording, write_recording
 
 
 def save_run(recording: Recording, folder: Path, label: str) -> Path:

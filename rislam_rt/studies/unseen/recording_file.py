@@ -1,4 +1,4 @@
-"""File of a recorded run in NetCDF: inputs of the estimator and, with names of their own, truth and scores."""
+"""Recording file of a run in an unseen room, in NetCDF: inputs of the estimator and, under other names, the truth."""
 
 import json
 from collections.abc import Mapping
