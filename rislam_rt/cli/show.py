@@ -56,7 +56,7 @@ def command(
         typer.echo(f"view: {_write_view(room, settings, depth, html)}")
     if picture is None:
         return
-    from rislam_rt.report.room import draw_scene
+    from rislam_rt.report.room_figures import draw_scene
 
     with show_progress() as tell:
         tell("draw", 0, 1)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design import Design
 from rislam_rt.model import DataSheet, PathKind, RisCode, RisSpecs, SlamResult
-from rislam_rt.report.room import middle_cycles
+from rislam_rt.report.room_figures import middle_cycles
 from rislam_rt.report.style import save_figure, styled
 
 MAX_LABELLED = 10

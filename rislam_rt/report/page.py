@@ -14,7 +14,7 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import judge_run
 from rislam_rt.report.map_from_above import draw_above
-from rislam_rt.report.room import draw_paths
+from rislam_rt.report.room_figures import draw_paths
 from rislam_rt.report.style import to_png
 from rislam_rt.report.terminal_tables import summary_rows
 from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels

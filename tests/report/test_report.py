@@ -14,7 +14,7 @@ from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
 from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
 from rislam_rt.report.page import build_page
-from rislam_rt.report.room import path_points
+from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.terminal_tables import summary_rows
 from rislam_rt.report.time_curves import strongest_db
 from rislam_rt.scene import load_scene

@@ -11,7 +11,7 @@ from rislam_rt.channel.compare import OneSidedPath
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths
 from rislam_rt.report.drawing_geometry import wall_edges
-from rislam_rt.report.room import path_points
+from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
 from rislam_rt.studies.compare import Certificate
 

@@ -10,7 +10,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, Scene, Trajectory
 from rislam_rt.pipeline.specification.spec import Settings
-from rislam_rt.report.room import path_points
+from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.style import KIND
 from rislam_rt.report.view.room_data import room_data, rounded, spread
 
