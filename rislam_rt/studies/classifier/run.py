@@ -6,7 +6,6 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.classify import Network
-from rislam_rt.studies.classifier.gather import Examples
 from rislam_rt.studies.classifier.score import (
     ClassifierScore,
     f1,
@@ -19,6 +18,7 @@ from rislam_rt.studies.classifier.score import (
 from rislam_rt.studies.classifier.sets import Sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import train_network
+from rislam_rt.studies.classifier.training_examples import Examples
 
 ALL, DRAWN, RANDOM = "all test rooms", "drawn rooms", "random rooms (validation)"
 """Names of the joint sets of examples that are scored beside the named rooms."""
