@@ -13,7 +13,7 @@ HEARD = 2.0
 def audible_paths(paths: Paths, settings: Settings) -> Booleans:
     """Which true paths (K, P) the receiver can detect: over the SNR threshold, in its window, from the array's front.
 
-    The direct path does not count; wall returns (VT) do where the estimator uses them.
+    The direct path does not count; wall returns (VT) do with `slam.use_vt`.
     """
     sensor = settings.sensor
     heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
