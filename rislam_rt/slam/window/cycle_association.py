@@ -20,7 +20,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     cluster,
     predict_returns,
 )
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import attitude, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
@@ -84,10 +84,10 @@ FAR_STRONGER = 1.0
 def associate_cycle(
     window: Window, landmarks: WindowTable, visibility: VisibilityObservations, heading: float,
     scene: KnownEnvironment, code: RisCode | None,
-    observed: Observations, strangers: Floats,
+    observed: Observations, strangers: Floats, sway: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters;
-    `strangers` is the density of clutter at each component."""
+    `strangers` is the density of clutter at each component, `sway` (A,) the variance of the attitude."""
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
@@ -101,6 +101,7 @@ def associate_cycle(
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
+    extra += attitude.spread(expected.seen[lead, 1:], np.diag(sway))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
         mean, held, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,

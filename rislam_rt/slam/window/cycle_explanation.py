@@ -24,7 +24,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironm
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
-from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -68,9 +68,12 @@ def log_associations(
     return state._replace(log=_explain(log, view, state.landmarks, row[used], at)), used
 
 
-def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) -> tuple[Floats, Floats]:
-    """Innovations (N, 3) of a cycle's associated components, measured less predicted, and the predictions' jacobian
-    (N, 3, 7 + 3F) by the present, both in standard deviations; the log already holds the associations."""
+def innovations(
+    view: CycleAssociation, log: Log, used: Booleans, cycle: int, axes: int
+) -> tuple[Floats, Floats, Floats]:
+    """Innovations (N, 3) of a cycle's associated components, measured less predicted, and the predictions' jacobians
+    (N, 3, 7 + 3F) by the present and (N, 3, A) by the attitude about so many `axes`, all in standard deviations; the
+    log already holds the associations."""
     row, at = view.row[used], int(np.searchsorted(log.cycle, cycle)) + view.pick[used]
     lead, mate, share = view.groups.leader[row], view.groups.partner[row], log.share[at, None]
     seen = view.expected.seen[lead] + share * view.groups.gap[row]
@@ -79,7 +82,15 @@ def innovations(view: CycleAssociation, log: Log, used: Booleans, cycle: int) ->
     left = log.seen[at] - seen
     correct_horizon_bias(seen, log.std[at], left, slope)
     std = np.sqrt(log.std[at] ** 2 + log.extra[at])
-    return left / std, slope / std[..., None]
+    turned = attitude.jacobian(log.seen[at, 1:], axes)
+    return left / std, slope / std[..., None], turned / std[..., None]
+
+
+def levelled_observations(observed: Observations, log: Log, covariance: Floats) -> Observations:
+    """A cycle's components as the log has levelled them, with deviations that include the attitude's `covariance`
+    (A, A) [rad^2]."""
+    seen = log.seen[len(log.cycle) - len(observed.seen) :]
+    return observed._replace(seen=seen, std=np.sqrt(observed.std**2 + attitude.spread(seen[:, 1:], covariance)))
 
 
 def learn_cycle(

@@ -17,6 +17,7 @@ from rislam_rt.slam.window.cycle_explanation import (
     components_to_explain,
     innovations,
     learn_cycle,
+    levelled_observations,
     log_associations,
     outcome_of,
     remove_or_add_features,
@@ -28,8 +29,8 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log
-from rislam_rt.slam.window.relinearisation import relinearise
-from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.relinearisation import level, relinearise
+from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH, STILL
@@ -54,7 +55,7 @@ def init(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
         motion_mode, motion_mode,
-        np.array([start.heading]), start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
+        np.array([start.heading]), np.zeros((1, 3)), attitude.first_levels(compass=not turns), start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -84,7 +85,8 @@ def step(
     state, view = _associate_over_motions(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
     state, used = log_associations(state, observed, view)
-    state, left, nis = _solve(state, view, used)
+    state, left, nis, uncertain = _solve(state, view, used)
+    heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
     jumped = state.lost_log_odds == 0.0
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
     if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
@@ -103,10 +105,12 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
+    rotation = state.attitude
     while window.num_poses >= CONSTANTS.window:
         motion_mode = motion.forward(motion_mode, _likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
+        rotation = rotation[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
         window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt, window.turns))
@@ -114,7 +118,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         precision = _precisions(level)
         window = window_gaussian.extend(window, dt, precision, _surplus(precision, level))
     return state._replace(
-        window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed
+        window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
+        attitude=np.concatenate([rotation, np.zeros((1, 3))]),
     )  # fmt: skip
 
 
@@ -135,8 +140,9 @@ def _associate_over_motions(
 
     def view_of(window: Window) -> CycleAssociation:
         return associate_cycle(
-            window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers
-        )
+            window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers,
+            state.attitude_variance,
+        )  # fmt: skip
 
     calm = best = view_of(state.window)
     window = state.window
@@ -208,16 +214,28 @@ def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
     return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
-def _solve(state: WindowState, view: CycleAssociation, used: Booleans) -> tuple[WindowState, Residuals, float]:
+def _solve(
+    state: WindowState, view: CycleAssociation, used: Booleans
+) -> tuple[WindowState, Residuals, float, Floats]:  # fmt: skip
     """Update the window with a cycle's associated components by two Gauss-Newton steps, the first on the association's
-    predictions; re-linearises all poses every few cycles, else the last one. Also returns residuals and squared
-    innovation."""
-    innovation, jacobian = innovations(view, state.log, used, state.cycle)
-    window = window_gaussian.with_present(state.window, innovation, jacobian)
+    predictions; re-linearises all poses every few cycles, else the last one. Also returns residuals, squared
+    innovation, and the covariance (A, A) [rad^2] of the attitude."""
+    axes = len(state.attitude_variance)
+    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
+    told = attitude.likelihood(innovation, jacobian, view.covariance, turned, state.attitude_variance)
+    state = state._replace(sway=attitude.next_levels(state.sway, told))
+    variance, last = state.attitude_variance, state.window.num_poses - 1
+    covariance = np.linalg.inv(told.information[0] + np.diag(1.0 / variance))
+    rotation = covariance @ told.slope[0]
+    state = level(state, last, rotation[None])
+    innovation = innovation - turned @ rotation
+    window = window_gaussian.with_present(
+        state.window, innovation, jacobian, turned, state.attitude[-1], variance
+    )  # fmt: skip
     window = window_gaussian.solve(window, spread=False)
-    window, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else window.num_poses - 1)
-    window = window_gaussian.weigh_holds(window_gaussian.solve(window))
-    return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2))
+    state, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else last)
+    window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
+    return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2)), covariance
 
 
 def widen_motion(state: WindowState) -> WindowState:

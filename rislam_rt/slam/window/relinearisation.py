@@ -1,5 +1,7 @@
 """Relinearisation of the window's measurements: quadratic costs on poses and features at the present estimate."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
@@ -8,33 +10,57 @@ from rislam_rt.slam.predicted_returns import linearise_each, poses_of
 from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
+from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window, poses
 from rislam_rt.slam.window.state import WindowState
 
 
-def relinearise(state: WindowState, first: int) -> tuple[Window, Residuals]:
+def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]:
     """Re-linearise the measurements of the poses from `first` on at the window's estimate, whose last pose is that of
-    the cycle; returns the window and its residuals."""
+    the cycle, and level them by the attitudes that they tell; returns the state and its residuals."""
     window, log = state.window, state.log
     slot = log.cycle - (state.cycle - window.num_poses + 1)
     rows, place = (log.explained & (slot >= first)).nonzero()[0], poses(window)
     found, slopes = residuals(state, rows, slot[rows], place)
-    size, many, of = slopes.shape[2], window.num_poses - first, found.slot - first
+    size, many, of, variance = slopes.shape[2], window.num_poses - first, found.slot - first, state.attitude_variance
+    turned = attitude.jacobian(log.seen[rows, 1:], len(variance)) / found.std[..., None]
     # the components of each slot side by side
     at = np.arange(len(rows)) - np.searchsorted(of, of)
-    wide = np.zeros((many, int(at.max(initial=-1)) + 1, 3, size + 1))
-    weight = np.sqrt(trust(found.left))[:, None]
-    wide[of, at, :, :size], wide[of, at, :, size] = weight[..., None] * slopes, weight * found.left
-    flat = wide.reshape(many, -1, size + 1)
-    product = np.swapaxes(flat[..., :size], 1, 2) @ flat
+    wide = np.zeros((many, int(at.max(initial=-1)) + 1, 3, size + len(variance) + 1))
+    weight = np.sqrt(trust(found.left))[:, None, None]
+    wide[of, at] = weight * np.concatenate([slopes, turned, found.left[..., None]], axis=2)
+    flat = wide.reshape(many, -1, wide.shape[-1])
+    one = attitude.marginalise(np.swapaxes(flat, 1, 2) @ flat, state.attitude[first:], variance)
     hessian, gradient, middle = (field.copy() for field in window.slots)
-    hessian[first:], gradient[first:] = product[..., :size], -product[..., size]
+    hessian[first:], gradient[first:] = one.hessian, -one.slope
     middle[first:, :POSE], middle[first:, POSE:] = place[first:], window.features.ravel()
-    return window._replace(slots=Quadratic(hessian, gradient, middle)), found
+    state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
+    left = found.left - (turned @ one.change[of][..., None])[..., 0]
+    return level(state, first, one.change), Residuals(found.row, found.slot, left)
 
 
-def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats) -> tuple[Residuals, Floats]:
+def level(state: WindowState, first: int, change: Floats) -> WindowState:
+    """Level the log's measurements of the poses from `first` on by changes (K, A) [rad] of their attitudes."""
+    log, by = state.log, np.zeros((len(change), 3))
+    by[:, : change.shape[1]] = change
+    slot = log.cycle - (state.cycle - state.window.num_poses + 1)
+    rows, seen, rotation = (slot >= first).nonzero()[0], log.seen.copy(), state.attitude.copy()
+    seen[rows, 1:] = attitude.levelled(seen[rows, 1:], by[slot[rows] - first])
+    rotation[first:] += by
+    return state._replace(log=log._replace(seen=seen), attitude=rotation)
+
+
+class _Whitened(NamedTuple):
+    """Residuals of A components of the log in standard deviations, and these."""
+
+    row: Integers
+    slot: Integers
+    left: Floats
+    std: Floats
+
+
+def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats) -> tuple[_Whitened, Floats]:
     """Residuals (A, 3) of explained rows of the log, heard at slots (A,) of the poses (K, 4), and the predictions'
     jacobians (A, 3, 4 + 3F) by pose and features, both in standard deviations."""
     window, log, scene, form = state.window, state.log, state.scene, state.log.form[rows]
@@ -58,7 +84,7 @@ def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats)
     left[:, 0] = scene.sensor.nearest(left[:, 0])
     correct_horizon_bias(seen, log.std[rows], left, slopes)
     slopes /= std[..., None]
-    return Residuals(rows, slot, left / std), slopes
+    return _Whitened(rows, slot, left / std, std), slopes
 
 
 def trust(left: Floats) -> Floats:

@@ -66,3 +66,5 @@ PERIODS = 3
 """Most periods of the sounding that an ambiguous delay may hide of a path's length: 115 m at 128 tones over 1 GHz."""
 STRENGTHS = 13
 """Number of strengths of an unresolved neighbour over which a track's expected scatter is averaged."""
+SWAYS = 5
+"""Number of levels of the body's attitude, half a decade of angle apart."""

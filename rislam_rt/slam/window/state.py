@@ -9,6 +9,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.tracks import WindowTracks
 
@@ -38,6 +39,11 @@ class WindowState(NamedTuple):
     """(2, L) or (3, L) filtered probabilities of the motion modes in the last step."""
     heading: Floats
     """(K,) [rad] headings of the poses as the compass told; without one, what the estimated offsets are relative to."""
+    attitude: Floats
+    """(K, 3) [rad] estimated rotation vectors of the body in the window's cycles, beyond the heading (see
+    `attitude`)."""
+    sway: Floats
+    """(2, L) probabilities of the levels of the attitude's deviation, of tilt and yaw; (1, L) without a compass."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
     scene: KnownEnvironment
@@ -52,3 +58,8 @@ class WindowState(NamedTuple):
     """(K,) phase codes of the window's cycles, as the agent believes they were applied."""
     passed: Floats
     """(P, 3) [m] smoothed positions of the poses that have left the window."""
+
+    @property
+    def attitude_variance(self) -> Floats:
+        """Expected variance (A,) [rad^2] of the attitude about each axis."""
+        return attitude.variance(self.sway)

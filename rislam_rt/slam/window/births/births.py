@@ -236,12 +236,12 @@ def _enter(
     grown = context._replace(window=window, landmarks=landmarks)
     share = min(max(decision.share, 0.0), 1.0)
     grown = _assign(grown, at, idents(landmarks, forms), histories.scatter[row], share)
-    window, left = resolve(grown, 3)
-    if not np.isfinite(window.head).all():
+    grown, left = resolve(grown, 3)
+    if not np.isfinite(grown.window.head).all():
         return context, False
     fresh = np.isin(left.row, at)
     if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
-    grown = grown._replace(window=window, visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))
+    grown = grown._replace(visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))
     return grown, True

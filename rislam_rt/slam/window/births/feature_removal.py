@@ -16,13 +16,13 @@ from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
-def resolve(context: WindowState, steps: int) -> tuple[window_gaussian.Window, Residuals]:
-    """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns it and the last step's
-    residuals."""
+def resolve(context: WindowState, steps: int) -> tuple[WindowState, Residuals]:
+    """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns the state and the last
+    step's residuals."""
     for _ in range(steps):
-        window, left = relinearise(context, 0)
-        context = context._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(window)))
-    return context.window, left
+        fresh, left = relinearise(context, 0)
+        context = fresh._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(fresh.window)))
+    return context, left
 
 
 def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
@@ -38,7 +38,7 @@ def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
     log = log._replace(form=form)
     window, landmarks = window_gaussian.drop_features(context.window, keep), remove_features(landmarks, keep)
     context = context._replace(window=window, landmarks=landmarks, log=log, tracks=tracks)
-    return context._replace(window=resolve(context, 2)[0])
+    return resolve(context, 2)[0]
 
 
 def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:

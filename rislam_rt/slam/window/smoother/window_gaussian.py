@@ -23,6 +23,7 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
+from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.motion_basis import (
     FIRST,
     HEAD,
@@ -186,14 +187,19 @@ def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] 
     return mean - window.accel.ravel()[at] @ weight, covariance - across.T @ weight
 
 
-def with_present(window: Window, left: Floats, jacobian: Floats) -> Window:
-    """Sliding window with the last slot's quadratic made from the present cycle's innovations (A, 3), in standard
-    deviations, and their jacobian (A, 3, 7 + 3F), all at full weight."""
+def with_present(
+    window: Window, left: Floats, jacobian: Floats, turned: Floats, rotation: Floats, variance: Floats
+) -> Window:
+    """Sliding window with the last slot's quadratic made from the present cycle's innovations (N, 3), in standard
+    deviations, and their jacobians (N, 3, 7 + 3F) by the present and `turned` (N, 3, A) by the attitude, whose estimate
+    is `rotation` (3,) and whose prior variances are (A,); all at full weight."""
     spot = np.concatenate([poses(window)[-1], window.head[HEAD:]])
     # what is seen does not hang on the velocity
-    flat = np.concatenate([jacobian[..., :3], jacobian[..., 6:]], axis=2).reshape(-1, len(spot))
+    flat = np.concatenate([jacobian[..., :3], jacobian[..., 6:], turned, left[..., None]], axis=2)
+    flat = flat.reshape(-1, flat.shape[-1])
+    found = marginalise((flat.T @ flat)[None], rotation[None], variance)
     hessian, gradient, middle = (field.copy() for field in window.slots)
-    hessian[-1], gradient[-1], middle[-1] = flat.T @ flat, -left.ravel() @ flat, spot
+    hessian[-1], gradient[-1], middle[-1] = found.hessian[0], -found.slope[0], spot
     return window._replace(slots=Quadratic(hessian, gradient, middle))
 
 

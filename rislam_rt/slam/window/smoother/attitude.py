@@ -1,0 +1,141 @@
+"""Attitude of the body in each cycle: a rotation beyond the heading that is told, common to all that the array hears.
+
+An array that sways, or a compass that errs from cycle to cycle, turns all arrivals of a cycle alike. The rotation
+vector of a cycle is white, of zero mean, with one deviation for tilt (roll and pitch) and one for yaw. It is a nuisance
+of its cycle alone, and is marginalised there (Schur complement); what stays is its estimate, by which the cycle's
+cosines are levelled. The deviations are learnt: each is one of a ladder of levels, whose probabilities follow from the
+marginal likelihood of each cycle's innovations, as those of the motion modes do.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.solver_limits import SWAYS
+
+AXES = np.array([0, 0, 1])
+"""Index of the chain of levels of each axis: roll and pitch share one, yaw has another."""
+
+
+@lru_cache(maxsize=4)
+def ladder(least: float, most: float) -> Floats:
+    """Standard deviations (L,) [rad] of the levels, in equal ratios."""
+    return np.geomspace(least, most, SWAYS)
+
+
+def levels() -> Floats:
+    """Standard deviations (L,) [rad] of the attitude's levels."""
+    return ladder(CONSTANTS.steady_body, CONSTANTS.swaying_body)
+
+
+def first_levels(*, compass: bool) -> Floats:
+    """Initial probabilities (2, L) of the levels of tilt and yaw; without a `compass` in use there is no yaw beside the
+    heading's random walk: (1, L)."""
+    weight = 3.0 ** -np.arange(SWAYS, dtype=np.float64)
+    return np.tile(weight / weight.sum(), (1 + compass, 1))
+
+
+def variance(probability: Floats) -> Floats:
+    """Expected variance (A,) [rad^2] of roll, pitch and, where there is a compass, yaw, from level probabilities."""
+    return np.asarray((probability @ levels() ** 2)[AXES[: len(probability) + 1]])
+
+
+def jacobian(cosines: Floats, axes: int) -> Floats:
+    """Derivatives (..., 3, A) of length and measured cosines (..., 2) by the rotation vector of the body: `u x theta`,
+    of which the length knows nothing."""
+    x, y = cosines[..., 0], cosines[..., 1]
+    up = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
+    found = np.zeros((*x.shape, 3, 3))
+    found[..., 1, 1], found[..., 1, 2] = -up, y
+    found[..., 2, 0], found[..., 2, 2] = up, -x
+    return found[..., :axes]
+
+
+def levelled(cosines: Floats, rotation: Floats) -> Floats:
+    """Cosines (N, 2) turned by rotation vectors (N, 3) [rad] into the axes of a body without these rotations."""
+    x, y = cosines[:, 0], cosines[:, 1]
+    ray = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=1)
+    once = np.cross(rotation, ray)
+    return np.asarray((ray + once + 0.5 * np.cross(rotation, once))[:, :2])
+
+
+def spread(cosines: Floats, covariance: Floats) -> Floats:
+    """Variance (N, 3) of length and cosines (N, 2) by an attitude of covariance (A, A)."""
+    slopes = jacobian(cosines, len(covariance))
+    return np.asarray(((slopes @ covariance) * slopes).sum(axis=-1))
+
+
+class Attitude(NamedTuple):
+    """Gaussian information about the rotation vectors of K cycles, before their prior."""
+
+    information: Floats
+    """(K, A, A) [1/rad^2]."""
+    slope: Floats
+    """(K, A) [1/rad] information times value."""
+
+
+def next_levels(before: Floats, told: Attitude) -> Floats:
+    """Level probabilities (C, L) after one more cycle, of which `told` (K = 1) knows the rotation with poses and map
+    uncertain.
+
+    The marginal likelihood of a level is that of N(0, its variance) under the cycle's likelihood; of the other chain
+    it takes the expected variance.
+    """
+    move = np.full((SWAYS, SWAYS), CONSTANTS.rare / (SWAYS - 1.0))
+    np.fill_diagonal(move, CONSTANTS.stay)
+    found, axes = before @ move, AXES[: len(before) + 1]
+    expected, size = variance(found), len(axes)
+    every = np.tile(expected, (len(before), SWAYS, 1))
+    for chain in range(len(before)):
+        every[chain][:, axes == chain] = levels()[:, None] ** 2
+    information, slope = told.information[0], told.slope[0]
+    inner = information + np.eye(size) / every[..., None, :]
+    gain = slope @ np.linalg.solve(inner, np.broadcast_to(slope[:, None], (*every.shape, 1)))[..., 0][..., None]
+    log_like = 0.5 * gain[..., 0] - 0.5 * np.linalg.slogdet(inner)[1] - 0.5 * np.log(every).sum(axis=-1)
+    found = found * np.exp(log_like - log_like.max(axis=1, keepdims=True))
+    return np.asarray(found / found.sum(axis=1, keepdims=True))
+
+
+class Marginal(NamedTuple):
+    """Normal equations of K cycles without their attitudes, and the change of each attitude that these equations ask
+    for."""
+
+    hessian: Floats
+    """(K, S, S) by pose and features."""
+    slope: Floats
+    """(K, S)."""
+    change: Floats
+    """(K, A) [rad]."""
+
+
+def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal:
+    """Marginalise the attitudes of K cycles, whose estimates are `rotation` (K, 3) and whose prior variances are (A,),
+    from products (K, S + A + 1, S + A + 1) of the slopes by pose and features, those by attitude, and residuals."""
+    axes = len(variance)
+    own, by, out = slice(-1 - axes, -1), slice(0, product.shape[-1] - 1 - axes), -1
+    information = product[:, own, own] + np.diag(1.0 / variance)
+    gain = np.linalg.solve(information, product[:, own, by])
+    pull = product[:, own, out] - rotation[:, :axes] / variance
+    change = np.linalg.solve(information, pull[..., None])[..., 0]
+    cross = product[:, by, own]
+    slope = product[:, by, out] - (cross @ change[..., None])[..., 0]
+    return Marginal(product[:, by, by] - cross @ gain, slope, change)
+
+
+def likelihood(left: Floats, jacobian: Floats, covariance: Floats, slopes: Floats, prior: Floats) -> Attitude:
+    """What innovations `left` (N, 3) tell of the rotation vector of their cycle by slopes (N, 3, A), all in standard
+    deviations, while pose and map are uncertain by `covariance` (D, D) through `jacobian` (N, 3, D).
+
+    Weights of Student's t, given the expected variance `prior` (A,), keep single outliers from speaking for all.
+    """
+    flat, by = jacobian.reshape(-1, jacobian.shape[-1]), slopes.reshape(-1, slopes.shape[-1])
+    noise = flat @ covariance @ flat.T
+    total = 1.0 + np.diagonal(noise).reshape(left.shape) + (slopes**2 * prior).sum(axis=-1)
+    trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + (left**2 / total).sum(axis=1))
+    at = np.arange(len(noise))
+    noise[at, at] += np.repeat(1.0 / np.minimum(trust, 1.0), 3)
+    heard = np.linalg.solve(noise, by)
+    return Attitude((heard.T @ by)[None], (left.ravel() @ heard)[None])
