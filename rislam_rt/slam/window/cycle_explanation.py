@@ -158,7 +158,7 @@ def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
     if not len(left.row):
         return log
     std = log.std[left.row]
-    raw = np.mean(left.left**2 * (1.0 + log.extra[left.row] / std**2), axis=1)
+    raw = left.square
     _, which = unique_forms(log.form[left.row, 0])
     total, count = np.zeros((2, num_poses, which.max() + 1))
     np.add.at(total, (left.slot, which), np.minimum(raw, LOUDEST))
@@ -176,7 +176,7 @@ def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
     if not len(rows):
         return np.zeros(0)
     at = np.searchsorted(left.row, rows)
-    return np.asarray(np.mean(left.left[at] ** 2 * (1.0 + log.extra[rows] / log.std[rows] ** 2), axis=1))
+    return left.square[at]
 
 
 def unexplained(state: WindowState, observed: Observations) -> float:

@@ -28,7 +28,7 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.measurement_log import Residuals, empty_log
+from rislam_rt.slam.window.measurement_log import Residuals, empty_log, squares
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import TURN
@@ -235,6 +235,9 @@ def _solve(
     window = window_gaussian.solve(window, spread=False)
     state, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else last)
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
+    left = left._replace(
+        square=squares(left, state.log, window_gaussian.prediction_variance(window, left.slot, left.slopes))
+    )
     return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2)), covariance
 
 

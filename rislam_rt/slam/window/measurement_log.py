@@ -93,10 +93,25 @@ class Residuals(NamedTuple):
     """(A,) index of its pose in the window."""
     left: Floats
     """(A, 3) measured less predicted length and cosines, in standard deviations."""
+    slopes: Floats
+    """(A, 3, 4 + 3F) of the predictions by pose and features, in standard deviations."""
+    square: Floats
+    """(A,) expected mean squares of the errors, in reported deviations (see `squares`)."""
 
     def take(self, rows: Any) -> "Residuals":
         """Only some of the measurements' residuals."""
         return Residuals._make(field[rows] for field in self)
+
+
+def squares(left: Residuals, log: Log, spread: Floats) -> Floats:
+    """Expected mean squares (A,) of the errors of residuals, in reported deviations, where what they were compared with
+    has the variance `spread` (A, 3), in deviations.
+
+    The estimate has followed the measurement by as much as it was free to: a residual is smaller than the error is
+    (the E step of expectation maximisation).
+    """
+    std, extra, now = (field[left.row] for field in (log.std, log.extra, log.momentary))
+    return np.asarray(np.mean(left.left**2 * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:

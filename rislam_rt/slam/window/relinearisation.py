@@ -37,7 +37,7 @@ def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]
     middle[first:, :POSE], middle[first:, POSE:] = place[first:], window.features.ravel()
     state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
     left = found.left - (turned @ one.change[of][..., None])[..., 0]
-    return level(state, first, one.change), Residuals(found.row, found.slot, left)
+    return level(state, first, one.change), Residuals(found.row, found.slot, left, slopes, np.zeros(len(left)))
 
 
 def level(state: WindowState, first: int, change: Floats) -> WindowState:
