@@ -107,7 +107,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
     rotation = state.attitude
     while window.num_poses >= CONSTANTS.window:
-        motion_mode = motion.forward(motion_mode, _likelihoods(window, 1)[:, 0], CONSTANTS.stay)
+        motion_mode = motion.forward(motion_mode, _likelihoods(window, len(window.accel))[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
         rotation = rotation[1:]
@@ -184,12 +184,37 @@ def _likelihoods(window: Window, count: int) -> Floats:
     block = inside.reshape(count, free, count, free)[every, :, every]
     found = np.stack([
         motion.log_likelihood(
-            window.accel[:count, group], block[:, group[:, None], group], window.precision[:count, group[0]]
+            window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group[0]]
         )
         for group in GROUPS[: free - 1]
     ])  # fmt: skip
     found[0, :, motion.is_level_only()] = -np.inf
     return found
+
+
+def _level_floor(window: Window, level: Floats) -> float:
+    """Probability that the height moves as its motion modes (K, L) have it, and not as on a level floor."""
+    size, free = len(window.head), window.accel.shape[1]
+    covariance, solved = window.covariance[size + 2 :: free, size + 2 :: free], window.solved[:, 2]
+    inner = np.linalg.inv(covariance)
+    told, pull = inner - np.diag(solved), inner @ window.accel[:, 2]
+    found, calm = (np.log(motion.expected_variance(each)) for each in (level, motion.first_motion_mode(0.0)))
+    calm = np.log(1.0 / motion.expected_precision(motion.first_motion_mode(0.0)))
+    found = -np.log(motion.expected_precision(level))
+    share = np.linspace(0.0, 1.0, 5)
+    std = np.exp(0.5 * (calm + share[:, None] * (found - calm)))
+    inside = np.eye(len(told)) + std[:, :, None] * told * std[:, None, :]
+    spun = std * pull
+    score = 0.5 * np.vecdot(spun, np.linalg.solve(inside, spun[..., None])[..., 0]) - 0.5 * np.linalg.slogdet(inside)[1]
+    score[1:] += CONSTANTS.log_rare
+    weight = np.exp(score - score.max())
+    return float(weight @ share / weight.sum())
+
+
+def _pooled(one: Floats, other: Floats, share: float) -> Floats:
+    """Logarithmic pool of probabilities (..., L)."""
+    found = np.maximum(one, 1e-300) ** share * np.maximum(other, 1e-300) ** (1.0 - share)
+    return np.asarray(found / found.sum(axis=-1, keepdims=True))
 
 
 def _precisions(levels: Floats) -> Floats:
@@ -248,6 +273,9 @@ def widen_motion(state: WindowState) -> WindowState:
     if not len(window.accel) or state.config.motion == "told":
         return state
     posterior, level = motion.smooth(state.motion_mode, _likelihoods(window, len(window.accel)), CONSTANTS.stay)
+    share = _level_floor(window, posterior[1])
+    calm = motion.first_motion_mode(0.0)
+    posterior[1], level[1] = _pooled(posterior[1], calm, share), _pooled(level[1], calm, share)
     fresh = _precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
