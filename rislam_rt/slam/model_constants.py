@@ -63,11 +63,6 @@ class ModelConstants(NamedTuple):
     liveliest: float = 1.0
     """Standard deviation [m/s^2] of the horizontal acceleration in the liveliest mode: a person turns on the spot."""
 
-    steady_body: float = 2e-4
-    """Standard deviation [rad] of the attitude of a body that does not sway, from cycle to cycle: 0.01 degrees."""
-    swaying_body: float = 0.02
-    """Standard deviation [rad] of the attitude of a body that sways, or of a poor compass's noise: 1.1 degrees."""
-
     @property
     def stay(self) -> float:
         """Probability that the motion mode of a step is that of the step before."""
@@ -103,6 +98,11 @@ class ModelConstants(NamedTuple):
         """Sine of the depth below the horizon from which a return still arrives, for every wall on its way: each
         leans, and turns the ray by twice that."""
         return 2.0 * self.lean
+
+    @property
+    def sway(self) -> float:
+        """Largest standard deviation [rad] of the body's attitude: of more, level returns would not be looked for."""
+        return self.dip
 
     @property
     def weaker(self) -> float:

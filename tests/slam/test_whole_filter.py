@@ -207,6 +207,9 @@ def motion_prior(level: float, upwards: bool) -> float:
     """Variance of the first step's acceleration, of a liveliness told to be `level`: of the mixture of its modes."""
     motion_mode = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
     motion_mode = np.where(model.is_level_only() & (not upwards), 0.0, motion_mode)
+    if upwards:  # four manoeuvres, a quarter to the whole, against a level floor, each a rare event
+        share = CONSTANTS.rare * 2.5 / (1.0 + 4.0 * CONSTANTS.rare)
+        motion_mode = motion_mode**share * model.first_motion_mode(0.0) ** (1.0 - share)
     return float(model.expected_variance(motion_mode / motion_mode.sum()))
 
 

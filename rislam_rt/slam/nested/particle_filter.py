@@ -49,12 +49,14 @@ from rislam_rt.slam.window.cycle_explanation import (
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.relinearisation import relinearise
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import attitude, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import REFRESH
 
 BROAD = 10.0
 """Prior standard deviation [m] of a landmark's position before its measurements."""
+LEVEL = np.zeros(3)
+"""Variance [rad^2] of the attitude, which particles take as known."""
 WALL_CYCLES = 20
 """Measurements that a track needs before birth where walls are found by points alone: two legs leave room for error."""
 HELD = 1e-4
@@ -86,6 +88,7 @@ def revisit(state: NestedState, start: StartPrior, config: SlamConfig, *, rng: n
 
 def _begin(front: WindowState, config: SlamConfig, *, rng: np.random.Generator) -> NestedState:
     """State of the nested particle filter with particles that have the mean and covariance of a window state."""
+    front = front._replace(sway=attitude.held_level(front.sway))
     mean, covariance = window_gaussian.now(front.window)
     std = np.sqrt(np.diag(covariance))[:HEAD]
     mean[6] += front.heading[-1]
@@ -115,7 +118,7 @@ def step(
     heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
-    view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers)
+    view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers, LEVEL)
     front, used = log_associations(front, observed, view)
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _refresh_view(front, told.belief, config)
@@ -156,7 +159,8 @@ def _move(
     step = np.zeros(0) if first else np.append(front.window.step, dt)[1 - keep :]
     headings = np.append(front.heading[:0] if first else front.heading, heading)[-keep:]
     front = front._replace(
-        window=front.window._replace(step=step), heading=headings, codes=(*front.codes, code)[-keep:]
+        window=front.window._replace(step=step), heading=headings, codes=(*front.codes, code)[-keep:],
+        attitude=np.zeros((len(headings), 3)),
     )  # fmt: skip
     return _refresh_view(front, belief, config), belief
 

@@ -11,7 +11,7 @@ from rislam_rt.slam.observations import Observations, stranger_density
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import StepInfo
-from rislam_rt.slam.window import tracks
+from rislam_rt.slam.window import motion_learning, tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
 from rislam_rt.slam.window.cycle_explanation import (
     components_to_explain,
@@ -31,9 +31,9 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironm
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log, squares
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
-from rislam_rt.slam.window.smoother.motion_basis import TURN
+from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, MISSED, REFRESH, STILL
+from rislam_rt.slam.window.solver_limits import MISSED, REFRESH
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -55,7 +55,8 @@ def init(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
         motion_mode, motion_mode,
-        np.array([start.heading]), np.zeros((1, 3)), attitude.first_levels(compass=not turns), start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
+        np.array([start.heading]), np.zeros((1, 3)), attitude.first_levels(compass=not turns),
+        start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -107,16 +108,16 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
     rotation = state.attitude
     while window.num_poses >= CONSTANTS.window:
-        motion_mode = motion.forward(motion_mode, _likelihoods(window, len(window.accel))[:, 0], CONSTANTS.stay)
+        motion_mode = motion.forward(motion_mode, motion_learning.likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
         rotation = rotation[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window = window_gaussian.extend(window, dt, _assumed_precision(state.config, dt, window.turns))
+        window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
     else:
-        precision = _precisions(level)
-        window = window_gaussian.extend(window, dt, precision, _surplus(precision, level))
+        precision = motion_learning.precisions(level)
+        window = window_gaussian.extend(window, dt, precision, motion_learning.surplus(precision, level))
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
         attitude=np.concatenate([rotation, np.zeros((1, 3))]),
@@ -147,10 +148,12 @@ def _associate_over_motions(
     calm = best = view_of(state.window)
     window = state.window
     if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
-        lively = window_gaussian.now_under(window, _livelier(window.solved), (calm.mean, calm.covariance))
+        lively = window_gaussian.now_under(
+            window, motion_learning.livelier(window.solved), (calm.mean, calm.covariance)
+        )
         score = score_again(calm, *lively, observed, strangers)
         if score + CONSTANTS.log_rare > calm.score:
-            trial = window_gaussian.solve(window._replace(precision=_livelier(window.precision)))
+            trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
@@ -160,83 +163,6 @@ def _associate_over_motions(
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
             return recovery.after_jump(state, by), view
     return state._replace(window=window), best
-
-
-def _livelier(precision: Floats) -> Floats:
-    """Prior precisions (K - 1, A) of the window's accelerations, the last steps' lowered to the liveliest motion mode,
-    but not vertically."""
-    found, lively = precision.copy(), COLUMNS[: precision.shape[1]] != 1
-    found[-LATELY:, lively] = np.minimum(found[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
-    return found
-
-
-GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
-"""Axes that share one chain of motion modes: the two horizontal ones, the vertical one, and the rate of turn."""
-COLUMNS = np.array([0, 0, 1, 2])
-"""Index into `GROUPS` of each axis."""
-
-
-def _likelihoods(window: Window, count: int) -> Floats:
-    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes."""
-    size, free = len(window.head), window.accel.shape[1]
-    every = np.arange(count)
-    inside = window.covariance[size : size + count * free, size : size + count * free]
-    block = inside.reshape(count, free, count, free)[every, :, every]
-    found = np.stack([
-        motion.log_likelihood(
-            window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group[0]]
-        )
-        for group in GROUPS[: free - 1]
-    ])  # fmt: skip
-    found[0, :, motion.is_level_only()] = -np.inf
-    return found
-
-
-def _level_floor(window: Window, level: Floats) -> float:
-    """Probability that the height moves as its motion modes (K, L) have it, and not as on a level floor."""
-    size, free = len(window.head), window.accel.shape[1]
-    covariance, solved = window.covariance[size + 2 :: free, size + 2 :: free], window.solved[:, 2]
-    inner = np.linalg.inv(covariance)
-    told, pull = inner - np.diag(solved), inner @ window.accel[:, 2]
-    found, calm = (np.log(motion.expected_variance(each)) for each in (level, motion.first_motion_mode(0.0)))
-    calm = np.log(1.0 / motion.expected_precision(motion.first_motion_mode(0.0)))
-    found = -np.log(motion.expected_precision(level))
-    share = np.linspace(0.0, 1.0, 5)
-    std = np.exp(0.5 * (calm + share[:, None] * (found - calm)))
-    inside = np.eye(len(told)) + std[:, :, None] * told * std[:, None, :]
-    spun = std * pull
-    score = 0.5 * np.vecdot(spun, np.linalg.solve(inside, spun[..., None])[..., 0]) - 0.5 * np.linalg.slogdet(inside)[1]
-    score[1:] += CONSTANTS.log_rare
-    weight = np.exp(score - score.max())
-    return float(weight @ share / weight.sum())
-
-
-def _pooled(one: Floats, other: Floats, share: float) -> Floats:
-    """Logarithmic pool of probabilities (..., L)."""
-    found = np.maximum(one, 1e-300) ** share * np.maximum(other, 1e-300) ** (1.0 - share)
-    return np.asarray(found / found.sum(axis=-1, keepdims=True))
-
-
-def _precisions(levels: Floats) -> Floats:
-    """Prior precisions (..., A) of accelerations along A axes, from motion-mode probabilities (N, ..., L) of N groups
-    of axes."""
-    each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
-    return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
-
-
-def _surplus(precision: Floats, levels: Floats) -> Floats:
-    """Variance (..., A) of the slopes of acceleration priors beyond their precisions (..., A), from motion-mode
-    probabilities (N, ..., L) of N groups of axes (see `now_with_excess`)."""
-    variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
-    return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
-
-
-def _assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
-    """Prior precisions (A,) of one step's acceleration, and of its rate of turn where the heading is estimated, under
-    told motion."""
-    upwards = config.sigma_a if config.height == "estimated" else STILL
-    rates = (config.turn_std / np.sqrt(dt),) if turns else ()
-    return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
 def _solve(
@@ -261,24 +187,6 @@ def _solve(
     state, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else last)
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
     left = left._replace(
-        square=squares(left, state.log, window_gaussian.prediction_variance(window, left.slot, left.slopes))
+        square=squares(left.row, left.left, state.log, prediction_variance(window, left.slot, left.slopes))
     )
-    return widen_motion(state._replace(window=window)), left, float(np.sum(innovation**2)), covariance
-
-
-def widen_motion(state: WindowState) -> WindowState:
-    """Re-estimate every step's motion-mode probabilities by forward-backward smoothing, and the prior precision of its
-    acceleration from them."""
-    window = state.window
-    if not len(window.accel) or state.config.motion == "told":
-        return state
-    posterior, level = motion.smooth(state.motion_mode, _likelihoods(window, len(window.accel)), CONSTANTS.stay)
-    share = _level_floor(window, posterior[1])
-    calm = motion.first_motion_mode(0.0)
-    posterior[1], level[1] = _pooled(posterior[1], calm, share), _pooled(level[1], calm, share)
-    fresh = _precisions(posterior)
-    # all steps at once, each as if the others were settled: damped, or they would take turns
-    precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    # the covariance is that of the precisions before
-    surplus = _surplus(window.precision, posterior)
-    return state._replace(window=window._replace(precision=precision, surplus=surplus), level=level)
+    return motion_learning.learn_motion(state._replace(window=window)), left, float(np.sum(innovation**2)), covariance

@@ -103,15 +103,15 @@ class Residuals(NamedTuple):
         return Residuals._make(field[rows] for field in self)
 
 
-def squares(left: Residuals, log: Log, spread: Floats) -> Floats:
-    """Expected mean squares (A,) of the errors of residuals, in reported deviations, where what they were compared with
-    has the variance `spread` (A, 3), in deviations.
+def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float) -> Floats:
+    """Expected mean squares (A,) of the errors of the log's components `rows` (A,), in reported deviations, given
+    their residuals `left` (A, 3) and the variance `spread` (A, 3) of what they were compared with, in deviations.
 
-    The estimate has followed the measurement by as much as it was free to: a residual is smaller than the error is
-    (the E step of expectation maximisation).
+    The estimate has followed the measurement by as much as it was free to, so that a residual is smaller than the
+    error is (the E step of expectation maximisation, Dempster et al. 1977).
     """
-    std, extra, now = (field[left.row] for field in (log.std, log.extra, log.momentary))
-    return np.asarray(np.mean(left.left**2 * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
+    std, extra, now = (field[rows] for field in (log.std, log.extra, log.momentary))
+    return np.asarray(np.mean(left**2 * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:

@@ -68,3 +68,5 @@ STRENGTHS = 13
 """Number of strengths of an unresolved neighbour over which a track's expected scatter is averaged."""
 SWAYS = 5
 """Number of levels of the body's attitude, half a decade of angle apart."""
+PRIORS = 5
+"""Number of priors of the vertical motion that are compared, from a level floor to what each step alone asks for."""

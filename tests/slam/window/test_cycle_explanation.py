@@ -8,7 +8,7 @@ import pytest
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.cycle_explanation import _names, innovations, reweigh_wall_returns, scatter_variance
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, Residuals
+from rislam_rt.slam.window.measurement_log import Log, Residuals, squares
 
 CYCLES = 20
 
@@ -26,7 +26,8 @@ def log_of(scatter):
     log = Log(slot, np.zeros((count, 3)), std, none, none, slot, slot, forms, none, extra, shared)
     raw = scatter[slot, which][:, None] * np.ones(3)
     left = np.sqrt(raw / (1.0 + extra / std**2))
-    return log, Residuals(np.arange(count), slot, left)
+    rows = np.arange(count)
+    return log, Residuals(rows, slot, left, np.zeros((count, 3, 4)), squares(rows, left, log, 0.0))
 
 
 def scatter_held(log):
@@ -71,7 +72,7 @@ def test_a_level_ray_moves_nothing_where_it_is_reported_on_average():
         cycle=np.array([7]), share=np.zeros(1), seen=np.array([[5.0, 0.6 * inside, 0.8 * inside]]),
         std=np.full((1, 3), std), extra=np.zeros((1, 3)),
     )  # fmt: skip
-    left, slope = innovations(view, log, np.ones(1, dtype=np.bool_), 7)
+    left, slope, _ = innovations(view, log, np.ones(1, dtype=np.bool_), 7, 3)
     np.testing.assert_allclose(left, 0.0, atol=1e-9)
     assert std * slope[0, 1:, 1:] @ [0.6, 0.8] @ [0.6, 0.8] == pytest.approx(0.5)
     np.testing.assert_array_equal(expected.jacobian, np.eye(3)[None])  # another cycle's map asks it again

@@ -1,19 +1,19 @@
 """The log's components and the poses of the window that they were heard at."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from rislam_rt.model import Body, RadioConfig, SensorModel
 from rislam_rt.slam import SlamConfig
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.predicted_returns import NONE, TX
-from rislam_rt.slam.window import filter as window_filter
+from rislam_rt.slam.start_prior import StartPrior
+from rislam_rt.slam.window import init
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import append, empty_log
+from rislam_rt.slam.window.measurement_log import append, empty_log, squares
+from rislam_rt.slam.window.motion_learning import assumed_precision
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
@@ -32,17 +32,38 @@ def test_a_cycle_in_which_nothing_was_heard_takes_nothing_of_the_one_before():
     )
     form = np.array([[[TX, NONE, NONE, 0, NONE], [UNKNOWN] * 5]])
     log = append(empty_log(), observed, 3, 0).explain(np.array([0]), form, 0.0, 0.0, np.zeros((1, 3)))
-    known = {"window": window, "log": log, "landmarks": landmarks, "scene": SCENE, "heading": np.zeros(2)}
+    state = init(
+        StartPrior(np.zeros(3), np.zeros(3), 0.01, 0.01, 0.0), BODY, None, SCENE.sensor, SlamConfig(),
+        rng=np.random.default_rng(0),
+    )._replace(window=window, log=log, landmarks=landmarks, heading=np.zeros(2), attitude=np.zeros((2, 3)))  # fmt: skip
     for cycle, heard in ((3, True), (4, False)):
-        found, left = relinearise(SimpleNamespace(**known, cycle=cycle), 1)
+        found, left = relinearise(state._replace(cycle=cycle), 1)
         assert len(left.row) == heard
-        assert found.slots.hessian[-1].any() == heard
+        assert found.window.slots.hessian[-1].any() == heard
     # the whole window then: it is the pose before that heard it
-    found, left = relinearise(SimpleNamespace(**known, cycle=4), 0)
+    found, left = relinearise(state._replace(cycle=4), 0)
     np.testing.assert_array_equal(left.slot, [0])
 
 
 def test_told_motion_has_a_rate_of_turn_once_the_compass_was_found_wrong():
     config = SlamConfig(motion="told", sigma_a=0.1, turn_std=0.02)
-    assert len(window_filter._assumed_precision(config, 0.1, False)) == 3
-    np.testing.assert_allclose(window_filter._assumed_precision(config, 0.1, True)[3], 0.1 / 0.02**2)
+    assert len(assumed_precision(config, 0.1, False)) == 3
+    np.testing.assert_allclose(assumed_precision(config, 0.1, True)[3], 0.1 / 0.02**2)
+
+
+def test_what_a_residual_has_lost_to_the_estimate_is_given_back():
+    """Ten measurements of one number and its mean: errors of nine deviations squared, whatever the residuals show."""
+    rng, count, loud = np.random.default_rng(5), 10, 9.0
+    log = empty_log()
+    observed = Observations(*(np.ones((count, 3)),) * 2, *(np.zeros(count),) * 3)
+    log = append(log, observed, 0, 0)
+    extra = np.full((count, 3), loud - 1.0)
+    log = log._replace(extra=extra, shared=extra)
+    error = np.sqrt(loud) * rng.standard_normal((4000, count, 3))
+    left = (error - error.mean(axis=1, keepdims=True)) / np.sqrt(loud)
+    rows = np.arange(count)
+    found = np.mean([squares(rows, each, log, np.full((count, 3), 1.0 / count)) for each in left])
+    short = np.mean([squares(rows, each, log, 0.0) for each in left])
+    # 4000 x 30 squares, each of variance 2 loud^2
+    assert found == np.clip(found, loud - 0.15, loud + 0.15)
+    assert short == np.clip(short, 0.9 * loud - 0.15, 0.9 * loud + 0.15)

@@ -17,8 +17,9 @@ from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, free_space
 from rislam_rt.slam.predicted_returns import poses_of
+from rislam_rt.slam.window.smoother.marginals import pose_covariance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
-from rislam_rt.slam.window.smoother.window_gaussian import Window, now, pose_covariance, poses
+from rislam_rt.slam.window.smoother.window_gaussian import Window, now, poses
 from rislam_rt.slam.window.solver_limits import PERIODS, POINTS, STRENGTHS
 from rislam_rt.slam.window.state import WindowState
 

@@ -74,5 +74,6 @@ def after_jump(state: WindowState, by: Floats) -> WindowState:
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
         window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level,
-        heading=state.heading[-1:], attitude=state.attitude[-1:], codes=state.codes[-1:], passed=passed, lost_log_odds=0.0,
+        heading=state.heading[-1:], attitude=state.attitude[-1:], codes=state.codes[-1:],
+        passed=passed, lost_log_odds=0.0,
     )  # fmt: skip

@@ -7,7 +7,6 @@ cosines are levelled. The deviations are learnt: each is one of a ladder of leve
 marginal likelihood of each cycle's innovations, as those of the motion modes do.
 """
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,15 +19,9 @@ AXES = np.array([0, 0, 1])
 """Index of the chain of levels of each axis: roll and pitch share one, yaw has another."""
 
 
-@lru_cache(maxsize=4)
-def ladder(least: float, most: float) -> Floats:
-    """Standard deviations (L,) [rad] of the levels, in equal ratios."""
-    return np.geomspace(least, most, SWAYS)
-
-
 def levels() -> Floats:
-    """Standard deviations (L,) [rad] of the attitude's levels."""
-    return ladder(CONSTANTS.steady_body, CONSTANTS.swaying_body)
+    """Standard deviations (L,) [rad] of the attitude's levels, half a decade apart up to the largest."""
+    return np.asarray(CONSTANTS.sway * 10.0 ** (-0.5 * np.arange(SWAYS)[::-1]))
 
 
 def first_levels(*, compass: bool) -> Floats:
@@ -36,6 +29,11 @@ def first_levels(*, compass: bool) -> Floats:
     heading's random walk: (1, L)."""
     weight = 3.0 ** -np.arange(SWAYS, dtype=np.float64)
     return np.tile(weight / weight.sum(), (1 + compass, 1))
+
+
+def held_level(probability: Floats) -> Floats:
+    """Level probabilities (C, L) of a body that is known not to sway."""
+    return np.tile(np.eye(SWAYS)[0], (len(probability), 1))
 
 
 def variance(probability: Floats) -> Floats:
@@ -119,7 +117,7 @@ def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal
     information = product[:, own, own] + np.diag(1.0 / variance)
     gain = np.linalg.solve(information, product[:, own, by])
     pull = product[:, own, out] - rotation[:, :axes] / variance
-    change = np.linalg.solve(information, pull[..., None])[..., 0]
+    change = np.asarray(np.linalg.solve(information, pull[..., None])[..., 0], dtype=np.float64)
     cross = product[:, by, own]
     slope = product[:, by, out] - (cross @ change[..., None])[..., 0]
     return Marginal(product[:, by, by] - cross @ gain, slope, change)
@@ -132,10 +130,12 @@ def likelihood(left: Floats, jacobian: Floats, covariance: Floats, slopes: Float
     Weights of Student's t, given the expected variance `prior` (A,), keep single outliers from speaking for all.
     """
     flat, by = jacobian.reshape(-1, jacobian.shape[-1]), slopes.reshape(-1, slopes.shape[-1])
-    noise = flat @ covariance @ flat.T
-    total = 1.0 + np.diagonal(noise).reshape(left.shape) + (slopes**2 * prior).sum(axis=-1)
-    trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + (left**2 / total).sum(axis=1))
-    at = np.arange(len(noise))
-    noise[at, at] += np.repeat(1.0 / np.minimum(trust, 1.0), 3)
-    heard = np.linalg.solve(noise, by)
-    return Attitude((heard.T @ by)[None], (left.ravel() @ heard)[None])
+    through = flat @ covariance
+    total = 1.0 + np.vecdot(through, flat).reshape(left.shape) + (slopes**2 * prior).sum(axis=-1)
+    trust = np.minimum((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + (left**2 / total).sum(axis=1)), 1.0)
+    weight = np.repeat(trust, 3)[:, None]
+    heard = weight * np.concatenate([by, left.reshape(-1, 1)], axis=1)
+    # Woodbury's identity: what pose and map may move is taken out
+    inner = np.eye(len(covariance)) + (weight * through).T @ flat
+    heard -= weight * (flat @ np.linalg.solve(inner, through.T @ heard))
+    return Attitude((by.T @ heard[:, :-1])[None], (by.T @ heard[:, -1])[None])

@@ -119,3 +119,9 @@ def prior_precision(posterior: Floats, is_turn: bool) -> Floats:
 def expected_variance(posterior: Floats) -> Floats:
     """Expected variance (...,) [m^2/s^4] of a step's acceleration, from motion-mode probabilities (..., L)."""
     return np.asarray(posterior @ ladder() ** 2)
+
+
+def pool(one: Floats, other: Floats, share: float) -> Floats:
+    """Logarithmic pool of motion-mode probabilities (..., L), `one` to the power `share` (Genest and Zidek 1986)."""
+    found = np.maximum(one, 1e-300) ** share * np.maximum(other, 1e-300) ** (1.0 - share)
+    return np.asarray(found / found.sum(axis=-1, keepdims=True))

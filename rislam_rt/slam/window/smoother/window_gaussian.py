@@ -20,12 +20,11 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.motion_basis import (
-    FIRST,
     HEAD,
     ONE,
     POSE,
@@ -201,34 +200,6 @@ def with_present(
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[-1], gradient[-1], middle[-1] = found.hessian[0], -found.slope[0], spot
     return window._replace(slots=Quadratic(hessian, gradient, middle))
-
-
-def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Floats:
-    """Variance (N, 3) of what the sliding window predicts in slots (N,), by slopes (N, 3, 4 + 3F) with respect to pose
-    and features."""
-    size, free, steps = len(window.head), window.accel.shape[1], len(window.step)
-    design = np.zeros((window.num_poses, POSE, len(window.covariance)))
-    design[:, TURN, 6] = 1.0
-    for axis, along in enumerate(_basis(window)):
-        design[:, axis, FIRST[axis]] = along[:, 0]
-        if axis != TURN:
-            design[:, axis, 3 + axis] = along[:, 1]
-        design[:, axis, size + axis :: free] = along[:, 2:] if steps else 0.0
-    wide = design @ window.covariance
-    pose, cross, inner = wide @ np.swapaxes(design, 1, 2), wide[:, :, HEAD:size], window.covariance[HEAD:size, HEAD:size]
-    by_pose, by_map = slopes[..., :POSE], slopes[..., POSE:]
-    flat = by_map.reshape(3 * len(by_map), size - HEAD)
-    found = np.vecdot(by_pose @ pose[slot], by_pose) + 2.0 * np.vecdot(by_pose @ cross[slot], by_map)
-    return np.asarray(found + np.vecdot(flat @ inner, flat).reshape(found.shape))
-
-
-def pose_covariance(window: Window, axis: int) -> Floats:
-    """Covariance (K, K) of all poses of the sliding window along one axis."""
-    along, size, free = _basis(window)[axis], len(window.head), window.accel.shape[1]
-    rate = [] if axis == TURN else [3 + axis]
-    rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
-    used = along if rate else np.delete(along, 1, axis=1)
-    return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
 
 
 def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:

@@ -196,7 +196,8 @@ def test_residuals_of_the_present_are_a_look_at_its_pose_and_features(turns):
     jacobian = np.zeros((1, 3, HEAD + 3))
     jacobian[..., [0, 1, 2, 6, 7, 8, 9]] = rows
     spot = np.concatenate([window_gaussian.poses(window)[-1], window.features[0]])
-    found = window_gaussian.with_present(window, (value - rows @ spot)[None], jacobian)
+    still = np.zeros((1, 3, 3)), np.zeros(3), np.ones(3)  # nothing tells of the attitude
+    found = window_gaussian.with_present(window, (value - rows @ spot)[None], jacobian, *still)
     wanted = window_gaussian.solve(_look(window, rows, value))
     for spread in (False, True):  # without the covariance a solution is the same: condition of the matrix, 1e4
         solved = window_gaussian.solve(found, spread=spread)

@@ -1,0 +1,118 @@
+"""Learning how the agent moves: each step's motion-mode probabilities, and the prior of its acceleration that follows.
+
+Axes are learnt in groups, a chain of motion modes each (see `smoother.motion`). The height is asked once more: each
+step's likelihood is that of its own acceleration, the other steps' priors being what they are, and one datum that tells
+of forty steps at once counts forty times. Next to nothing measures the height while no ceiling is known; noise of no
+weight made an agent climb. So the vertical chain's priors stand against those of a level floor, by the marginal
+likelihood of all steps together.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.smoother import motion
+from rislam_rt.slam.window.smoother.motion_basis import TURN
+from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
+from rislam_rt.slam.window.state import WindowState
+
+UP = 1
+"""Index of the vertical axis's group among `GROUPS`."""
+GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
+"""Axes that share one chain of motion modes: the two horizontal ones, the vertical one, and the rate of turn."""
+COLUMNS = np.array([0, 0, 1, 2])
+"""Index into `GROUPS` of each axis."""
+
+
+def learn_motion(state: WindowState) -> WindowState:
+    """Re-estimate every step's motion-mode probabilities by forward-backward smoothing, and the prior precision of its
+    acceleration from them."""
+    window = state.window
+    if not len(window.accel) or state.config.motion == "told":
+        return state
+    posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel)), CONSTANTS.stay)
+    share = manoeuvre_share(window, motion.expected_precision(posterior[UP]))
+    posterior[UP], level[UP] = nearer_floor(posterior[UP], share), nearer_floor(level[UP], share)
+    fresh = precisions(posterior)
+    # all steps at once, each as if the others were settled: damped, or they would take turns
+    precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
+    # the covariance is that of the precisions before
+    wide = surplus(window.precision, posterior)
+    return state._replace(window=window._replace(precision=precision, surplus=wide), level=level)
+
+
+def likelihoods(window: Window, count: int) -> Floats:
+    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes."""
+    size, free = len(window.head), window.accel.shape[1]
+    every = np.arange(count)
+    inside = window.covariance[size : size + count * free, size : size + count * free]
+    block = inside.reshape(count, free, count, free)[every, :, every]
+    found = np.stack([
+        motion.log_likelihood(
+            window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group[0]]
+        )
+        for group in GROUPS[: free - 1]
+    ])  # fmt: skip
+    found[0, :, motion.is_level_only()] = -np.inf
+    return found
+
+
+def manoeuvre_share(window: Window, precision: Floats) -> float:
+    """Expected share, from 0 for a level floor to 1 for the vertical chain's prior precisions (K,), of a prior of the
+    vertical accelerations between these two, by the marginal likelihood of all steps together.
+
+    Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare event.
+    """
+    size, free = len(window.head), window.accel.shape[1]
+    inner = np.linalg.inv(window.covariance[size + 2 :: free, size + 2 :: free])
+    told, slope = inner - np.diag(window.solved[:, 2]), inner @ window.accel[:, 2]
+    floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
+    share = np.linspace(0.0, 1.0, PRIORS)
+    std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])
+    # N(0, P^-1) against what is told, information `told` with the slope `slope`
+    inside, pull = np.eye(len(told)) + std[:, :, None] * told * std[:, None, :], std * slope
+    log_like = 0.5 * np.vecdot(pull, np.linalg.solve(inside, pull[..., None])[..., 0])
+    log_like -= 0.5 * np.linalg.slogdet(inside)[1]
+    log_like[1:] += CONSTANTS.log_rare
+    weight = np.exp(log_like - log_like.max())
+    return float(weight @ share / weight.sum())
+
+
+def nearer_floor(level: Floats, share: float) -> Floats:
+    """Vertical motion-mode probabilities (..., L), pooled with those of a level floor by `share` where they are
+    livelier."""
+    pooled = motion.pool(level, motion.first_motion_mode(0.0), share)
+    calmer = motion.expected_variance(pooled) < motion.expected_variance(level)
+    return np.where(calmer[..., None], pooled, level)
+
+
+def precisions(levels: Floats) -> Floats:
+    """Prior precisions (..., A) of accelerations along A axes, from motion-mode probabilities (N, ..., L) of N groups
+    of axes."""
+    each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
+    return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
+
+
+def surplus(precision: Floats, levels: Floats) -> Floats:
+    """Variance (..., A) of the slopes of acceleration priors beyond their precisions (..., A), from motion-mode
+    probabilities (N, ..., L) of N groups of axes (see `now_with_excess`)."""
+    variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
+    return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
+
+
+def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
+    """Prior precisions (A,) of one step's acceleration, and of its rate of turn where the heading is estimated, under
+    told motion."""
+    upwards = config.sigma_a if config.height == "estimated" else STILL
+    rates = (config.turn_std / np.sqrt(dt),) if turns else ()
+    return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
+
+
+def livelier(precision: Floats) -> Floats:
+    """Prior precisions (K - 1, A) of the window's accelerations, the last steps' lowered to the liveliest motion mode,
+    but not vertically."""
+    found, lively = precision.copy(), COLUMNS[: precision.shape[1]] != 1
+    found[-LATELY:, lively] = np.minimum(found[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
+    return found

@@ -1,0 +1,69 @@
+"""How strongly the agent manoeuvres upwards: one datum counts once, and a climb is a climb."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.slam.window.motion_learning import manoeuvre_share, nearer_floor
+from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
+
+DT, CYCLES = 0.1, 40
+LIVELY = motion.first_motion_mode(1.0)
+
+
+def window_of(height, std, floor=1e-3):
+    """Window of 40 poses whose heights (40,) [m] were measured with deviations (40,) [m], on a level floor's prior."""
+    begin = window_gaussian.begin(np.zeros(3), np.zeros(3), np.array([1e-5] * 3 + [0.01, 0.01, 1e-3, 0.0]))
+    window = begin
+    for _ in range(CYCLES - 1):
+        window = window_gaussian.extend(window, DT, np.full(3, floor**-2.0))
+    hessian, gradient, middle = (np.array(field) for field in window.slots)
+    hessian[:, 2, 2], gradient[:, 2] = std**-2.0, -height * std**-2.0
+    return window_gaussian.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
+
+
+def share_of(window):
+    """The share of what the chain of single steps would ask for."""
+    return manoeuvre_share(window, np.full(CYCLES - 1, motion.expected_precision(LIVELY)))
+
+
+def test_one_datum_does_not_make_an_agent_climb():
+    """A height that is told once, three deviations off, 2.4 m: each step alone takes it for its own."""
+    std = np.full(CYCLES, 1e6)
+    std[-1] = 0.8
+    window = window_of(np.where(np.arange(CYCLES) == CYCLES - 1, 2.4, 0.0), std)
+    size = len(window.head)
+    single = motion.log_likelihood(
+        window.accel[:, 2:3], window.covariance[size + 2 :: 3, size + 2 :: 3].diagonal()[:, None, None],
+        window.solved[:, 2],
+    )  # fmt: skip
+    # what forty steps together seemed to tell, and the most that a datum three deviations off can
+    assert (single[:, -1] - single[:, 0]).sum() > 10.0 > 0.5 * 3.0**2
+    assert share_of(window) < 0.5
+
+
+@pytest.mark.parametrize("speed", [0.1, 0.3])
+def test_a_climb_is_one(speed):
+    height = speed * DT * np.maximum(np.arange(CYCLES) - 20, 0)
+    assert share_of(window_of(height, np.full(CYCLES, 0.01))) > 0.7
+
+
+def test_a_level_floor_is_one():
+    rng = np.random.default_rng(0)
+    shares = [share_of(window_of(0.01 * rng.standard_normal(CYCLES), np.full(CYCLES, 0.01))) for _ in range(20)]
+    assert np.mean(shares) < 0.1
+
+
+def test_nothing_heard_leaves_a_manoeuvre_a_rare_event():
+    share = share_of(window_of(np.zeros(CYCLES), np.full(CYCLES, 1e6)))
+    assert share == pytest.approx(2.5 * 0.02 / (1.0 + 4.0 * 0.02), rel=1e-3)
+
+
+def test_the_floor_makes_nothing_livelier():
+    calm = np.eye(len(LIVELY))[0]
+    np.testing.assert_array_equal(nearer_floor(calm[None], 0.0)[0], calm)
+    floor = motion.first_motion_mode(0.0)
+    np.testing.assert_allclose(nearer_floor(LIVELY[None], 0.0)[0], floor)
+    np.testing.assert_allclose(nearer_floor(LIVELY[None], 1.0)[0], LIVELY)
+    variance = motion.expected_variance(np.stack([nearer_floor(LIVELY[None], share)[0] for share in (0.0, 0.5, 1.0)]))
+    assert (np.diff(variance) > 0.0).all()
