@@ -34,7 +34,13 @@ def lead(room: str, settings: list[str], seeds: int, cycles: int) -> tuple[np.nd
     """RMSE (seeds,) [m] of runs on one stage, and false components a cycle in the mean."""
     spec = load_spec(
         "pipelines/trace_then_slam.toml",
-        ["receiver.estimator=bound", f"cycles={cycles}", "schemes=['optimized']", *settings],
+        [
+            "receiver.estimator=bound",
+            "receiver.alternation=false",
+            f"cycles={cycles}",
+            "schemes=['optimized']",
+            *settings,
+        ],
     )
     stage = prepare_setup(load_scene(room), spec, rng=np.random.default_rng(7))
     errors, false = [], []

@@ -29,7 +29,10 @@ SETTINGS = ("channel=image_source", 'schemes=["random"]', "motion.sigma_a_m_s2=0
 
 def run(seed: int, scene: str, settings: Sequence[str]) -> tuple[int, Floats, Floats, float]:
     """NEES (K,) of the horizontal position, errors (K,) [m] and processor time [s] of one run."""
-    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", ["receiver.estimator=bound", *settings])
+    spec = load_spec(
+        ROOT / "pipelines" / "trace_then_slam.toml",
+        ["receiver.estimator=bound", "receiver.alternation=false", *settings],
+    )
     begin = process_time()
     result = run_slam(load_scene(ROOT / "scenes" / scene), spec, rng=np.random.default_rng([20, seed]))
     scheme = result.schemes[spec.schemes[0]]

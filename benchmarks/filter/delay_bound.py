@@ -117,6 +117,7 @@ def main() -> None:
     for snr in arguments.snr:
         told = (
             "receiver.estimator=bound",
+            "receiver.alternation=false",
             "channel=image_source",
             "motion.sigma_a_m_s2=0.01",
             f"cycles={arguments.cycles}",

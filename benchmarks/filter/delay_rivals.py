@@ -53,7 +53,8 @@ def print_runs(seeds: Sequence[int], scheme: str, settings: Sequence[str]) -> No
 def run_seed(seed: int, scheme: str, settings: Sequence[str]) -> tuple[float, ...]:
     """RMSE, that of dead reckoning, the bound's, largest error [m], mean NEES / 2, processor time with the room [s]."""
     spec = load_spec(
-        ROOT / "pipelines" / "trace_then_slam.toml", ("receiver.estimator=bound", *settings, f'schemes=["{scheme}"]')
+        ROOT / "pipelines" / "trace_then_slam.toml",
+        ("receiver.estimator=bound", "receiver.alternation=false", *settings, f'schemes=["{scheme}"]'),
     )
     began = time.process_time()
     result = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng([20, seed]))

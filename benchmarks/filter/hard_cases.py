@@ -140,7 +140,7 @@ def draw_case(kind: str, seed: int, engine: str, most: int = 40) -> Case:
     code = RisCode(index, panel.levels)
     paths = rephase(_stretch(_paths(kind if kind in ROOMS else "", depth), stretch), code)
     # merged components are one more thing that may go wrong, and not always wanted
-    receiver = ReceiverConfig(estimator="bound", merge=bool(rng.integers(2)))
+    receiver = ReceiverConfig(estimator="bound", merge=bool(rng.integers(2)), alternation=False)
     cycles = []
     for row in range(count):
         heading = float(motion.heading[row])

@@ -17,7 +17,7 @@ from rislam_rt.measurement import Received, ReceiverConfig, capture, find_compon
 from rislam_rt.model import RadioConfig
 
 RADIO = RadioConfig()
-CONFIG = ReceiverConfig(estimator="waveform", false_alarm_rate=0.01)
+CONFIG = ReceiverConfig(estimator="waveform", false_alarm_rate=0.01, alternation=False)
 SNRS_DB = np.array([10.0, 12.5, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0])
 PAIR_SNRS_DB = (20.0, 30.0, 40.0)
 DELAYS = np.array([0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.25, 1.5, 2.0])

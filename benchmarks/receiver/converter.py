@@ -32,8 +32,9 @@ def main() -> None:
     for cancellation in CANCELLATIONS_DB:
         for bits in BITS:
             config = ReceiverConfig(
-                estimator="waveform", converter_bits=bits, leakage_cancellation_db=cancellation, false_alarm_rate=0.1
-            )
+                estimator="waveform", converter_bits=bits, leakage_cancellation_db=cancellation, false_alarm_rate=0.1,
+                alternation=False,
+            )  # fmt: skip
             extra, share = score(paths, motion, config)
             print(f"{bits or 'exact':>5}  {cancellation:4.0f}  {extra:6.1f}  {share:5.2f}")
 

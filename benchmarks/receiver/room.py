@@ -28,9 +28,9 @@ RATES = (0.01, 0.1, 0.5, 1.47)
 """Set false alarms a cycle; the last is what a threshold of 10 dB stands for."""
 BINS_DB = np.arange(0.0, 41.0, 2.5)
 RECEIVERS = {
-    "waveform": ReceiverConfig(estimator="waveform", clutter_rate=0.0),
-    "bound, joint": ReceiverConfig(estimator="bound", resolution="joint", clutter_rate=0.0),
-    "bound, cell": ReceiverConfig(estimator="bound", resolution="cell", clutter_rate=0.0),
+    "waveform": ReceiverConfig(estimator="waveform", clutter_rate=0.0, alternation=False),
+    "bound, joint": ReceiverConfig(estimator="bound", resolution="joint", clutter_rate=0.0, alternation=False),
+    "bound, cell": ReceiverConfig(estimator="bound", resolution="cell", clutter_rate=0.0, alternation=False),
 }
 
 
@@ -188,7 +188,7 @@ def compare(waveform: list[Findings], bound: list[Findings]) -> None:
 
 def false_rates(paths: Paths, motion: Trajectory, rate: float) -> tuple[float, float]:
     """False components a cycle in the room (sphere at 13 dB), and on noise alone."""
-    config = ReceiverConfig(estimator="waveform", false_alarm_rate=rate)
+    config = ReceiverConfig(estimator="waveform", false_alarm_rate=rate, alternation=False)
     radio = with_reference_snr(RadioConfig(), 13.0)
     room = run(paths, motion, radio, config, 3).false
     silent = replace(paths, valid=np.zeros_like(paths.valid))

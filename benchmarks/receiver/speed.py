@@ -30,7 +30,7 @@ from rislam_rt.measurement.waveform_receiver import to_measurement
 from rislam_rt.model import Paths, RadioConfig, RxArray, Trajectory
 from rislam_rt.scene import load_scene
 
-WAVEFORM = ReceiverConfig(estimator="waveform")
+WAVEFORM = ReceiverConfig(estimator="waveform", alternation=False)
 CASES = {
     "4 x 4, 1 GHz": RadioConfig(),
     "2 x 2": RadioConfig(array=RxArray(rows=2, cols=2)),
@@ -57,8 +57,8 @@ def main() -> None:
     print("milliseconds of processor time a cycle: mean and largest over the places; samples L M; components found")
     base = RadioConfig()
     for name, config in (
-        ("bound, cell", ReceiverConfig(estimator="bound")),
-        ("bound, joint", ReceiverConfig(estimator="bound", resolution="joint")),
+        ("bound, cell", ReceiverConfig(estimator="bound", alternation=False)),
+        ("bound, joint", ReceiverConfig(estimator="bound", resolution="joint", alternation=False)),
     ):
         print_times(name, times(lambda k, c=config: draw(paths, motion, k, base, c), arguments.places))
     if arguments.quick:
@@ -99,7 +99,7 @@ def times(work: Callable[[int], Any], places: int) -> list[float]:
 def track_times(paths: Paths, motion: Trajectory, radio: RadioConfig) -> list[float]:
     state, seconds = init_tracks(), []
     for cycle in range(len(motion) // 2):
-        measurement, _ = draw(paths, motion, cycle, radio, ReceiverConfig())
+        measurement, _ = draw(paths, motion, cycle, radio, WAVEFORM)
         for _ in range(4):
             begin = time.process_time()
             state, _ = step_tracks(state, measurement, 0.1, TrackingConfig())

@@ -25,7 +25,7 @@ def main() -> None:
     scene = load_scene("scenes/paper_room")
     motion = scene.agent[: arguments.cycles]
     paths = ImageSourceChannel(scene, RADIO).paths(motion)
-    for config in (ReceiverConfig(), ReceiverConfig(estimator="waveform")):
+    for config in (ReceiverConfig("bound", alternation=False), ReceiverConfig(alternation=False)):
         rng = np.random.default_rng(2)
         state, label, truth, confirmed, measurement = init_tracks(), [], [], [], None
         for cycle in range(len(motion)):

@@ -75,6 +75,7 @@ def compare_hearing() -> None:
         schemes = '["genie", "random", "optimized"]' if scene.ris else '["no_ris"]'
         changed = [
             "receiver.estimator=bound",
+            "receiver.alternation=false",
             f"radio.reference_snr_db={snr}",
             "channel=image_source",
             f"schemes={schemes}",

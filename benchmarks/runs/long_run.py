@@ -58,7 +58,13 @@ def main() -> int:
     parser.add_argument("--cycles", type=int, default=100_000)
     parser.add_argument("--set", action="append", default=[], dest="settings")
     given = parser.parse_args()
-    settings = ["receiver.estimator=bound", "channel=image_source", 'schemes=["random"]', *given.settings]
+    settings = [
+        "receiver.estimator=bound",
+        "receiver.alternation=false",
+        "channel=image_source",
+        'schemes=["random"]',
+        *given.settings,
+    ]
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
     peaks: dict[int, float] = {}
 

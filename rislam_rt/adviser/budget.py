@@ -70,7 +70,8 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
     scene = replace(scene, agent=scene.agent[rows])
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
     channel = ImageSourceChannel(scene, settings.radio, next((depth for most, depth in DEPTHS if faces <= most), 0))
-    return Survey(scene, channel.paths(scene.agent), settings, channel.depth)
+    receiver = replace(settings.receiver, panels=max(len(scene.panels), 1))
+    return Survey(scene, channel.paths(scene.agent), settings._replace(receiver=receiver), channel.depth)
 
 
 def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:

@@ -74,7 +74,7 @@ def _what_helps(looked: Survey, link: LandmarkLink) -> str:
     """Text on one landmark that is not detected: the reasons with their remedies, the SNR that it lacks, and what would
     make up for that."""
     scene, lack = looked.scene, lack_db(link)
-    parts = list(_why_where(link))
+    parts = list(_why_where(link, panel_held=bool(link.code) and not looked.settings.receiver.alternation))
     if lack:
         parts.append(f"{lack:.1f} dB lack where it is too weak: as much less noise (radio.reference_snr_db) would do")
         parts += _larger(looked, link, lack)
@@ -85,12 +85,12 @@ def _what_helps(looked: Survey, link: LandmarkLink) -> str:
     return "; ".join(parts)
 
 
-def _why_where(link: LandmarkLink) -> Iterator[str]:
+def _why_where(link: LandmarkLink, *, panel_held: bool) -> Iterator[str]:
     """Reasons why a landmark is not detected, the commonest first, each with its share of the trajectory and a
     remedy."""
     for reason, count in Counter(reason for reason in link.reason if reason).most_common():
         share = f"{reason} on {count / len(link.reason):.0%} of it"
-        yield share if reason == WEAK else f"{share} ({_way_round(reason)})"
+        yield share if reason == WEAK else f"{share} ({_way_round(reason, panel_held=panel_held)})"
 
 
 def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
@@ -121,8 +121,9 @@ def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[st
         )
 
 
-def _way_round(why: str) -> str:
-    """Remedy for a reason why a landmark is not detected, other than too weak a path."""
+def _way_round(why: str, *, panel_held: bool) -> str:
+    """Remedy for a reason why a landmark is not detected, other than too weak a path; `panel_held`: it is a RIS panel
+    whose code is held for the whole slot."""
     if "behind the panel" in why:
         return "turn the panel, or lead the way before it"
     if "shaded" in why:
@@ -130,7 +131,7 @@ def _way_round(why: str) -> str:
     if "below" in why:
         return "raise it, lower the agent, or take radio.array.pattern = 'isotropic'"
     if "told from" in why:
-        return "more bandwidth or antennas, or receiver.alternation for a panel"
+        return "more bandwidth or antennas" + (", or receiver.alternation = true" if panel_held else "")
     return "lead the way to where it is seen"
 
 

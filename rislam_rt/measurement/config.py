@@ -43,8 +43,9 @@ class ReceiverConfig:
     """Which paths cannot be resolved (`bound`): `cell`, two within 1/B in delay and the array's beam; `joint`, those
     among which the joint bound cannot share the amplitude out. `joint` draws the errors from that bound too, and costs
     more."""
-    alternation: bool = False
-    """Whether the slot is split between the code and its phase-reversed one, which sets the panel's paths apart."""
+    alternation: bool = True
+    """Whether the slot is split between the code and its phase-reversed one, which sets the panel's paths apart; for a
+    room without a panel give False (the pipeline does)."""
     order: str = "ABBA"
     """Order of the code (A) and its phase-reversed one (B) within the slot: `ABBA` cancels the first order of motion,
     `AB` lets it leak."""
@@ -63,7 +64,8 @@ class ReceiverConfig:
     max_delay: float = 80e-9
     """Components after this delay [s] are not reported."""
     false_alarm_rate: float = 0.0
-    """Mean number of false components a cycle that noise alone may cause; above 0 it sets the threshold instead."""
+    """Mean number of false components a cycle that noise alone may cause, in all captures together; above 0 it sets the
+    threshold instead."""
     num_subcarriers: int = 0
     """Number M of tones, or samples, of a sounding; 0 takes as many as the latest delay needs."""
     element_exact: bool = False

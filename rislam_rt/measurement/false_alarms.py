@@ -17,11 +17,12 @@ from rislam_rt.model import RadioConfig, SensorModel
 
 
 def detection_threshold(radio: RadioConfig, config: ReceiverConfig) -> float:
-    """Detection threshold (linear) on the measured SNR over all antennas: as set, or as the false-alarm rate
-    demands."""
+    """Detection threshold (linear) on the measured SNR over all antennas: as set, or as the false-alarm rate demands,
+    of which every capture of a cycle has the same share."""
     if not config.false_alarm_rate:
         return float(10.0 ** (config.detection_threshold_db / 10.0))
-    return _threshold_of_rate(config.false_alarm_rate, radio, config.max_delay - config.min_delay)
+    rate = config.false_alarm_rate / config.num_captures
+    return _threshold_of_rate(rate, radio, config.max_delay - config.min_delay)
 
 
 def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -> float:

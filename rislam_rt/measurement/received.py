@@ -119,6 +119,20 @@ def phase_reversed(code: RisCode) -> RisCode:
     ConfigError
         The panel has an odd number of levels, none of which is half a turn.
     """
-    if code.levels % 2:
-        raise ConfigError(f"ris.levels: {code.levels} received; alternation needs an even number of phase levels")
+    check_half_turn(code.levels)
     return RisCode((code.index + code.levels // 2) % code.levels, code.levels)
+
+
+def check_half_turn(levels: int) -> None:
+    """Check that half a turn is among the phase levels of a panel, as alternated codes need it.
+
+    Raises
+    ------
+    ConfigError
+        Their number is odd.
+    """
+    if levels % 2:
+        raise ConfigError(
+            f"ris.levels: {levels} received; alternation needs an even number of phase levels, half a turn among "
+            "them; give one, or receiver.alternation = false, which holds one code for the whole slot"
+        )

@@ -12,6 +12,7 @@ import numpy as np
 from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
+from rislam_rt.measurement.received import check_half_turn
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.assumed_model import tilted_motion
 from rislam_rt.pipeline.control_link import check_control
@@ -185,7 +186,8 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     ------
     ConfigError
         The time budget is not the scene's cycle time, the scene has fewer cycles than asked for, a scheme needs a panel
-        that is not there, the room cannot be changed as asked, or the channel cannot find the diffuse paths asked for.
+        that is not there, its codes are to alternate and half a turn is not among its levels, the room cannot be
+        changed as asked, or the channel cannot find the diffuse paths asked for.
     SceneError
         A wall's material is not specified at the radio's carrier.
     """
@@ -207,6 +209,8 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
         if need:
             raise ConfigError(f"schemes: '{need[0]}' needs a panel and scene '{scene.name}' has none; give 'no_ris'")
         return
+    if spec.receiver.alternation and any(SCHEMES[name].panel for name in spec.schemes):
+        check_half_turn(scene.ris.spec.levels)
     check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
 
 

@@ -39,7 +39,7 @@ class SchemeSimulation:
         self.motion, self.body = scene.agent, body
         self.front_end: FrontEnd | None = None
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
-        settings = build_settings(spec, 1 if panel is None else len(panel.panels))
+        settings = build_settings(spec, 0 if panel is None else len(panel.panels))
         compass, self.sway = (child(seeds.told, number) for number in range(2))
         start = np.random.default_rng(seeds.start)
         told = tell_belief(self.motion, body, panel, spec, settings, start=start, compass=compass)

@@ -10,14 +10,15 @@ from pydantic import Field
 
 from rislam_rt.design import focus_codes
 from rislam_rt.errors import ConfigError, StoreError
-from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, phase_reversed, signals_dataset
+from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset
+from rislam_rt.measurement.received import check_half_turn
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
 from rislam_rt.pipeline.dataset import paths_to_dataset
 from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.read import build_spec, settings_table
 from rislam_rt.pipeline.specification.section import Section
-from rislam_rt.pipeline.specification.spec import ReceiverSection
+from rislam_rt.pipeline.specification.spec import ReceiverSection, build_receiver
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,14 +70,15 @@ def load_signals_spec(overrides: Sequence[str]) -> SignalsSpec:
 
 
 def signal_settings(spec: SignalsSpec, scene: Scene | None = None) -> tuple[RadioConfig, ReceiverConfig]:
-    """Radio and receiver of a data set of signals, in SI units and linear ratios, for as many panels as the scene has.
+    """Radio and receiver of a data set of signals, in SI units and linear ratios, for as many panels as the scene has;
+    without one no codes alternate.
 
     Raises
     ------
     ConfigError
         A value is out of range, or the receiver is one that makes no samples.
     """
-    receiver = ReceiverConfig(**spec.receiver.model_dump(), panels=max(len(scene.panels), 1) if scene else 1)
+    receiver = build_receiver(spec.receiver, len(scene.panels) if scene else 1)
     if receiver.estimator != "waveform":
         raise ConfigError(f"receiver.estimator: '{receiver.estimator}' received; samples need 'waveform'")
     return build_radio(spec.radio), receiver
@@ -117,7 +119,7 @@ def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rn
     """
     radio, receiver = signal_settings(spec, scene)
     if scene.ris is not None and receiver.alternation:
-        phase_reversed(RisCode(np.zeros((1, 1), dtype=np.int64), scene.ris.spec.levels))
+        check_half_turn(scene.ris.spec.levels)
     tracer = build_channel(channel, scene, radio, depth)
     paths = tracer.paths(scene.agent)
     chosen = panel_codes(scene, paths, spec.code, rng=rng)

@@ -86,7 +86,7 @@ def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
     """One line for each landmark that is missing in a scheme's last map, with the reason."""
     spec = PipelineSpec.model_validate(dict(result.config))
-    settings = build_settings(spec)
+    settings = build_settings(spec, len(result.scene.panels) if scheme.levels else 0)
     threshold = build_sensor(settings.radio, settings.receiver).threshold
     paths = result.paths
     snr = np.where(paths.valid, settings.radio.integrated_snr(scheme.gain), 0.0)

@@ -43,7 +43,7 @@ def office() -> Scene:
     return load_scene(ROOT / "scenes" / "office")
 
 
-@pytest.mark.parametrize("changed", [(), ("receiver.alternation=true",)])
+@pytest.mark.parametrize("changed", [(), ("receiver.alternation=false",)])
 def test_the_chance_of_being_heard_is_the_share_of_the_receivers_own_draws(paper: Scene, changed: tuple[str]) -> None:
     looked = survey(paper, settings("receiver.estimator=bound", "radio.reference_snr_db=0", *changed), places=3)
     rng, draws = np.random.default_rng(5), 200
@@ -110,11 +110,18 @@ def test_what_hides_and_reflects_nothing_is_named(paper: Scene) -> None:
     assert set(links["sphere", ""].reason) == {"shaded by 'crate'"}
 
 
-def test_a_covered_path_names_what_covers_it() -> None:
-    _, links = look(load_scene(ROOT / "scenes" / "shaded_room"), places=15)
-    said = [reason for reason in links["ris", "random"].reason if reason.startswith("not to be told from")]
+def test_a_covered_path_names_what_covers_it_and_alternated_codes_uncover_a_panel() -> None:
+    scene = load_scene(ROOT / "scenes" / "shaded_room")
+    held, links = look(scene, "receiver.alternation=false", places=15)
+    link = links["ris", "random"]
+    said = [reason for reason in link.reason if reason.startswith("not to be told from")]
     assert said
     assert all(reason.split()[5] in ("VT", "VS", "PS", "LOS") for reason in said)
+    unheard = link._replace(code="aimed", probability=np.zeros(15))
+    assert any("or receiver.alternation = true" in line for line in remedies(held, [unheard]))
+    alternated, links = look(scene, places=15)
+    assert not any(reason.startswith("not to be told from") for reason in links["ris", "random"].reason)
+    assert not any("receiver.alternation" in line for line in remedies(alternated, [unheard]))
 
 
 def test_what_lacks_is_what_would_do(paper: Scene) -> None:

@@ -1,15 +1,19 @@
 """`trace --signals`: a data set that says what was sent through which paths, and nothing written when it cannot be."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import load_signals
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline.dataset import dataset_to_paths
+from rislam_rt.pipeline.signals import coded_paths, load_signals_spec, signals_size
+from rislam_rt.scene import load_scene
 from rislam_rt.storage.netcdf import read_dataset
 
 SCENE = Path(__file__).parents[2] / "scenes" / "paper_room"
@@ -65,6 +69,19 @@ def test_samples_are_those_of_the_true_paths_in_noise(run, tmp_path, alternation
         16,
         128,
     )
+
+
+def test_there_is_a_capture_for_the_codes_sum_and_one_for_each_panel():
+    """Without a panel, or with its code held, the sum is all there is; a panel without half a turn is refused."""
+    one, two = load_scene(SCENE), load_scene(SCENE.parent / "two_panels")
+    plain, held = load_signals_spec([]), load_signals_spec(["receiver.alternation=false"])
+    assert [signals_size(room, plain).captures for room in (replace(one, ris=None), one, two)] == [1, 2, 3]
+    assert [signals_size(room, held).captures for room in (one, two)] == [1, 1]
+    odd = replace(one, ris=replace(one.ris, spec=replace(one.ris.spec, levels=3)))
+    with pytest.raises(ConfigError, match=r"receiver\.alternation = false"):
+        coded_paths(odd, "image_source", 0, plain, rng=np.random.default_rng(0))
+    few = replace(odd, agent=odd.agent[:1])
+    assert coded_paths(few, "image_source", 0, held, rng=np.random.default_rng(0)).num_cycles == 1
 
 
 def test_estimates_lie_at_the_true_paths_that_they_name(run, tmp_path):

@@ -11,7 +11,7 @@ from rislam_rt.measurement import ReceiverConfig, detection_probability, measure
 from rislam_rt.model import PathKind, RadioConfig, RisCode, RxArray
 
 RADIO = RadioConfig()
-QUIET = ReceiverConfig(estimator="bound", clutter_rate=0.0)
+QUIET = ReceiverConfig(estimator="bound", clutter_rate=0.0, alternation=False)
 UP = (0.3, -0.2, 0.9)
 
 
@@ -207,7 +207,7 @@ def test_unusable_settings_are_refused_in_one_line(wrong):
 class TestJointResolution:
     """Errors from the joint bound: wider where signals overlap, and one component where they cannot be shared out."""
 
-    config = ReceiverConfig(estimator="bound", clutter_rate=0.0, resolution="joint")
+    config = ReceiverConfig(estimator="bound", clutter_rate=0.0, resolution="joint", alternation=False)
 
     def pair(self, make_paths, make_gain, gap, snr_db):
         gains = make_gain(snr_db, RADIO), make_gain(snr_db, RADIO, 1.0)

@@ -17,7 +17,7 @@ from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()
 CELL = SPEED_OF_LIGHT / RADIO.bandwidth
-WAVEFORM = ReceiverConfig(estimator="waveform")
+WAVEFORM = ReceiverConfig(estimator="waveform", alternation=False)
 UP = (0.3, -0.2, 0.9)
 
 
@@ -142,8 +142,9 @@ def test_path_60_db_below_the_walls_is_found(make_paths, make_gain):
     assert found >= 8
 
 
-def test_false_alarms_keep_to_the_rate(make_paths):
-    config = ReceiverConfig(estimator="waveform", false_alarm_rate=0.5)
+@pytest.mark.parametrize("alternation", [False, True])
+def test_false_alarms_keep_to_the_rate(make_paths, alternation):
+    config = ReceiverConfig(estimator="waveform", false_alarm_rate=0.5, alternation=alternation)
     times = 300
     count = np.sum([len(m) for m, _ in repeat(make_paths([]), config, times)])
     # Poisson of 150: three standard deviations are 37; the search over a grid loses up to a tenth
@@ -152,9 +153,10 @@ def test_false_alarms_keep_to_the_rate(make_paths):
 
 def test_threshold_follows_from_the_rate():
     for rate in (1e-4, 0.1, 1.0):
-        config = ReceiverConfig(false_alarm_rate=rate)
-        threshold = detection_threshold(RADIO, config)
-        assert expected_false_alarms(threshold, RADIO, 80e-9) == pytest.approx(rate, rel=1e-6)
+        for alternation, panels in ((False, 1), (True, 1), (True, 3)):
+            config = ReceiverConfig(false_alarm_rate=rate, alternation=alternation, panels=panels)
+            a_capture = expected_false_alarms(detection_threshold(RADIO, config), RADIO, 80e-9)
+            assert a_capture * config.num_captures == pytest.approx(rate, rel=1e-6)
     assert detection_threshold(RADIO, ReceiverConfig()) == pytest.approx(10.0)
     single = RadioConfig(array=RxArray(rows=1, cols=1))
     # one antenna searches delays alone: crossings of a Rayleigh process, by Rice's formula

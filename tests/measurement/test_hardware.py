@@ -26,7 +26,7 @@ from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
-RADIO, RECEIVER = RadioConfig(), ReceiverConfig(estimator="waveform")
+RADIO, RECEIVER = RadioConfig(), ReceiverConfig(estimator="waveform", alternation=False)
 SENT = SentSignal(1.0, 0.0)
 
 

@@ -7,7 +7,7 @@ from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.model import Measurement, PathKind, RadioConfig
 
 RADIO = RadioConfig()
-WAVEFORM = ReceiverConfig(estimator="waveform", false_alarm_rate=1e-3)
+WAVEFORM = ReceiverConfig(estimator="waveform", false_alarm_rate=1e-3, alternation=False)
 
 
 def room(make_paths, make_gain, moved):

@@ -12,7 +12,7 @@ from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_va
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()
-WAVEFORM = ReceiverConfig(estimator="waveform")
+WAVEFORM = ReceiverConfig(estimator="waveform", alternation=False)
 
 
 @pytest.mark.slow

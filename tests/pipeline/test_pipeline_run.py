@@ -9,8 +9,11 @@ import pytest
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import cycle, load_spec
-from rislam_rt.pipeline.run import check_run
+from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.recordings.replay import Recorder
+from rislam_rt.pipeline.run import check_run, prepare_setup, run_scheme
 from rislam_rt.pipeline.scheme_simulation import without_panel
+from rislam_rt.progress import tell_nobody
 
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 
@@ -111,6 +114,28 @@ def test_what_does_not_fit_is_refused(room, override, field):
 def test_a_scheme_with_a_panel_needs_one(room, short_spec):
     with pytest.raises(ConfigError, match="needs a panel"):
         check_run(replace(room, ris=None), short_spec)
+
+
+def test_codes_alternate_where_there_is_a_panel(room, run_short):
+    """A component says whether it ran over the panel under codes that alternate, and of held ones nobody knows."""
+
+    def told(name, scene, *keys):
+        spec = load_spec(PIPELINE, ["channel=image_source", "cycles=2", f'schemes=["{name}"]', *keys])
+        recorder, setup = Recorder(ESTIMATORS["slam"]), prepare_setup(scene, spec, rng=np.random.default_rng(7))
+        run_scheme(name, setup, spec, tell_nobody, recorder.estimator)
+        return {one.from_panel is not None for one in recorder.inputs.measurements}
+
+    assert told("random", room) == {True}
+    assert told("random", room, "receiver.alternation=false") == {False}
+    assert told("no_ris", room) == told("no_ris", replace(room, ris=None)) == {False}
+
+
+def test_a_panel_without_half_a_turn_holds_its_code(room):
+    odd = ["room.panel_levels=3"]
+    with pytest.raises(ConfigError, match=r"ris\.levels: 3 received; .* or receiver\.alternation = false"):
+        check_run(room, load_spec(PIPELINE, odd))
+    check_run(room, load_spec(PIPELINE, [*odd, "receiver.alternation=false"]))
+    check_run(room, load_spec(PIPELINE, [*odd, 'schemes=["no_ris"]']))
 
 
 def test_room_without_panel_runs(room, run_short):

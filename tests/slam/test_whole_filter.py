@@ -161,7 +161,7 @@ def test_order_of_measurements_does_not_matter(normal: tuple[Heard, Course]) -> 
     rng = np.random.default_rng(9)
     cycles = 50
     orders = [rng.permutation(len(m)) for m in heard.measurements]
-    names = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std")
+    names = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std", "from_panel")
     mixed = [
         Measurement(*(getattr(m, name)[order] for name in names))
         for m, order in zip(heard.measurements, orders, strict=True)

@@ -164,7 +164,8 @@ def replay(
 ) -> Answers:
     """Run an estimator on the recorded inputs of a run, cycle by cycle, and return its estimates; no paths are traced.
 
-    Phase codes are those of the recording, even if the estimator's belief would have led to others.
+    Phase codes are those of the recording, even if the estimator's belief would have led to others. Where no component
+    says whether it ran over a panel, the codes did not alternate, whatever `config` says.
 
     Parameters
     ----------
@@ -185,7 +186,7 @@ def replay(
     for key, value in (changes or {}).items():
         content = put_dotted(content, key, value)
     spec = build_spec(Table(Path("settings of the replay"), content, ()), PipelineSpec, build_settings)
-    settings = tell_settings(build_settings(spec), spec.told)
+    settings = tell_settings(build_settings(spec, _alternated_panels(inputs)), spec.told)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[scheme].estimator])
     run = recorder.estimator
     own = run.config(settings)
@@ -195,3 +196,10 @@ def replay(
         state, _ = run.step(state, measurement, code, float(dt), float(heading), own, rng=rng)
         run.estimate(state, own)
     return recorder.answers
+
+
+def _alternated_panels(inputs: Inputs) -> int:
+    """Number of RIS panels that the receiver of a recording told apart by alternated codes; 0 where it did not."""
+    if all(one.from_panel is None for one in inputs.measurements):
+        return 0
+    return 1 if inputs.panel is None else len(inputs.panel.panels)

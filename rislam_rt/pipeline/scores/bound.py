@@ -64,7 +64,7 @@ class BoundProblem(NamedTuple):
 def bound_problem(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]) -> BoundProblem:
     """Linearise the detectable paths of a scheme's run for the recursion of its posterior bound; see `scheme_bound`."""
     spec = PipelineSpec.model_validate(dict(config))
-    settings = build_settings(spec)
+    settings = build_settings(spec, len(scene.panels) if SCHEMES[scheme].panel else 0)
     estimator, walls = ESTIMATORS[SCHEMES[scheme].estimator], build_walls(scene)
     sensor = build_sensor(settings.radio, settings.receiver)
     axes = 3 if settings.slam.height == "estimated" else 2

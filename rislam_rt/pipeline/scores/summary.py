@@ -65,7 +65,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     squares = nees_per_dof(scheme, truth)
     nees = None if squares is None else float(np.mean(squares))
     largest = float(errors.max())
-    settings = build_settings(PipelineSpec.model_validate(dict(result.config)))
+    panels = len(scene.panels) if scheme.levels else 0
+    settings = build_settings(PipelineSpec.model_validate(dict(result.config)), panels)
     use_vt = uses_wall_returns(scheme.scheme, settings)
     score = association_score(*component_labels(scene, result.paths, scheme, use_vt=use_vt))
     audible = seconds_audible(scene, result.paths, settings, scheme.gain)

@@ -314,16 +314,32 @@ class Settings(NamedTuple):
     """Impairments of the receiver's front end."""
 
 
-def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
-    """Convert a pipeline's specification to settings in SI units, for a room with that number of RIS panels.
+def build_receiver(section: ReceiverSection, panels: int = 1, **more: float) -> ReceiverConfig:
+    """Receiver configuration from a table `[receiver]`, for a room with that number of RIS panels; `more` is what the
+    table does not hold.
+
+    Where there is no panel there is nothing to alternate: one capture a cycle, whatever the table says.
 
     Raises
     ------
     ConfigError
         A value is out of range.
     """
-    own = {"slot": spec.budget.measure_s, "panels": panels}
-    radio, receiver = build_radio(spec.radio), ReceiverConfig(**spec.receiver.model_dump() | own)
+    values = section.model_dump() | more
+    values["alternation"] = values["alternation"] and panels > 0
+    return ReceiverConfig(**values | {"panels": max(panels, 1)})
+
+
+def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
+    """Convert a pipeline's specification to settings in SI units, for a room with that number of RIS panels; 0 for a
+    scheme that uses none.
+
+    Raises
+    ------
+    ConfigError
+        A value is out of range.
+    """
+    radio, receiver = build_radio(spec.radio), build_receiver(spec.receiver, panels, slot=spec.budget.measure_s)
     return Settings(
         radio,
         receiver,

@@ -12,11 +12,12 @@ from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.pipeline.specification.spec import build_receiver
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
-from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec, build_receiver
+from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec
 from rislam_rt.studies.classifier.training_examples import Examples, gather_walk, join
 from rislam_rt.studies.classifier.walks import random_walk
 
@@ -125,7 +126,8 @@ def gather_motion(
 ) -> Examples:  # fmt: skip
     """Examples of the classifier along a motion, once for each code policy; once in a room without a RIS panel."""
     paths = build_channel(spec.channel, replace(scene, agent=motion), radio, depth).paths(motion)
-    receiver, panel = build_receiver(spec.receiver), None if scene.ris is None else scene.ris.spec
+    receiver = build_receiver(spec.receiver, len(scene.panels))
+    panel = None if scene.ris is None else scene.ris.spec
     parts = []
     for policy in policies if panel is not None else [-1]:
         lit = set_codes(paths, panel, POLICIES[policy], rng=rng)

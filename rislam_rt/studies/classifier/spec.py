@@ -4,7 +4,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.pipeline.specification.radio import RadioSection
 from rislam_rt.pipeline.specification.section import Count, Positive, Section
 from rislam_rt.pipeline.specification.spec import ReceiverSection
@@ -15,17 +14,6 @@ LEARNT_FIRST = 1_000_000
 """Number of the first drawn room that may be in the training set; those below it never are."""
 
 Share = Annotated[float, Field(ge=0.0, le=100.0)]
-
-
-def build_receiver(section: ReceiverSection) -> ReceiverConfig:
-    """Receiver configuration from the table `[receiver]` of a classifier's training.
-
-    Raises
-    ------
-    ConfigError
-        A value is out of range.
-    """
-    return ReceiverConfig(**section.model_dump())
 
 
 class TestedRoom(ComparedRoomSection):

@@ -35,7 +35,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     prepare_channel(spec.channel)
     scene = load_scene(room_beside(Path(settings["beside"]), str(settings["scene"])))
     setup = prepare_setup(scene, spec, rng=np.random.default_rng(seed))
-    made, motion = build_settings(spec), setup.scene.agent
+    made, motion = build_settings(spec, len(setup.scene.panels)), setup.scene.agent
     build = np.random.default_rng(setup.seeds.hardware)
     front_end = prepare_front_end(setup.paths, motion, setup.body, made, rng=build)
     codes = panel_codes(setup.scene, setup.paths, "focused", rng=np.random.default_rng(setup.seeds.design))

@@ -1,6 +1,7 @@
 """Measurements of one's own: the same answer as in the run they came from, and a clear line for a wrong unit."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +10,16 @@ import pytest
 import rislam_rt
 from rislam_rt.cli.slam import _new_folder, command
 from rislam_rt.errors import ConfigError
+from rislam_rt.measurement import ReceiverConfig, build_sensor
+from rislam_rt.model import SensorModel
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.own_measurements import inputs_of, localise, read_inputs
+from rislam_rt.pipeline.recordings.replay import replay
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene.write import tum_bytes
-from rislam_rt.shipped import find_pipeline
+from rislam_rt.shipped import find_pipeline, find_room
 from rislam_rt.slam import StartPrior
 from rislam_rt.studies.unseen import Inputs, Recorder
 
@@ -122,6 +126,31 @@ def test_a_cycle_in_which_nothing_is_heard_counts(table: Table, spec: PipelineSp
     assert len(inputs.measurements) == CYCLES + 1
     assert len(inputs.measurements[-1]) == 0
     assert len(localise(inputs, spec, rng=np.random.default_rng(0)).estimates) == CYCLES + 1
+
+
+def test_the_filter_reckons_with_as_many_captures_as_the_recording_had(
+    recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec
+) -> None:
+    """Each capture has false components of its own: the codes' sum, and a difference for every panel told apart."""
+    inputs, panels = recorded[0], rislam_rt.load_scene(find_room("two_panels")).ris.spec
+    told = tuple(replace(one, from_panel=np.zeros(len(one))) for one in inputs.measurements)
+
+    def rate(given: Inputs) -> float:
+        begun: list[SensorModel] = []
+        deaf = ESTIMATORS["slam"]._replace(
+            init=lambda start, body, panel, sensor, config, *, rng: begun.append(sensor),
+            step=lambda *_, **__: (None, None),
+            estimate=lambda *_: None,
+        )
+        replay(given, spec.model_dump(), "random", estimator=deaf, rng=np.random.default_rng(0))
+        return begun[0].false_alarms
+
+    assert spec.receiver.alternation
+    one = rate(inputs)
+    assert one == build_sensor(build_radio(spec.radio), ReceiverConfig(alternation=False)).false_alarms
+    assert rate(inputs._replace(panel=panels)) == one
+    assert rate(inputs._replace(measurements=told)) == pytest.approx(2.0 * one)
+    assert rate(inputs._replace(measurements=told, panel=panels)) == pytest.approx(3.0 * one)
 
 
 def test_without_a_compass_the_heading_has_to_be_estimated(table: Table, spec: PipelineSpec) -> None:

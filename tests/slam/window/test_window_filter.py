@@ -19,7 +19,7 @@ from rislam_rt.slam.window.smoother import window_gaussian
 
 ROOM, CYCLES = Path(__file__).parents[3] / "scenes" / "paper_room", 70
 CONFIG = SlamConfig(filter="window", use_vt=True)
-RECEIVER = ReceiverConfig("bound")
+RECEIVER = ReceiverConfig("bound", alternation=False)
 
 
 @pytest.fixture(scope="module")

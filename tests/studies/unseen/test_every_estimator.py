@@ -48,13 +48,13 @@ CASES = [
     Case("default", "random", {}, 266, 0.05, 20.0, 0.55),
     Case("landmarks", "random", LANDMARKS, 103, 0.1, 10.0, 1.0),
     Case("landmarks", "random", LANDMARKS, 266, 0.2, 7.0, 0.6),
-    Case("nested", "random", NESTED, 233, 0.2, 7.0, 1.6),
-    Case("bp_slam", "bp_slam", {}, 233, 0.5, 1.5, 0.7),
+    Case("nested", "random", NESTED, 233, 0.12, 4.5, 0.65),
+    Case("bp_slam", "bp_slam", {}, 233, 0.5, 1.5, 1.5),
     Case("bp_slam", "bp_slam", {}, 266, 0.8, 6.0, 2.5),
-    Case("channel_slam", "channel_slam", {}, 233, 0.5, 1.5, 2.7),
+    Case("channel_slam", "channel_slam", {}, 233, 0.5, 1.5, 1.7),
     Case("channel_slam", "channel_slam", {}, 266, 0.8, 6.0, 1.9),
     Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 103, 0.015, 20.0, 1.0),
-    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 233, 0.015, 6.0, 0.55),
+    Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 233, 0.006, 3.0, 0.55),
     Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 266, 0.015, 9.0, 0.75),
 ]
 
