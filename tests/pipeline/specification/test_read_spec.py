@@ -108,6 +108,7 @@ def test_bad_file_is_one_line_with_file_and_field(write, text, place, hint):
     [
         ("schemes=optimized,random", """give a list, in quotes: 'schemes=["optimized", "random"]'"""),
         ("schemes=[optimized]", """give a list, in quotes: 'schemes=["optimized"]'"""),
+        (r"schemes=own\filter", r"""give a list, in quotes: 'schemes=["own\\filter"]'"""),
         ("radio.carrier_ghz=10e9", "give at most 3000 GHz"),
         ("start.position_std_m=-1", "give at least 0 m"),
         ("cycles=many", "give a whole number"),

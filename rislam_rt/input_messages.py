@@ -1,7 +1,9 @@
-"""What is wanted in place of a bad value in a file or on the command line, said as what to give."""
+"""Messages about bad input: what to give in place of a bad value in a file or on the command line."""
 
 from collections.abc import Mapping
 from typing import Any
+
+from rislam_rt.toml import toml_value
 
 UNITS = {
     "_m_s2": "m/s^2",
@@ -43,9 +45,11 @@ def unit_of(name: str) -> str:
     return next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
 
 
-def wanted(item: Mapping[str, Any], typed: bool = False) -> str:
-    """What to give instead, of a fault of pydantic's: `give at most 3000 GHz`; `typed` on the command line, a list
-    needs quotes."""
+def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
+    """What to give in place of the bad value of a pydantic error `item`: `give at most 3000 GHz`.
+
+    `typed` is whether the value came from the command line, where a list needs quotes.
+    """
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     names = [part for part in item["loc"] if isinstance(part, str)]
     name = names[-1] if names else ""
@@ -68,5 +72,5 @@ def _toml(word: str) -> str:
     try:
         float(word)
     except ValueError:
-        return f'"{word}"'
+        return toml_value(word)
     return word
