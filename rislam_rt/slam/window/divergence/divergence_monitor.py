@@ -18,6 +18,7 @@ from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
+from rislam_rt.slam.window.smoother.marginals import pose_covariance
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.tracks import CYCLE
@@ -104,7 +105,7 @@ def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> e
     """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
-    found = egomotion.rates(log, heading, step, baseline)
+    found = egomotion.rates(log, heading, window_gaussian.poses(window)[:, :3], step, baseline)
     if len(found.rate) < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
@@ -113,23 +114,42 @@ def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> e
     return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 
-def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
+def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float) -> float:
     """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
-    from the rates at which path lengths changed.
+    from the rates at which path lengths changed."""
+    found = _latest_rates(window, log, heading, baseline)
+    if found is None:
+        return 0.0
+    return egomotion.weigh(found, *_mean_velocity(window, found.cycles)).log_odds - CONSTANTS.log_rare
 
-    `lively` [m/s^2] is the standard deviation of its acceleration.
-    """
-    if len(window.step) < PAST:
+
+def log_agreement(before: Window, after: Window, log: Log, heading: Floats, baseline: float) -> float:
+    """Log likelihood ratio of the rates at which path lengths changed under one estimate of the motion `after` a birth
+    against that `before` it."""
+    found = _latest_rates(before, log, heading, baseline)
+    if found is None:
         return 0.0
-    passed = float(window.step[-PAST:].sum())
-    time = passed if passed > 0.0 else PAST * CYCLE
-    found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST, baseline)
-    if len(found.rate) < egomotion.FEWEST:
-        return 0.0
-    place = window_gaussian.poses(window)[-PAST - 1 :, :3]
-    # what a clock that stands still does not allow for was not foreseen
-    std = passed / time * np.sqrt(np.diag(window_gaussian.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
-    return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - CONSTANTS.log_rare
+    one, other = (egomotion.log_evidence(found, *_mean_velocity(window, found.cycles)) for window in (before, after))
+    return other - one
+
+
+def _latest_rates(window, log, heading, baseline):
+    cycles = min(PAST, len(window.step))
+    passed = float(window.step[len(window.step) - cycles:].sum())
+    if cycles < egomotion.MEASURED - 1 or passed <= 0.0:
+        return None
+    place = window_gaussian.poses(window)[-cycles - 1 :, :3]
+    found = egomotion.rates(log, heading[-cycles - 1 :], place, passed / cycles, baseline)
+    return found if len(found.rate) >= egomotion.FEWEST else None
+
+
+def _mean_velocity(window: Window, cycles: int) -> tuple[Floats, Floats]:
+    """Mean velocity (3,) [m/s] over the window's last steps, and its standard deviations (3,)."""
+    time, ends = float(window.step[len(window.step) - cycles:].sum()), [-1, -1 - cycles]
+    place = window_gaussian.poses(window)[:, :3]
+    wide = np.array([pose_covariance(window, axis)[np.ix_(ends, ends)] for axis in range(3)])
+    variance = np.trace(wide, axis1=1, axis2=2) - 2.0 * wide[:, 0, 1]
+    return (place[-1] - place[-1 - cycles]) / time, np.sqrt(np.maximum(variance, 0.0)) / time + 1e-6
 
 
 PAST = 10

@@ -22,8 +22,7 @@ def check_motion(state: WindowState) -> tuple[WindowState, bool]:
     baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
     if len(state.landmarks.ident):
         if state.cycle % divergence_monitor.PAST == 0:
-            lively = float(np.sqrt(motion.expected_variance(state.level[0])))
-            odds = divergence_monitor.log_other_motion(state.window, state.log, state.heading, baseline, lively)
+            odds = divergence_monitor.log_other_motion(state.window, state.log, state.heading, baseline)
             state = state._replace(
                 lost_log_odds=float(np.clip(state.lost_log_odds + odds, CONSTANTS.log_lost, -CONSTANTS.log_lost))
             )
