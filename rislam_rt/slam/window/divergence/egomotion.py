@@ -20,7 +20,7 @@ from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for."""
-FEWEST = 5
+FEWEST = 3
 """Tracks with a rate of length from which on the motion is checked."""
 
 
