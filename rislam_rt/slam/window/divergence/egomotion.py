@@ -35,6 +35,8 @@ class Rates(NamedTuple):
     """(T,) [m^2/s^2] of the rate."""
     blur: Floats
     """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
+    turning: float = 0.0
+    """[m/s] speed of Tx and Rx against each other, as the body turns."""
     cycles: int = 0
     """Number of steps over which the rates were measured."""
 
@@ -66,7 +68,7 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     known = log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     if not len(rows):
-        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0), len(heading) - 1)
+        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0), 0.0, len(heading) - 1)
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
     names, which = unique_forms(every)
@@ -91,12 +93,14 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
     length = log.seen[rows, 0] - np.vecdot(toward[which], place[since] - place[-1])
     sy, sxy = total(weight * length), total(weight * x * length)
+    span = step * max(len(place) - 1, 1)
     rate, variance = (s * sxy - sx * sy) / spread, CONSTANTS.crowd * s / spread
-    rate += toward @ ((place[-1] - place[0]) / (step * max(len(place) - 1, 1)))
+    rate += toward @ ((place[-1] - place[0]) / span)
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
-    return Rates(toward[enough], rate[enough], variance[enough], blur[enough], len(heading) - 1)
+    turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
+    return Rates(toward[enough], rate[enough], variance[enough], blur[enough], turning, len(heading) - 1)
 
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
@@ -178,10 +182,13 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
-    close = 0.5 * np.exp(-0.5 * left**2 / variance) / np.sqrt(2.0 * np.pi * variance)
+    # every other one of them over more than one wall, where a turn of the body changes the length as well
+    either_way = np.stack([variance, variance + found.turning**2])
+    likely = 0.25 * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
+    close = likely.sum(axis=0)
     kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
     either = close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk))
-    return np.log(either), close / either / variance
+    return np.log(either), (likely / either_way).sum(axis=0) / either
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
