@@ -1,5 +1,4 @@
-"""Divergence monitor: a hidden Markov chain of tracked and lost, jumps in position, and a check of the start against
-the tracks.
+"""Divergence monitor: a hidden Markov chain of tracked and lost, jumps in position, and corrections of the start.
 
 While the agent is tracked, the map predicts what is heard; once it is lost, all is clutter. The log likelihood ratio of
 a cycle (`CycleAssociation.score`) moves the log odds of a hidden chain, which passes from tracked to lost at a rate of
@@ -15,13 +14,10 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
-from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
-from rislam_rt.slam.window.smoother.marginals import pose_covariance
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
-from rislam_rt.slam.window.tracks import CYCLE
 
 CELL = 0.01
 """Distance [m] within which two positions are one: as far as a cycle's returns tell."""
@@ -99,61 +95,6 @@ def after_jump(window: Window, by: Floats) -> Window:
     turn = prior.hessian @ inverse(window.prior.hessian)
     noise = turn @ window.noise @ turn.T
     return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
-
-
-def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
-    """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
-    passes = window.step[window.step > 0.0]
-    step = float(passes.mean()) if len(passes) else CYCLE
-    found = egomotion.rates(log, heading, window_gaussian.poses(window)[:, :3], step, baseline)
-    if len(found.rate) < egomotion.FEWEST:
-        return None
-    share = window.step.mean() / step
-    std = np.sqrt(np.diag(window.covariance)[3:6])
-    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
-    return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
-
-
-def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float) -> float:
-    """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
-    from the rates at which path lengths changed."""
-    found = _latest_rates(window, log, heading, baseline)
-    if found is None:
-        return 0.0
-    return egomotion.weigh(found, *_mean_velocity(window, found.cycles)).log_odds - CONSTANTS.log_rare
-
-
-def log_agreement(before: Window, after: Window, log: Log, heading: Floats, baseline: float) -> float:
-    """Log likelihood ratio of the rates at which path lengths changed under one estimate of the motion `after` a birth
-    against that `before` it."""
-    found = _latest_rates(before, log, heading, baseline)
-    if found is None:
-        return 0.0
-    one, other = (egomotion.log_evidence(found, *_mean_velocity(window, found.cycles)) for window in (before, after))
-    return other - one
-
-
-def _latest_rates(window, log, heading, baseline):
-    cycles = min(PAST, len(window.step))
-    passed = float(window.step[len(window.step) - cycles:].sum())
-    if cycles < egomotion.MEASURED - 1 or passed <= 0.0:
-        return None
-    place = window_gaussian.poses(window)[-cycles - 1 :, :3]
-    found = egomotion.rates(log, heading[-cycles - 1 :], place, passed / cycles, baseline)
-    return found if len(found.rate) >= egomotion.FEWEST else None
-
-
-def _mean_velocity(window: Window, cycles: int) -> tuple[Floats, Floats]:
-    """Mean velocity (3,) [m/s] over the window's last steps, and its standard deviations (3,)."""
-    time, ends = float(window.step[len(window.step) - cycles:].sum()), [-1, -1 - cycles]
-    place = window_gaussian.poses(window)[:, :3]
-    wide = np.array([pose_covariance(window, axis)[np.ix_(ends, ends)] for axis in range(3)])
-    variance = np.trace(wide, axis1=1, axis2=2) - 2.0 * wide[:, 0, 1]
-    return (place[-1] - place[-1 - cycles]) / time, np.sqrt(np.maximum(variance, 0.0)) / time + 1e-6
-
-
-PAST = 10
-"""Cycles over which the estimated motion is checked against the rates of path lengths."""
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:

@@ -37,8 +37,6 @@ class Rates(NamedTuple):
     """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
-    cycles: int = 0
-    """Number of steps over which the rates were measured."""
 
 
 class StartCheck(NamedTuple):
@@ -68,7 +66,7 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     known = log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     if not len(rows):
-        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0), 0.0, len(heading) - 1)
+        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0))
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
     names, which = unique_forms(every)
@@ -100,7 +98,7 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
     turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
-    return Rates(toward[enough], rate[enough], variance[enough], blur[enough], turning, len(heading) - 1)
+    return Rates(toward[enough], rate[enough], variance[enough], blur[enough], turning)
 
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
