@@ -2,7 +2,7 @@
 
 Every track tells of the velocity, whatever its cause (see `egomotion`): many tracks that agree on another velocity than
 the estimated one speak against the map. So they are asked before each birth, which a wrong cause would let turn the
-estimate, and every `PAST` cycles.
+estimate, and, more leniently, every `PAST` cycles, where to be wrong costs the map.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
@@ -42,11 +42,13 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
 
 def log_other_motion(state: WindowState) -> float:
     """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
-    from the rates at which path lengths changed; 0 where too few are known."""
+    give or take a manoeuvre, from the rates at which path lengths changed; 0 where too few are known."""
     found = _latest_rates(state)
     if found is None:
         return 0.0
-    return egomotion.weigh(found, *_mean_velocity(state.window)).log_odds - CONSTANTS.log_rare
+    lively = np.sqrt(motion.expected_variance(state.level[0])) * _latest(state.window)[1]
+    std = np.sqrt(np.diag(window_gaussian.now(state.window)[1])[3:6] + lively**2) + 1e-6
+    return egomotion.weigh(found, _mean_velocity(state.window)[0], std).log_odds - CONSTANTS.log_rare
 
 
 def log_agreement(state: WindowState, after: Window) -> float:
