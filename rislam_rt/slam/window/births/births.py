@@ -14,6 +14,7 @@ from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation
+from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.measurement_prediction import UnresolvedClusters
@@ -223,8 +224,8 @@ def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats
 def _enter(
     context: WindowState, at: Integers, decision: TrackDecision, histories: TrackSummary, row: int
 ) -> tuple[WindowState, bool]:
-    """Add a new feature with its track's history to the map and solve the window again; if they do not fit, return the
-    state as it was, and False."""
+    """Add a new feature with its track's history to the map and solve the window again; if they do not fit, or the
+    other tracks speak against the motion that follows, return the state as it was, and False."""
     new = len(context.landmarks.ident)
     holds = decision.holds._replace(feature=np.full(len(decision.holds.std), new))
     window = window_gaussian.add_feature(context.window, decision.place, holds)
@@ -241,6 +242,8 @@ def _enter(
         return context, False
     fresh = np.isin(left.row, at)
     if float(np.mean(np.vecdot(left.left[fresh], left.left[fresh]))) > 3.0 * CONSTANTS.fit:
+        return context, False
+    if not is_clear(decision, motion_agreement.log_agreement(context, grown.window)):
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))

@@ -229,14 +229,17 @@ COST_MEAN, COST_STD = 3.56, 2.17
 with 3 degrees of freedom."""
 
 
-def is_clear(decision: TrackDecision) -> bool:
+def is_clear(decision: TrackDecision, log_ratio: float = 0.0) -> bool:
     """Whether a decision is clear enough for its feature to enter the map: likely, a fit, and located well enough to be
-    linearised."""
+    linearised; `log_ratio` is a log likelihood ratio of further evidence for it."""
     if decision.kind < 0 or decision.kind == TWO_WALLS:
         return False
     holds = decision.holds
     information = np.linalg.inv(decision.covariance) + (holds.axis.T / holds.std**2) @ holds.axis
     worst = np.sqrt(1.0 / np.linalg.eigvalsh(information)[0])
+    odds = decision.probability / max(1.0 - decision.probability, 1e-12)
     return bool(
-        decision.probability > CONSTANTS.born and decision.misfit < CONSTANTS.fit and worst < 0.1 * decision.length
+        np.log(odds) + log_ratio > CONSTANTS.log_born
+        and decision.misfit < CONSTANTS.fit
+        and worst < 0.1 * decision.length
     )

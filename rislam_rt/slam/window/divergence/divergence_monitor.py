@@ -1,5 +1,4 @@
-"""Divergence monitor: a hidden Markov chain of tracked and lost, jumps in position, and a check of the start against
-the tracks.
+"""Divergence monitor: a hidden Markov chain of tracked and lost, jumps in position, and corrections of the start.
 
 While the agent is tracked, the map predicts what is heard; once it is lost, all is clutter. The log likelihood ratio of
 a cycle (`CycleAssociation.score`) moves the log odds of a hidden chain, which passes from tracked to lost at a rate of
@@ -15,12 +14,10 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
-from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
-from rislam_rt.slam.window.tracks import CYCLE
 
 CELL = 0.01
 """Distance [m] within which two positions are one: as far as a cycle's returns tell."""
@@ -98,42 +95,6 @@ def after_jump(window: Window, by: Floats) -> Window:
     turn = prior.hessian @ inverse(window.prior.hessian)
     noise = turn @ window.noise @ turn.T
     return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
-
-
-def check_start(window: Window, log: Log, heading: Floats, baseline: float) -> egomotion.StartCheck | None:
-    """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
-    passes = window.step[window.step > 0.0]
-    step = float(passes.mean()) if len(passes) else CYCLE
-    found = egomotion.rates(log, heading, step, baseline)
-    if len(found.rate) < egomotion.FEWEST:
-        return None
-    share = window.step.mean() / step
-    std = np.sqrt(np.diag(window.covariance)[3:6])
-    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
-    return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
-
-
-def log_other_motion(window: Window, log: Log, heading: Floats, baseline: float, lively: float) -> float:
-    """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
-    from the rates at which path lengths changed.
-
-    `lively` [m/s^2] is the standard deviation of its acceleration.
-    """
-    if len(window.step) < PAST:
-        return 0.0
-    passed = float(window.step[-PAST:].sum())
-    time = passed if passed > 0.0 else PAST * CYCLE
-    found = egomotion.rates(log, heading[-PAST - 1 :], time / PAST, baseline)
-    if len(found.rate) < egomotion.FEWEST:
-        return 0.0
-    place = window_gaussian.poses(window)[-PAST - 1 :, :3]
-    # what a clock that stands still does not allow for was not foreseen
-    std = passed / time * np.sqrt(np.diag(window_gaussian.now(window)[1])[3:6] + (lively * time) ** 2) + 1e-6
-    return egomotion.weigh(found, (place[-1] - place[0]) / time, std).log_odds - CONSTANTS.log_rare
-
-
-PAST = 10
-"""Cycles over which the estimated motion is checked against the rates of path lengths."""
 
 
 def with_velocity(window: Window, velocity: Floats, std: float) -> Window:

@@ -20,7 +20,7 @@ from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for."""
-FEWEST = 5
+FEWEST = 3
 """Tracks with a rate of length from which on the motion is checked."""
 
 
@@ -35,6 +35,8 @@ class Rates(NamedTuple):
     """(T,) [m^2/s^2] of the rate."""
     blur: Floats
     """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
+    turning: float = 0.0
+    """[m/s] speed of Tx and Rx against each other, as the body turns."""
 
 
 class StartCheck(NamedTuple):
@@ -53,11 +55,12 @@ class StartCheck(NamedTuple):
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
 
-def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
+def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float) -> Rates:
     """Rates at which the lengths of tracks and explained paths change, by weighted line fits over the log's last K
     cycles of `step` [s].
 
-    `heading` (K,) [rad] of these; `baseline` [m] between Tx and Rx.
+    `heading` (K,) [rad] and estimated positions `place` (K, 3) [m] of these; `baseline` [m] between Tx and Rx. The line
+    is fitted to what the positions leave of the lengths' change, so that a turn or an acceleration bends none.
     """
     first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
     known = log.explained
@@ -75,22 +78,27 @@ def rates(log: Log, heading: Floats, step: float, baseline: float) -> Rates:
         return np.asarray(np.bincount(which, value, count), dtype=np.float64)
 
     s, sx, sxx = total(weight), total(weight * x), total(weight * x**2)
-    sy, sxy = total(weight * log.seen[rows, 0]), total(weight * x * log.seen[rows, 0])
     spread = s * sxx - sx**2
     enough = (np.bincount(which, minlength=count) >= MEASURED) & (spread > 1e-9 * s * s * step**2)
     spread = np.where(enough, spread, 1.0)
-    angle = heading[log.cycle[rows] - first]
+    since = log.cycle[rows] - first
+    angle = heading[since]
     cos, sin = np.cos(angle), np.sin(angle)
     flat = log.seen[rows, 1:]
     toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
     toward /= np.bincount(which, minlength=count)[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
+    length = log.seen[rows, 0] - np.vecdot(toward[which], place[since] - place[-1])
+    sy, sxy = total(weight * length), total(weight * x * length)
+    span = step * max(len(place) - 1, 1)
     rate, variance = (s * sxy - sx * sy) / spread, CONSTANTS.crowd * s / spread
+    rate += toward @ ((place[-1] - place[0]) / span)
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
-    blur = 2.0 * baseline * s / np.maximum(sy, 1e-9)
-    return Rates(toward[enough], rate[enough], variance[enough], blur[enough])
+    blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
+    turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
+    return Rates(toward[enough], rate[enough], variance[enough], blur[enough], turning)
 
 
 def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
@@ -117,6 +125,11 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
         max(float(speed.max()), float(compass.max())) - right + CONSTANTS.log_rare, is_compass, velocity,
         float(np.sqrt(np.trace(variance) / 2.0)), float((turn + np.pi) % (2.0 * np.pi) - np.pi),
     )  # fmt: skip
+
+
+def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
+    """Log evidence of the rates of path lengths under a velocity `told` (3,) [m/s] within `std` (3,)."""
+    return float(_find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2)).evidence.max())
 
 
 def agreed_velocity(found: Rates) -> Floats:
@@ -167,10 +180,13 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
-    close = 0.5 * np.exp(-0.5 * left**2 / variance) / np.sqrt(2.0 * np.pi * variance)
+    # every other one of them over more than one wall, where a turn of the body changes the length as well
+    either_way = np.stack([variance, variance + found.turning**2])
+    likely = 0.25 * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
+    close = likely.sum(axis=0)
     kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
     either = close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk))
-    return np.log(either), close / either / variance
+    return np.log(either), (likely / either_way).sum(axis=0) / either
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.divergence import divergence_monitor, motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
@@ -17,20 +17,18 @@ from rislam_rt.slam.window.state import WindowState
 def check_motion(state: WindowState) -> tuple[WindowState, bool]:
     """Check the agent's motion against the rates of path lengths: before any birth a wrong start is corrected, later
     the odds of being lost are updated; also returns whether the start was corrected."""
-    if len(state.level) > 2 or len(state.heading) != state.window.num_poses:
+    if not motion_agreement.is_checked(state):
         return state, False
-    baseline = float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
     if len(state.landmarks.ident):
-        if state.cycle % divergence_monitor.PAST == 0:
-            lively = float(np.sqrt(motion.expected_variance(state.level[0])))
-            odds = divergence_monitor.log_other_motion(state.window, state.log, state.heading, baseline, lively)
+        if state.cycle % motion_agreement.PAST == 0:
+            odds = motion_agreement.log_other_motion(state)
             state = state._replace(
                 lost_log_odds=float(np.clip(state.lost_log_odds + odds, CONSTANTS.log_lost, -CONSTANTS.log_lost))
             )
         return state, False
-    if state.start_was_wrong or len(state.heading) > divergence_monitor.PAST + 1:  # by then the speed may be another
+    if state.start_was_wrong or len(state.heading) > motion_agreement.PAST + 1:  # by then the speed may be another
         return state, False
-    told = divergence_monitor.check_start(state.window, state.log, state.heading, baseline)
+    told = motion_agreement.check_start(state)
     if told is None or told.log_odds <= 0.0:
         return state, False
     state = state._replace(start_was_wrong=True)

@@ -1,0 +1,93 @@
+"""Agreement of the estimated motion with the rates at which path lengths change: a check of the motion without the map.
+
+Every track tells of the velocity, whatever its cause (see `egomotion`): many tracks that agree on another velocity than
+the estimated one speak against the map. So they are asked before each birth, which a wrong cause would let turn the
+estimate, and, more leniently, every `PAST` cycles, where to be wrong costs the map.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.divergence import egomotion
+from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.marginals import pose_covariance
+from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.tracks import CYCLE
+
+PAST = 10
+"""Cycles over which the estimated motion is checked against the rates of path lengths."""
+
+
+def is_checked(state: WindowState) -> bool:
+    """Whether the motion can be checked: with a compass, whose offset is not estimated, told of in every cycle."""
+    return len(state.level) <= 2 and len(state.heading) == state.window.num_poses
+
+
+def check_start(state: WindowState) -> egomotion.StartCheck | None:
+    """Check of the start's velocity and compass against the first tracks; None while there are too few of them."""
+    window = state.window
+    passes = window.step[window.step > 0.0]
+    step = float(passes.mean()) if len(passes) else CYCLE
+    place = window_gaussian.poses(window)[:, :3]
+    found = egomotion.rates(state.log, state.heading, place, step, _baseline(state))
+    if len(found.rate) < egomotion.FEWEST:
+        return None
+    share = window.step.mean() / step
+    std = np.sqrt(np.diag(window.covariance)[3:6])
+    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
+    return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
+
+
+def log_other_motion(state: WindowState) -> float:
+    """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
+    give or take a manoeuvre, from the rates at which path lengths changed; 0 where too few are known."""
+    found = _latest_rates(state)
+    if found is None:
+        return 0.0
+    lively = np.sqrt(motion.expected_variance(state.level[0])) * _latest(state.window)[1]
+    std = np.sqrt(np.diag(window_gaussian.now(state.window)[1])[3:6] + lively**2) + 1e-6
+    return egomotion.weigh(found, _mean_velocity(state.window)[0], std).log_odds - CONSTANTS.log_rare
+
+
+def log_agreement(state: WindowState, after: Window) -> float:
+    """Log likelihood ratio of the rates at which path lengths changed over the last `PAST` cycles under the motion as
+    estimated `after` a birth against that before it; 0 where too few are known."""
+    found = _latest_rates(state) if is_checked(state) else None
+    if found is None:
+        return 0.0
+    one, other = (egomotion.log_evidence(found, *_mean_velocity(window)) for window in (state.window, after))
+    return other - one
+
+
+def _latest_rates(state: WindowState) -> egomotion.Rates | None:
+    """Rates of path lengths over the last `PAST` cycles, or as many as there are; None where they are too few."""
+    cycles, time = _latest(state.window)
+    if cycles < egomotion.MEASURED - 1:
+        return None
+    rows = slice(-1 - cycles, None)
+    place = window_gaussian.poses(state.window)[rows, :3]
+    found = egomotion.rates(state.log, state.heading[rows], place, time / cycles, _baseline(state))
+    return found if len(found.rate) >= egomotion.FEWEST else None
+
+
+def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
+    """Mean velocity (3,) [m/s] over the last `PAST` cycles, and its standard deviations (3,)."""
+    cycles, time = _latest(window)
+    ends = [-1, -1 - cycles]
+    place = window_gaussian.poses(window)[ends, :3]
+    wide = np.array([pose_covariance(window, axis)[np.ix_(ends, ends)] for axis in range(3)])
+    variance = np.trace(wide, axis1=1, axis2=2) - 2.0 * wide[:, 0, 1]
+    return (place[0] - place[1]) / time, np.sqrt(np.maximum(variance, 0.0)) / time + 1e-6
+
+
+def _latest(window: Window) -> tuple[int, float]:
+    """Number of the last `PAST` cycles, or as many as there are, and how long [s] they took."""
+    step = window.step[-PAST:]
+    return len(step), float(step.sum()) or len(step) * CYCLE  # where the clock stands still, as usual
+
+
+def _baseline(state: WindowState) -> float:
+    """Distance [m] between Tx and Rx."""
+    return float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))
