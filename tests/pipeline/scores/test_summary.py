@@ -13,6 +13,7 @@ from rislam_rt.pipeline.scores.bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import landmark_track, over_budget, summarise
 from rislam_rt.pipeline.scores.walls import coplanar, count_ghosts, wall_scores, wall_surfaces
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.toml import put_dotted
 
 
 def map_of_walls(normal, offset):
@@ -158,19 +159,24 @@ def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles):
         assert summarise(astray)["schemes"]["random"]["diverged"] is lost
 
 
-def test_a_wall_is_audible_as_long_as_a_path_over_it_is_above_the_threshold(room, short_result):
-    paths, scheme = short_result.paths, short_result.schemes["random"]
-    settings = build_settings(PipelineSpec.model_validate(dict(short_result.config)))
+@pytest.mark.parametrize(("name", "use_vt"), [("random", True), ("bp_slam", True), ("bp_slam", False)])
+def test_a_wall_is_audible_while_a_path_that_the_scheme_uses_is_above_the_threshold(room, short_result, name, use_vt):
+    """Wall returns (VT) count for a scheme whose own estimator uses them, whatever `slam.use_vt` is."""
+    config = put_dotted(dict(short_result.config), "bp_slam.planes", use_vt)
+    scheme = replace(short_result.schemes["random"], scheme=name)
+    result = replace(short_result, config=config, schemes={name: scheme})
+    paths, settings = result.paths, build_settings(PipelineSpec.model_validate(config))
     names, heard = build_walls(room).names, {}
     for path in range(paths.num_paths):
         loud = settings.radio.integrated_snr(scheme.gain[:, path]) >= settings.sensor.threshold
         loud &= paths.valid[:, path] & (paths.arrival[:, path, 2] >= 0.0)
         _, landmark, tx, rx = paths.identity(path)
-        if landmark >= 0 or settings.slam.use_vt:
+        if landmark >= 0 or use_vt:
             for wall in {*tx, *rx}:
                 heard[names[wall]] = heard.get(names[wall], False) | loud
-    step = float(np.median(np.diff(short_result.scene.agent.time)))
-    walls = summarise(short_result)["schemes"]["random"]["walls"]
+    step = float(np.median(np.diff(result.scene.agent.time)))
+    walls = summarise(result)["schemes"][name]["walls"]
+    assert settings.slam.use_vt
     assert heard
-    for name in names:
-        assert walls[name]["audible_s"] == pytest.approx(step * np.sum(heard.get(name, False)))
+    for wall in names:
+        assert walls[wall]["audible_s"] == pytest.approx(step * np.sum(heard.get(wall, False)))

@@ -36,6 +36,15 @@ def test_a_cell_gives_the_same_again_and_traces_a_room_once() -> None:
     assert cell(WITHOUT)["schemes"]["random"]["ran"] == "no_ris"
 
 
+def test_walls_heard_by_their_own_returns_count_for_an_estimator_that_uses_them() -> None:
+    """Whatever `slam.use_vt` is; what counts is heard for 2 s, 20 of 22 cycles."""
+    heard = []
+    for planes in (False, True):
+        run = RUN | {"cycles": 22, "schemes": ["bp_slam"], "bp_slam": {"planes": planes}}
+        heard.append(run_cell({"run": run, "variants": {}, "room": WITHOUT}, 0)["schemes"]["bp_slam"]["walls_heard"])
+    assert heard == [1, 4]
+
+
 def test_a_recording_is_read_back_and_replayed_to_the_bit(tmp_path: Path) -> None:
     scores = cell(WITH_PANEL, save="components", data=str(tmp_path))["schemes"]["random"]
     folder = tmp_path / f"room_{WITH_PANEL:05d}"
