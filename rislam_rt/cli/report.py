@@ -7,7 +7,7 @@ import typer
 
 from rislam_rt.cli.options import JsonFile, write_json
 from rislam_rt.cli.output_files import OUTPUT
-from rislam_rt.cli.verbosity import warn
+from rislam_rt.cli.scores import show_scores
 
 if TYPE_CHECKING:
     from rislam_rt.model import SlamResult
@@ -33,7 +33,6 @@ def command(
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run
     from rislam_rt.report import write_report
-    from rislam_rt.report.terminal_tables import print_summary
 
     if gif is not None and gif.suffix.lower() != ".gif":
         raise ConfigError(f"--gif: '{gif}' received; give a name that ends in .gif")
@@ -46,9 +45,7 @@ def command(
         typer.echo(f"recording: {rerun}")
     if gif is not None:
         typer.echo(f"moving picture: {_write_gif(result, gif)}")
-    print_summary(summary)
-    for line in summary["warnings"]:
-        warn(line)
+    show_scores(summary)
     with hold_run(run):
         page = write_report(result, summary, run)
     typer.echo(f"report: {page}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
+from rislam_rt.cli.scores import show_scores
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.spelling import counted
 
@@ -87,13 +88,10 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
     from rislam_rt.report.page import PAGE, write_report
-    from rislam_rt.report.terminal_tables import print_summary
 
     summary = read_summary(folder, about)
     typer.echo("this run is complete already; nothing was computed")
-    print_summary(summary)
-    for line in summary["warnings"]:
-        warn(line)
+    show_scores(summary)
     page = folder / PAGE
     draw = given.page and not page.is_file()
     if draw or is_left_locked(folder):  # a process died at the report, or is at it
@@ -120,7 +118,6 @@ def compute_run(
     from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
     from rislam_rt.pipeline.scores.summary import summarise
     from rislam_rt.pipeline.store.run_folder import open_run
-    from rislam_rt.report.terminal_tables import print_summary
 
     kept = 0
     try:
@@ -139,9 +136,7 @@ def compute_run(
                 summary, result = found
             finally:
                 kept = len(store)
-            print_summary(summary)
-            for line in summary["warnings"]:
-                warn(line)
+            show_scores(summary)
             if given.page:
                 from rislam_rt.report import write_report
 

@@ -6,11 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
+from rislam_rt.input_messages import expected_input
 from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
-from rislam_rt.wanted import wanted
 
 MAX_SCENE_BYTES = 4_000_000
 """Most bytes of a scene file, which people write; anything larger is another file by mistake."""
@@ -337,7 +337,7 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
     if item["type"] == "extra_forbidden":
         hint = did_you_mean(nearest(str(item["loc"][-1]), _known_keys()))
         return Fault(f"{place}: unknown key", hint or "remove it or mend its name")
-    message = wanted(item)
+    message = expected_input(item)
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):

@@ -13,7 +13,18 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "rislam_rt"
 
 FLOORS = {
-    0: ("errors", "constants", "arrays", "backend", "progress", "shipped", "spelling", "toml", "wanted", "worker_pool"),
+    0: (
+        "errors",
+        "constants",
+        "arrays",
+        "backend",
+        "input_messages",
+        "progress",
+        "shipped",
+        "spelling",
+        "toml",
+        "worker_pool",
+    ),
     1: ("geometry", "storage"),
     2: ("model",),
     3: ("scene", "ris", "waveform"),

@@ -10,20 +10,20 @@ HEARD = 2.0
 """[s] Least total time for which a path or wall must be above the detection threshold to count in a score."""
 
 
-def audible_paths(paths: Paths, settings: Settings) -> Booleans:
+def audible_paths(paths: Paths, settings: Settings, *, use_vt: bool) -> Booleans:
     """Which true paths (K, P) the receiver can detect: over the SNR threshold, in its window, from the array's front.
 
-    The direct path does not count; wall returns (VT) do with `slam.use_vt`.
+    The direct path does not count; wall returns (VT) do with `use_vt`, for an estimator that uses them.
     """
     sensor = settings.sensor
     heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
     heard &= sensor.in_window(paths.tau)
     if settings.radio.array.pattern == "upper":
         heard &= paths.arrival[..., 2] >= 0.0
-    wanted = paths.landmark >= 0
-    if settings.slam.use_vt:
-        wanted |= paths.kind == PathKind.VT
-    return np.asarray(heard & wanted)
+    counted = paths.landmark >= 0
+    if use_vt:
+        counted |= paths.kind == PathKind.VT
+    return np.asarray(heard & counted)
 
 
 def audible_planes(paths: Paths, audible: Booleans, group: Integers) -> Booleans:

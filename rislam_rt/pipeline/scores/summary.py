@@ -69,7 +69,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     settings = build_settings(PipelineSpec.model_validate(dict(result.config)), panels)
     use_vt = uses_wall_returns(scheme.scheme, settings)
     score = association_score(*component_labels(scene, result.paths, scheme, use_vt=use_vt))
-    audible = seconds_audible(scene, result.paths, settings, scheme.gain)
+    audible = seconds_audible(scene, result.paths, settings, scheme.gain, use_vt=use_vt)
     walls = wall_scores(scene, scheme.map, least, audible)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import expected_input
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.section import Section
@@ -15,7 +16,6 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.shipped import shipped_pipelines
 from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
-from rislam_rt.wanted import wanted
 
 MAX_BYTES = 1_000_000
 """Largest size [bytes] of a pipeline file; anything larger is another file by mistake."""
@@ -206,7 +206,7 @@ def _remark(item: Any, model: type[BaseModel], typed: bool) -> str:
     if isinstance(item["input"], dict):
         message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
         return f"{place}: {message}" if place else message
-    return f"{place}: {str(item['input'])[:60]!r} received; {wanted(item, typed)}"
+    return f"{place}: {str(item['input'])[:60]!r} received; {expected_input(item, typed)}"
 
 
 def _is_said(content: Any, place: tuple[Any, ...]) -> bool:

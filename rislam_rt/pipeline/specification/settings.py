@@ -15,10 +15,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import unit_of
 from rislam_rt.pipeline.specification.section import Choices
 from rislam_rt.pipeline.specification.spec import RECORDS
 from rislam_rt.spelling import did_you_mean, nearest
-from rislam_rt.wanted import unit_of
 
 LARGEST = 2.0**40
 """Largest number tried for the end of a setting's range; a range that includes it counts as unlimited."""

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rislam_rt.input_messages import unit_of
 from rislam_rt.report.style import save_figure, scheme_colour, styled
 from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.studies.pipeline_sweep import SchemeScore
-from rislam_rt.wanted import unit_of
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LINES = ("-", "--", ":", "-.")

@@ -13,7 +13,8 @@ import scipy
 from rislam_rt.arrays import Floats
 
 REACH = 4.0
-"""Distance from the rim, in standard deviations, from which on noise puts nothing beyond it."""
+"""Distance from the rim, in standard deviations, up to which the bias is computed: a limit of computation, what is left
+out beyond is at most 7e-6 deviations (`f(4) - 4 Q(4)`)."""
 
 
 def correct_horizon_bias(seen: Floats, std: Floats, left: Floats, slopes: Floats) -> None:

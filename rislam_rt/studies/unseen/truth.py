@@ -12,6 +12,7 @@ from rislam_rt.information import posterior_bound
 from rislam_rt.model import Paths, Scene, SchemeResult
 from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes
 from rislam_rt.pipeline.scores.bound import bound_problem
+from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 
@@ -59,7 +60,7 @@ class Truth(NamedTuple):
 def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> Truth:
     """Truth of one scheme's run for scoring, with detectability and bounds under the phase codes that it applied."""
     settings, walls = build_settings(spec, len(scene.panels) if result.levels else 0), build_walls(scene)
-    audible = audible_paths(paths.with_gain(result.gain), settings)
+    audible = audible_paths(paths.with_gain(result.gain), settings, use_vt=uses_wall_returns(result.scheme, settings))
     group = coplanar(walls)
     surfaces = wall_surfaces(walls, group)
     of = paths.landmark[:, None] == np.arange(len(scene.landmarks))

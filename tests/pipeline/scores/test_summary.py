@@ -13,6 +13,7 @@ from rislam_rt.pipeline.scores.bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import landmark_track, over_budget, summarise
 from rislam_rt.pipeline.scores.walls import coplanar, count_ghosts, wall_scores, wall_surfaces
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.toml import put_dotted
 
 
 def map_of_walls(normal, offset):
@@ -158,19 +159,23 @@ def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles):
         assert summarise(astray)["schemes"]["random"]["diverged"] is lost
 
 
-def test_a_wall_is_audible_as_long_as_a_path_over_it_is_above_the_threshold(room, short_result):
-    paths, scheme = short_result.paths, short_result.schemes["random"]
+@pytest.mark.parametrize(("name", "use_vt"), [("random", True), ("bp_slam", True), ("bp_slam", False)])
+def test_a_wall_is_audible_as_long_as_a_path_over_it_that_the_scheme_uses_is_above_the_threshold(
+    room, short_result, name, use_vt
+):
+    short_result = replace(short_result, config=put_dotted(dict(short_result.config), "bp_slam.planes", use_vt))
+    paths, scheme = short_result.paths, replace(short_result.schemes["random"], scheme=name)
     settings = build_settings(PipelineSpec.model_validate(dict(short_result.config)))
     names, heard = build_walls(room).names, {}
     for path in range(paths.num_paths):
         loud = settings.radio.integrated_snr(scheme.gain[:, path]) >= settings.sensor.threshold
         loud &= paths.valid[:, path] & (paths.arrival[:, path, 2] >= 0.0)
         _, landmark, tx, rx = paths.identity(path)
-        if landmark >= 0 or settings.slam.use_vt:
+        if landmark >= 0 or use_vt:
             for wall in {*tx, *rx}:
                 heard[names[wall]] = heard.get(names[wall], False) | loud
     step = float(np.median(np.diff(short_result.scene.agent.time)))
-    walls = summarise(short_result)["schemes"]["random"]["walls"]
+    walls = summarise(replace(short_result, schemes={name: scheme}))["schemes"][name]["walls"]
     assert heard
-    for name in names:
-        assert walls[name]["audible_s"] == pytest.approx(step * np.sum(heard.get(name, False)))
+    for wall in names:
+        assert walls[wall]["audible_s"] == pytest.approx(step * np.sum(heard.get(wall, False)))

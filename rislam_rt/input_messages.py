@@ -1,7 +1,9 @@
-"""What is wanted in place of a bad value in a file or on the command line, said as what to give."""
+"""Messages on a bad value in a file or on the command line: what to give instead, in the unit of the setting."""
 
 from collections.abc import Mapping
 from typing import Any
+
+from rislam_rt.toml import toml_value
 
 UNITS = {
     "_m_s2": "m/s^2",
@@ -43,7 +45,7 @@ def unit_of(name: str) -> str:
     return next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
 
 
-def wanted(item: Mapping[str, Any], typed: bool = False) -> str:
+def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
     """What to give instead, of a fault of pydantic's: `give at most 3000 GHz`; `typed` on the command line, a list
     needs quotes."""
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
@@ -51,7 +53,7 @@ def wanted(item: Mapping[str, Any], typed: bool = False) -> str:
     name = names[-1] if names else ""
     if item["type"] == "list_type":
         words = str(item["input"]).strip("[]()").replace('"', "").replace("'", "").split(",")
-        values = f"[{', '.join(_toml(word.strip()) for word in words)}]"[:100]
+        values = f"[{', '.join(_entry(word.strip()) for word in words)}]"[:100]
         return f"give a list, in quotes: '{name}={values}'" if typed else f"give a list, {name} = {values}"
     kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
     if kind is not None:
@@ -63,10 +65,10 @@ def wanted(item: Mapping[str, Any], typed: bool = False) -> str:
     return f"give {text}" if text != message else f"{message[:1].lower()}{message[1:]}"
 
 
-def _toml(word: str) -> str:
+def _entry(word: str) -> str:
     """A word as an entry of a list: numbers as they are, text in quotes."""
     try:
         float(word)
     except ValueError:
-        return f'"{word}"'
+        return toml_value(word)
     return word
