@@ -1,4 +1,4 @@
-"""Messages about bad input: what to give in place of a bad value in a file or on the command line."""
+"""Messages on a bad value in a file or on the command line: what to give instead, in the unit of the setting."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -46,16 +46,14 @@ def unit_of(name: str) -> str:
 
 
 def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
-    """What to give in place of the bad value of a pydantic error `item`: `give at most 3000 GHz`.
-
-    `typed` is whether the value came from the command line, where a list needs quotes.
-    """
+    """What to give instead, of a fault of pydantic's: `give at most 3000 GHz`; `typed` on the command line, a list
+    needs quotes."""
     message = " ".join(str(item["msg"]).removeprefix("Value error, ").split())
     names = [part for part in item["loc"] if isinstance(part, str)]
     name = names[-1] if names else ""
     if item["type"] == "list_type":
         words = str(item["input"]).strip("[]()").replace('"', "").replace("'", "").split(",")
-        values = f"[{', '.join(_toml(word.strip()) for word in words)}]"[:100]
+        values = f"[{', '.join(_entry(word.strip()) for word in words)}]"[:100]
         return f"give a list, in quotes: '{name}={values}'" if typed else f"give a list, {name} = {values}"
     kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
     if kind is not None:
@@ -67,7 +65,7 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
     return f"give {text}" if text != message else f"{message[:1].lower()}{message[1:]}"
 
 
-def _toml(word: str) -> str:
+def _entry(word: str) -> str:
     """A word as an entry of a list: numbers as they are, text in quotes."""
     try:
         float(word)

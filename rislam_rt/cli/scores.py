@@ -1,4 +1,4 @@
-"""Scores of a run on the terminal, and its warnings."""
+"""Scores of a run on the terminal, with the warnings that belong to them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,7 @@ from rislam_rt.cli.verbosity import warn
 
 
 def show_scores(summary: Mapping[str, Any]) -> None:
-    """Print the table of a run's scores, then its warnings on the error stream; `summary` as `summarise` returns it."""
+    """Print the scores of a run from its summary, then its warnings on the error stream."""
     from rislam_rt.report.terminal_tables import print_summary
 
     print_summary(summary)

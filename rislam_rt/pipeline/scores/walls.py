@@ -51,7 +51,7 @@ def wall_scores(
 def seconds_audible(scene: Scene, paths: Paths, settings: Settings, gain: Any, *, use_vt: bool) -> Floats:
     """Total time (W,) [s] for which a path over each wall's plane was above the detection threshold, for its score.
 
-    `gain` (K, P) are the paths' gains under the applied codes; wall returns count with `use_vt`, as in `audible_paths`.
+    `gain` (K, P) are the paths' gains under the applied codes; wall returns count with `use_vt`.
     """
     group = coplanar(build_walls(scene))
     audible = audible_planes(paths, audible_paths(paths.with_gain(gain), settings, use_vt=use_vt), group)

@@ -60,8 +60,7 @@ class Truth(NamedTuple):
 def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> Truth:
     """Truth of one scheme's run for scoring, with detectability and bounds under the phase codes that it applied."""
     settings, walls = build_settings(spec, len(scene.panels) if result.levels else 0), build_walls(scene)
-    use_vt = uses_wall_returns(result.scheme, settings)
-    audible = audible_paths(paths.with_gain(result.gain), settings, use_vt=use_vt)
+    audible = audible_paths(paths.with_gain(result.gain), settings, use_vt=uses_wall_returns(result.scheme, settings))
     group = coplanar(walls)
     surfaces = wall_surfaces(walls, group)
     of = paths.landmark[:, None] == np.arange(len(scene.landmarks))

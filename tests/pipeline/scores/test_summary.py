@@ -160,12 +160,12 @@ def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles):
 
 
 @pytest.mark.parametrize(("name", "use_vt"), [("random", True), ("bp_slam", True), ("bp_slam", False)])
-def test_a_wall_is_audible_while_a_path_that_the_scheme_uses_is_above_the_threshold(room, short_result, name, use_vt):
-    """Wall returns (VT) count for a scheme whose own estimator uses them, whatever `slam.use_vt` is."""
-    config = put_dotted(dict(short_result.config), "bp_slam.planes", use_vt)
-    scheme = replace(short_result.schemes["random"], scheme=name)
-    result = replace(short_result, config=config, schemes={name: scheme})
-    paths, settings = result.paths, build_settings(PipelineSpec.model_validate(config))
+def test_a_wall_is_audible_as_long_as_a_path_over_it_that_the_scheme_uses_is_above_the_threshold(
+    room, short_result, name, use_vt
+):
+    short_result = replace(short_result, config=put_dotted(dict(short_result.config), "bp_slam.planes", use_vt))
+    paths, scheme = short_result.paths, replace(short_result.schemes["random"], scheme=name)
+    settings = build_settings(PipelineSpec.model_validate(dict(short_result.config)))
     names, heard = build_walls(room).names, {}
     for path in range(paths.num_paths):
         loud = settings.radio.integrated_snr(scheme.gain[:, path]) >= settings.sensor.threshold
@@ -174,9 +174,8 @@ def test_a_wall_is_audible_while_a_path_that_the_scheme_uses_is_above_the_thresh
         if landmark >= 0 or use_vt:
             for wall in {*tx, *rx}:
                 heard[names[wall]] = heard.get(names[wall], False) | loud
-    step = float(np.median(np.diff(result.scene.agent.time)))
-    walls = summarise(result)["schemes"][name]["walls"]
-    assert settings.slam.use_vt
+    step = float(np.median(np.diff(short_result.scene.agent.time)))
+    walls = summarise(replace(short_result, schemes={name: scheme}))["schemes"][name]["walls"]
     assert heard
     for wall in names:
         assert walls[wall]["audible_s"] == pytest.approx(step * np.sum(heard.get(wall, False)))
