@@ -1,12 +1,12 @@
 """The command `rislam-rt run PIPELINE`: runs a SLAM pipeline or a study, or goes on with one that was stopped."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
-from rislam_rt.cli.scores import show_scores
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.spelling import counted
 
@@ -49,15 +49,15 @@ def command(
     if isinstance(spec, PipelineSpec):
         run_main_job(spec, given)
         return
-    from rislam_rt.cli import study, training, unseen
+    from rislam_rt.cli import study
     from rislam_rt.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, UnseenSpec
 
     runs: dict[type, Callable[[Any, StudyOptions], None]] = {
         CompareSpec: study.run_compare_channels,
         Fig4aSpec: study.run_gain_curves,
-        UnseenSpec: unseen.run_unseen,
+        UnseenSpec: study.run_unseen,
         ClaimsSpec: study.run_claims,
-        ClassifierSpec: training.run_classifier,
+        ClassifierSpec: study.run_classifier,
     }
     runs.get(type(spec), study.run_swept)(spec, given)
 
@@ -146,3 +146,12 @@ def compute_run(
         raise Interrupted(f"interrupted: {said}") from None
     typer.echo(f"run folder: {folder}")
     write_json(given.json, summary)
+
+
+def show_scores(summary: Mapping[str, Any]) -> None:
+    """Print the scores of a run from its summary, then its warnings on the error stream."""
+    from rislam_rt.report.terminal_tables import print_summary
+
+    print_summary(summary)
+    for line in summary["warnings"]:
+        warn(line)

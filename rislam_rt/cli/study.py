@@ -17,21 +17,38 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.run import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.report.studies.claims import write_claims
+from rislam_rt.report.studies.classifier import (
+    classifier_page,
+    classifier_table,
+    draw_importance,
+    draw_panel,
+    draw_scores,
+    weights_file,
+)
 from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
 from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, write_comparison, write_fig4a
+from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.terminal_tables import print_validation
+from rislam_rt.report.unseen import write_unseen
+from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.scene.file_names import safe_name
 from rislam_rt.shipped import room_beside
-from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
+from rislam_rt.storage.files import json_file, write_all
+from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec, UnseenSpec
 from rislam_rt.studies.claims import SOURCE, judge, read_results
+from rislam_rt.studies.classifier.sets import gather_sets
+from rislam_rt.studies.classifier.spec import ClassifierSpec
+from rislam_rt.studies.classifier.train import ALL, train_and_score
 from rislam_rt.studies.compare import comparison_table, run_comparison
 from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept import build_sweep
 from rislam_rt.studies.swept.sweep import swept_record
+from rislam_rt.studies.unseen import build_unseen, count_tests
+from rislam_rt.studies.unseen.sweep import unseen_record
 from rislam_rt.sweeps import Row, Sweep, SweepOptions, build_cells, run_sweep
-from rislam_rt.sweeps.store import check_folder
+from rislam_rt.sweeps.store import check_folder, read_timings
 
 
 def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
@@ -143,3 +160,59 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
     write_json(given.json, {"claims": [claim._asdict() for claim in found]})
+
+
+def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
+    """Run the study in unseen random rooms, print the scores and write its page; exit code 1 if a room failed."""
+    refuse_scene(given, "unseen", "draws its rooms; leave it out")
+    cells = Path("sweeps") / spec.name
+    record = unseen_record(spec)
+    files = page_files(spec.name, figure=given.page)
+    folder = study_folder(given.out, f"{spec.name}-{spec.first}", record, files)
+    check_folder(cells)
+    sweep = build_unseen(spec, given.pipeline, Path("sweeps") / f"{spec.name}_data")
+    for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
+        prepare_channel(kind)
+    tests = count_tests(spec, given.pipeline)
+
+    def write(rows: Sequence[Row]) -> Path | None:
+        timings = read_timings(cells)
+        return write_unseen(rows, spec, record, folder, tests=tests, timings=timings, figures=given.page)
+
+    def show(rows: Sequence[Row]) -> None:
+        print_cards(rows, read_timings(cells))
+
+    run_cells(sweep, cells, spec.time_limit_s, given, record, write, show)
+
+
+PAGE, WEIGHTS = "classifier", "weights.npz"
+PICTURES = {
+    "figures/classifier_scores.png": draw_scores,
+    "figures/classifier_features.png": draw_importance,
+    "figures/classifier_panel.png": draw_panel,
+}
+
+
+def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
+    """Train and score the classifier of multipath components, and write weights, page, data and figures."""
+    refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
+    radio = build_radio(spec.radio)
+    scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]
+    record = study_record(spec, scenes)
+    files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *(PICTURES if given.page else ()))
+    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
+    prepare_channel(spec.channel)
+    with show_progress() as progress:
+        found = train_and_score(gather_sets(scenes, spec, progress=progress), spec)
+    content = {**record, **classifier_table(found)}
+    contents = {
+        f"{PAGE}.md": classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),
+        f"{PAGE}.json": json_file(content),
+        WEIGHTS: weights_file(found),
+    }
+    if given.page:
+        contents |= {name: to_png(draw(found)) for name, draw in PICTURES.items()}
+    page = write_all(folder, contents)
+    typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")
+    typer.echo(f"page: {page}")
+    write_json(given.json, content)

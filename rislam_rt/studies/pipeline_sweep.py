@@ -21,9 +21,8 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.sweeps.axes import Axis, Scalar, Value, parse_axis
 from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
-from rislam_rt.sweeps.sweep import Sweep
+from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
 
 FUNCTION = f"{__name__}:run_cell"
 

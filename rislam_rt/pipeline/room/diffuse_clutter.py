@@ -6,7 +6,7 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import Clutter
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.specification.diffuse import DiffuseSection
+from rislam_rt.pipeline.specification.spec import DiffuseSection
 
 
 def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:

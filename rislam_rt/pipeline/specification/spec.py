@@ -12,7 +12,6 @@ from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio, linear
 from rislam_rt.pipeline.specification.section import (
@@ -31,6 +30,25 @@ from rislam_rt.slam import NestedConfig, SlamConfig
 from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam_aoa import BpSlamAoaConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
+
+
+class DiffuseSection(Section):
+    """Which diffuse and diffracted paths the ray tracer adds to the received signal, unknown to the agent."""
+
+    diffuse: bool = False
+    """Whether rough walls scatter: those whose material has `scattering`, or all by `room.scattering`."""
+    diffraction: bool = False
+    """Whether edges of walls, objects and openings diffract."""
+    depth: Annotated[int, Field(ge=1, le=3)] = 1
+    """Largest number of interactions of a diffuse or diffracted path."""
+    samples: Annotated[int, Field(ge=100, le=1_000_000)] = 2000
+    """Rays shot in every cycle; the mean power does not depend on them, its fluctuation does."""
+
+    @property
+    def wanted(self) -> bool:
+        """Whether diffuse or diffracted paths are to be traced."""
+        return self.diffuse or self.diffraction
+
 
 RECORDS: dict[type, type] = {}
 """Configuration record of each section that was made from one."""

@@ -9,8 +9,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import PathKind
 from rislam_rt.slam.classify import FEATURES, Network, blend, classify_geometric, log_odds
-from rislam_rt.studies.classifier.codes import POLICIES
 from rislam_rt.studies.classifier.training_examples import Examples
+from rislam_rt.studies.classifier.walks import POLICIES
 
 AMPLITUDE_RULE = 0.35
 """Ratio of amplitude to free-space amplitude above which the amplitude rule removes (`SlamConfig.specular_ratio`)."""

@@ -16,10 +16,9 @@ from rislam_rt.pipeline.specification.spec import build_receiver
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.scene.random_rooms.box_rooms import random_room
-from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
 from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec
 from rislam_rt.studies.classifier.training_examples import Examples, gather_walk, join
-from rislam_rt.studies.classifier.walks import random_walk
+from rislam_rt.studies.classifier.walks import AIMED, POLICIES, random_walk, set_codes
 
 DEPTH = 2
 """Largest number of wall bounces on a path in random rooms, both legs together."""

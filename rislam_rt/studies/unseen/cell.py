@@ -1,4 +1,4 @@
-"""One cell of the study in unseen rooms: every scheme in one random room at one SNR under one variant."""
+"""One cell of the study in unseen rooms: every scheme in one random room at one SNR; saves what is asked for."""
 
 import json
 from collections.abc import Mapping
@@ -9,16 +9,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt.model import RisCode, Scene, SchemeResult
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
+from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.signals import SignalsSpec, build_signals
 from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec
 from rislam_rt.progress import tell_nobody
+from rislam_rt.ris import rephase
+from rislam_rt.scene import write_scene
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
+from rislam_rt.storage.netcdf import write_dataset
 from rislam_rt.studies.swept.cell import cell_spec
-from rislam_rt.studies.unseen.recording_file import Recording
-from rislam_rt.studies.unseen.save import save_room, save_run, save_signals
+from rislam_rt.studies.unseen.recording_file import Recording, write_recording
 from rislam_rt.studies.unseen.score import score_run
 from rislam_rt.studies.unseen.truth import build_truth
 from rislam_rt.sweeps.cell_work import one_line
@@ -110,3 +115,58 @@ def room_traits(room: RandomRoom) -> dict[str, Any]:
     """Properties of a random room as plain data: seed, shape and other classes, number of scatterers."""
     traits = {field.name: getattr(room, field.name) for field in fields(room) if field.name != "scene"}
     return {**traits, "scatterers": len(room.scene.scatterers)}
+
+
+def save_run(recording: Recording, folder: Path, label: str) -> Path:
+    """Save a recorded run as `<room>/<label>.nc`, and return the file's path.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    file = room_folder(folder, recording.traits) / f"{label}.nc"
+    write_recording(recording, file)
+    return file
+
+
+def save_room(scene: Scene, traits: Mapping[str, Any], folder: Path) -> None:
+    """Save an unseen room as a scene folder with the true motion as its trajectory, unless it is there.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    target = room_folder(folder, traits) / "scene"
+    if not target.exists():
+        write_scene(scene, target)
+
+
+def save_signals(
+    setup: RunSetup, result: SchemeResult, spec: PipelineSpec, traits: Mapping[str, Any], folder: Path, label: str
+) -> None:
+    """Save samples of the received signal under the codes that a run applied, as `<room>/<label>_signals.nc`.
+
+    The noise is drawn anew from the room's seed: it is not that of the recorded components.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    section = spec.receiver.model_copy(update={"estimator": "waveform"})
+    own = SignalsSpec(seed=int(traits["seed"]), code="zero", radio=spec.radio, receiver=section)
+    paths = without_panel(setup.paths)
+    if result.levels:
+        paths = rephase(setup.paths, RisCode(result.applied, result.levels))
+    rng = np.random.default_rng(setup.seeds.noise)
+    data = build_signals(setup.scene, paths, own, rng=rng, on_cycle=lambda: None)
+    target = room_folder(folder, traits)
+    target.mkdir(parents=True, exist_ok=True)
+    write_dataset(data.assign_attrs(code="as applied"), target / f"{label}_signals.nc")
+
+
+def room_folder(folder: Path, traits: Mapping[str, Any]) -> Path:
+    """Folder of all saved files of an unseen room, named by its seed."""
+    return folder / f"room_{int(traits['seed']):05d}"
