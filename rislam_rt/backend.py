@@ -34,12 +34,9 @@ PYTHONS = ((3, 11), (3, 13))
 
 _PACKAGES = ("rislam-rt", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core", "numpy", "scipy")
 _SYSTEM_LLVM = (
-    "/usr/lib/*-linux-gnu/libLLVM*.so*",
-    "/usr/lib64/libLLVM*.so*",
-    "/usr/lib/llvm-*/lib/libLLVM*.so*",
-    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
-    "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
-)
+    "/usr/lib/*-linux-gnu/libLLVM*.so*", "/usr/lib64/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*",
+    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib", "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
+)  # fmt: skip
 _HOW_TO_GET = (
     f"libLLVM {OLDEST_LLVM} or newer is needed: 'pip install karellen-llvm-core' (Linux x86-64), or install one "
     "from your system (Debian: libllvm19, macOS: brew install llvm) and set DRJIT_LIBLLVM_PATH to it"

@@ -80,12 +80,9 @@ def tell_start(
     heading = motion.heading[0] + turn + np.radians(told.start_heading_deg) if free_heading else compass
     return StartPrior(
         motion.position[0] + shift * start.position_std_m * axes + [0.0, 0.0, told.height_m],
-        motion.velocity[0] + push * start.velocity_std_m_s * axes,
-        float(heading),
-        start.position_std_m,
-        start.velocity_std_m_s,
-        float(np.radians(start.heading_std_deg)),
-    )
+        motion.velocity[0] + push * start.velocity_std_m_s * axes, float(heading), start.position_std_m,
+        start.velocity_std_m_s, float(np.radians(start.heading_std_deg)),
+    )  # fmt: skip
 
 
 def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:

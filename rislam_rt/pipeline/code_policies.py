@@ -65,14 +65,9 @@ def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Setti
         there = room.trajectory[due : due + 1]
         try:
             problem = problem_from_paths(
-                room.at(due),
-                there.tx[0],
-                there.rx[0],
-                settings.radio,
-                panel.levels,
-                prior=prior,
+                room.at(due), there.tx[0], there.rx[0], settings.radio, panel.levels, prior=prior,
                 least_snr=spec.design.least_snr,
-            )
+            )  # fmt: skip
         except ConfigError:  # the panel is out of sight: any code will do
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         return designer(method)(problem, rng=rng, config=settings.design).code

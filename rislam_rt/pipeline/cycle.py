@@ -81,12 +81,9 @@ class Receptions(dict[tuple[int, bytes, int], tuple[Measurement | None, Measurem
     """
 
     def measure(
-        self,
-        cycle: int,
-        code: bytes,
-        previous: Measurement | None,
+        self, cycle: int, code: bytes, previous: Measurement | None,
         receive: Callable[[], tuple[Measurement, PathTruth]],
-    ) -> tuple[Measurement, PathTruth, float]:
+    ) -> tuple[Measurement, PathTruth, float]:  # fmt: skip
         """Return a cycle's measurement, its true paths and the seconds it took; `receive` is called if none is kept."""
         key = cycle, code, id(previous)
         if key not in self:

@@ -45,12 +45,13 @@ class Estimator(NamedTuple):
     """Returns smoothed positions (K, 3) [m] of all cycles; None of an estimator that does not smooth."""
 
 
-class Outcomes(NamedTuple):
-    """Diagnostics that stand for those of a user's own estimator, which gives none."""
+class OwnDiagnostics(NamedTuple):
+    """Diagnostics that stand for those of a user's own or an external estimator in one cycle."""
 
     landmark: Integers
-    """(M,) -1: no component is known to be of a landmark."""
+    """(M,) number of the landmark that each component was associated with, -1 for none."""
     outcome: str = "ok"
+    """`diverged` where the estimator holds itself for lost."""
 
 
 def own_estimator(name: str) -> Estimator:
@@ -92,10 +93,10 @@ def own_estimator(name: str) -> Estimator:
     def step(
         state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
         *, rng: np.random.Generator,
-    ) -> tuple[Any, Outcomes]:  # fmt: skip
+    ) -> tuple[Any, OwnDiagnostics]:  # fmt: skip
         with own_method_errors(name):
             state = own.step(state, measurement, code, dt, heading, rng=rng)
-        return state, Outcomes(np.full(len(measurement), -1))
+        return state, OwnDiagnostics(np.full(len(measurement), -1))
 
     return Estimator(init, predict, step, estimate, lambda settings: None, use_vt=lambda settings: False)
 

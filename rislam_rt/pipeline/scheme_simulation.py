@@ -124,30 +124,18 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
         if panel is not None and m.panel is not None:  # an empty map has none
             panel[row, column] = m.panel
     return SchemeResult(
-        scheme=scheme,
-        time=time,
-        position=np.array([estimate.position for estimate in estimates]),
+        scheme=scheme, time=time, position=np.array([estimate.position for estimate in estimates]),
         velocity=np.array([estimate.velocity for estimate in estimates]),
         heading=np.array([estimate.heading for estimate in estimates]),
         covariance=np.array([estimate.covariance for estimate in estimates]),
-        sent=_codes([cycle.sent for cycle in cycles]),
-        applied=_codes([cycle.applied for cycle in cycles]),
-        levels=levels,
-        gain=np.array([cycle.gain for cycle in cycles]),
+        sent=_codes([cycle.sent for cycle in cycles]), applied=_codes([cycle.applied for cycle in cycles]),
+        levels=levels, gain=np.array([cycle.gain for cycle in cycles]),
         component_path=padded([cycle.truth.path for cycle in cycles], NOTHING, np.int64),
-        component_landmark=padded([cycle.info.landmark for cycle in cycles], NOTHING, np.int64),
-        ident=ident,
-        parent=parent,
-        held=held,
-        landmark_position=landmark,
-        ris_probability=ris_probability,
-        seconds=np.array([cycle.seconds for cycle in cycles]),
-        info=_diagnostics([cycle.info for cycle in cycles]),
-        outcome=tuple(str(cycle.info.outcome) for cycle in cycles),
-        map=maps[-1],
-        panel=panel,
-        given=given,
-    )
+        component_landmark=padded([cycle.info.landmark for cycle in cycles], NOTHING, np.int64), ident=ident,
+        parent=parent, held=held, landmark_position=landmark, ris_probability=ris_probability,
+        seconds=np.array([cycle.seconds for cycle in cycles]), info=_diagnostics([cycle.info for cycle in cycles]),
+        outcome=tuple(str(cycle.info.outcome) for cycle in cycles), map=maps[-1], panel=panel, given=given,
+    )  # fmt: skip
 
 
 def _codes(codes: Sequence[RisCode | None]) -> Integers:

@@ -129,16 +129,10 @@ def slam_sweep(
     spec = build_spec(table, PipelineSpec, build_settings)
     typed = tuple(typed_axis(axis) for axis in found.values())
     return Sweep(
-        FUNCTION,
-        typed,
-        spec.model_dump(mode="json", exclude={"seed", "description"}),
-        repeat or section.repeat,
-        spec.seed,
-        tuple(section.paired if section.paired is not None else found),
-        {"beside": os.path.abspath(path.parent)},
-        _depends(path, tuple(found)),
-        spec.name,
-    )
+        FUNCTION, typed, spec.model_dump(mode="json", exclude={"seed", "description"}), repeat or section.repeat,
+        spec.seed, tuple(section.paired if section.paired is not None else found),
+        {"beside": os.path.abspath(path.parent)}, _depends(path, tuple(found)), spec.name,
+    )  # fmt: skip
 
 
 def typed_axis(axis: Axis) -> Axis:

@@ -6,14 +6,6 @@ from rislam_rt.sweeps.store import Row
 from rislam_rt.sweeps.sweep import Axis, Sweep, build_cells, parse_axis
 
 __all__ = [
-    "Axis",
-    "Row",
-    "Sweep",
-    "SweepCost",
-    "SweepOptions",
-    "SweepProgress",
-    "SweepReport",
-    "build_cells",
-    "parse_axis",
+    "Axis", "Row", "Sweep", "SweepCost", "SweepOptions", "SweepProgress", "SweepReport", "build_cells", "parse_axis",
     "run_sweep",
-]
+]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Work on one cell of a sweep: calls the function in a worker process, and records its result as plain data or failure."""
+"""Work on one cell of a sweep: calls its function in a worker process, and records its plain result or failure."""
 
 import math
 import os

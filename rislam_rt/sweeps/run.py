@@ -82,13 +82,9 @@ class SweepReport:
 
 
 def run_sweep(
-    sweep: Sweep,
-    folder: Path,
-    effort: SweepOptions | None = None,
-    *,
-    tell: Callable[[SweepProgress], None] | None = None,
-    grow: Callable[[Sequence[Row]], None] | None = None,
-) -> SweepReport:
+    sweep: Sweep, folder: Path, effort: SweepOptions | None = None, *,
+    tell: Callable[[SweepProgress], None] | None = None, grow: Callable[[Sequence[Row]], None] | None = None,
+) -> SweepReport:  # fmt: skip
     """Run all cells of a sweep that have no file in `folder` yet, and write a file for each.
 
     A sweep that was stopped in any way goes on from the cells that are there when it is called again; the files are the
@@ -156,16 +152,9 @@ class _SweepState:
     """State of a running sweep: results of its cells, cells left and their cost; writes them and reports progress."""
 
     def __init__(
-        self,
-        sweep: Sweep,
-        folder: Path,
-        effort: SweepOptions,
-        cells: Sequence[Cell],
-        tell: Callable[[SweepProgress], None] | None,
-        grow: Callable[[Sequence[Row]], None] | None,
-        *,
-        keep: bool,
-    ) -> None:
+        self, sweep: Sweep, folder: Path, effort: SweepOptions, cells: Sequence[Cell],
+        tell: Callable[[SweepProgress], None] | None, grow: Callable[[Sequence[Row]], None] | None, *, keep: bool,
+    ) -> None:  # fmt: skip
         self.keep = keep
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
         self.rows = {cell.ident: read_row(folder, cell) for cell in cells}

@@ -303,27 +303,18 @@ def read_run(folder: Path) -> SlamResult:
         check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
         paths, scene = dataset_to_paths(data), load_scene(folder / "scene")
         agent = Trajectory(
-            data["time"].to_numpy(),
-            data["true_position"].to_numpy(),
-            data["true_velocity"].to_numpy(),
-            data["true_heading"].to_numpy(),
-            scene.agent.body,
-        )
+            data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
+            data["true_heading"].to_numpy(), scene.agent.body,
+        )  # fmt: skip
         schemes = {
             name: _read_scheme(scheme_file(folder, name), name, about["identity"], about["cycles"])
             for name in about["schemes"]
         }
         return SlamResult(
-            name=about["name"],
-            scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]),
-            paths=paths,
-            schemes=schemes,
-            config=about["config"],
-            seed=about["seed"],
-            versions=about["versions"],
-            seconds=about["seconds"],
-            warnings=tuple(about["warnings"]),
-        )
+            name=about["name"], scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]), paths=paths,
+            schemes=schemes, config=about["config"], seed=about["seed"], versions=about["versions"],
+            seconds=about["seconds"], warnings=tuple(about["warnings"]),
+        )  # fmt: skip
 
 
 @contextmanager

@@ -77,14 +77,9 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
     hit, false, missed, right = tables.sum(axis=0)
     clutter = kept[~labelled]
     return ClassifierScore(
-        float(_f1(tables.sum(axis=0)[None])[0]),
-        float(low),
-        float(high),
-        _share(hit, hit + false),
-        _share(hit, hit + missed),
-        _share(right, right + false),
-        float(clutter.mean()) if len(clutter) else 0.0,
-    )
+        float(_f1(tables.sum(axis=0)[None])[0]), float(low), float(high), _share(hit, hit + false),
+        _share(hit, hit + missed), _share(right, right + false), float(clutter.mean()) if len(clutter) else 0.0,
+    )  # fmt: skip
 
 
 def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
