@@ -53,12 +53,9 @@ def command(
     from rislam_rt.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, UnseenSpec
 
     runs: dict[type, Callable[[Any, StudyOptions], None]] = {
-        CompareSpec: study.run_compare_channels,
-        Fig4aSpec: study.run_gain_curves,
-        UnseenSpec: study.run_unseen,
-        ClaimsSpec: study.run_claims,
-        ClassifierSpec: study.run_classifier,
-    }
+        CompareSpec: study.run_compare_channels, Fig4aSpec: study.run_gain_curves, UnseenSpec: study.run_unseen,
+        ClaimsSpec: study.run_claims, ClassifierSpec: study.run_classifier,
+    }  # fmt: skip
     runs.get(type(spec), study.run_swept)(spec, given)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from rislam_rt.cli.interrupts import Interrupted
-from rislam_rt.cli.options import StudyOptions, beside, write_json
+from rislam_rt.cli.options import StudyOptions, write_json
 from rislam_rt.cli.output_files import page_files, study_folder
 from rislam_rt.cli.progress import show_progress, show_sweep
 from rislam_rt.cli.scenes import open_scene, scene_of
@@ -51,21 +51,15 @@ from rislam_rt.sweeps import Row, Sweep, SweepOptions, build_cells, run_sweep
 from rislam_rt.sweeps.store import check_folder, read_timings
 
 
-def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
-    """Raise an error if `--scene` is given for a study that names its own rooms, or has none.
-
-    Raises
-    ------
-    ConfigError
-        It was given.
-    """
+def _refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
+    """Raise an error if `--scene` is given for a study that names its own rooms, or has none."""
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
 
 
 def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
     """Run the study that compares ray tracer and image sources, and write its page; exit code 1 if they differ."""
-    refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
+    _refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
@@ -151,8 +145,8 @@ def run_cells(
 
 def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
     """Check the paper's claims against the results of other studies, and write the page."""
-    refuse_scene(given, "claims", "runs in no room; leave it out")
-    results = read_results(beside(given.pipeline, spec.results))
+    _refuse_scene(given, "claims", "runs in no room; leave it out")
+    results = read_results(Path(os.path.normpath(given.pipeline.parent / spec.results)))
     found = judge(results)
     sources = {study: {name: content[name] for name in SOURCE} for study, content in results.items()}
     folder = study_folder(given.out, spec.name, results, page_files(spec.name))
@@ -164,7 +158,7 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
 
 def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
     """Run the study in unseen random rooms, print the scores and write its page; exit code 1 if a room failed."""
-    refuse_scene(given, "unseen", "draws its rooms; leave it out")
+    _refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
     files = page_files(spec.name, figure=given.page)
@@ -195,7 +189,7 @@ PICTURES = {
 
 def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     """Train and score the classifier of multipath components, and write weights, page, data and figures."""
-    refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
+    _refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]
     record = study_record(spec, scenes)

@@ -71,11 +71,8 @@ MAP: dict[str, Entry] = {
 }
 
 AXES: dict[str, list[str]] = {
-    "xyz": ["x", "y", "z"],
-    "cosine": ["x", "y"],
-    "state": ["x", "y", "z", "vx", "vy", "vz"],
-    "step": list(STEPS),
-}
+    "xyz": ["x", "y", "z"], "cosine": ["x", "y"], "state": ["x", "y", "z", "vx", "vy", "vz"], "step": list(STEPS),
+}  # fmt: skip
 """Labels along axes, for `.sel`."""
 
 

@@ -21,7 +21,7 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
+from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes, rows_by_point
 from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
 
 FUNCTION = f"{__name__}:run_cell"
@@ -169,11 +169,8 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
     """Scores of every scheme at every point of a pipeline's sweep; failures are counted, never dropped."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(repr(row.cell.point), []).append(row)
     scores = []
-    for group in groups.values():
+    for group in rows_by_point(rows):
         point = group[0].cell.point
         missing = sum(row.state == MISSING for row in group)
         for scheme in group[0].cell.settings["schemes"]:

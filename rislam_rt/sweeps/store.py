@@ -12,10 +12,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.errors import RislamError
 from rislam_rt.storage.files import (
-    TEMPORARY,
     csv_file,
+    has_marker,
     json_file,
     make_folders,
     remove_empty,
@@ -65,16 +65,8 @@ def check_folder(folder: Path) -> None:
     ResultError
         `sweep.json` was changed since it was written.
     """
-    try:
-        names = [entry.name for entry in folder.iterdir()]
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise ConfigError(f"{folder}: cannot be used ({error.strerror}); give another folder") from None
-    if SWEEP_FILE in names:
+    if has_marker(folder, SWEEP_FILE, LOCK_FILE, "sweep"):
         read_sealed(folder / SWEEP_FILE)
-    elif not all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
-        raise ConfigError(f"{folder}: exists and is not a sweep; give a folder that does not exist yet")
 
 
 @contextmanager
@@ -112,14 +104,10 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
         The disk refused.
     """
     about = {
-        "name": sweep.name,
-        "function": sweep.function,
-        "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes],
-        "base": dict(sweep.base),
-        "repetitions": sweep.repetitions,
-        "seed": sweep.seed,
-        "paired": list(sweep.paired),
-    }
+        "name": sweep.name, "function": sweep.function,
+        "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes], "base": dict(sweep.base),
+        "repetitions": sweep.repetitions, "seed": sweep.seed, "paired": list(sweep.paired),
+    }  # fmt: skip
     write_atomic(folder / SWEEP_FILE, json_file(seal(about), sort_keys=True))
 
 
@@ -149,17 +137,21 @@ def read_row(folder: Path, cell: Cell) -> Row:
     return Row(cell, MISSING, "", {})
 
 
+def rows_by_point(rows: Sequence[Row]) -> list[list[Row]]:
+    """Rows of a sweep in groups with the same values along the axes, groups and rows in their order."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(repr(row.cell.point), []).append(row)
+    return list(groups.values())
+
+
 def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
     """Append the time and machine of a cell to `timings.jsonl`, from which costs are estimated; errors are ignored."""
     line = {
-        "ident": cell.ident,
-        "point": dict(cell.point),
-        "repetition": cell.repetition,
-        "seconds": round(outcome.seconds, 4),
-        "cpu_seconds": round(outcome.cpu_seconds, 4),
-        "host": outcome.host,
+        "ident": cell.ident, "point": dict(cell.point), "repetition": cell.repetition,
+        "seconds": round(outcome.seconds, 4), "cpu_seconds": round(outcome.cpu_seconds, 4), "host": outcome.host,
         **({"timing": outcome.timing} if outcome.timing else {}),
-    }
+    }  # fmt: skip
     with suppress(OSError), (folder / "timings.jsonl").open("a", encoding="utf-8") as file:
         file.write(json.dumps(line) + "\n")
 

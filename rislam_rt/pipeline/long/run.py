@@ -89,15 +89,10 @@ def run_long(
     finally:
         _remove_unfinished(store)
     about = {
-        "name": spec.name,
-        "seed": spec.seed,
-        "cycles": cycles,
-        "schemes": list(spec.schemes),
-        "seconds": {"trace": seconds},
-        "warnings": list(panel_warnings(scene, spec)),
-        "config": spec.model_dump(mode="json"),
-        "slices": len(slice_bounds(cycles)),
-    }
+        "name": spec.name, "seed": spec.seed, "cycles": cycles, "schemes": list(spec.schemes),
+        "seconds": {"trace": seconds}, "warnings": list(panel_warnings(scene, spec)),
+        "config": spec.model_dump(mode="json"), "slices": len(slice_bounds(cycles)),
+    }  # fmt: skip
     found = gather_long(folder, scene, {**about, "versions": library_versions()}, run)
     _complete(store, scene, found, about)
     return found
@@ -128,15 +123,10 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) 
         **{name: about[name] for name in names},
     )  # fmt: skip
     summary = {
-        "seed": about["seed"],
-        "cycles": len(scene.agent),
-        "pipeline": about["name"],
-        "scene": scene.name,
-        "source": paths.source,
-        "trace_seconds": about["seconds"].get("trace", 0.0),
-        "warnings": list(lines),
+        "seed": about["seed"], "cycles": len(scene.agent), "pipeline": about["name"], "scene": scene.name,
+        "source": paths.source, "trace_seconds": about["seconds"].get("trace", 0.0), "warnings": list(lines),
         "schemes": scores,
-    }
+    }  # fmt: skip
     return LongRun(summary, shown)
 
 

@@ -27,7 +27,7 @@ from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
-from rislam_rt.storage.files import TEMPORARY, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.storage.files import has_marker, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.netcdf import dataset_bytes, read_dataset
 from rislam_rt.storage.seal import file_digest, read_sealed, seal
@@ -61,8 +61,8 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         data = seal_dataset(scheme_to_dataset(result), **self._stamp())
         if result.given is not None:
             given = seal_dataset(given_to_dataset(result), **self._stamp())
-            self._write(given_file(self.folder, name).name, dataset_bytes(given))
-        self._write(scheme_file(self.folder, name).name, dataset_bytes(data))
+            self.put(f"measurements_{name}.nc", dataset_bytes(given))
+        self.put(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
 
     def __delitem__(self, name: str) -> None:
@@ -108,24 +108,21 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             The disk refused.
         """
         paths = seal_dataset(paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
-        self._write(PATHS_FILE, dataset_bytes(paths))
+        self.put(PATHS_FILE, dataset_bytes(paths))
         for name, content in export_files(result, summary).items():
-            self._write(name, content)
+            self.put(name, content)
         told = {
-            "name": result.name,
-            "seed": result.seed,
-            "cycles": len(result.scene.agent),
-            "schemes": list(result.schemes),
-            "seconds": dict(result.seconds),
-            "warnings": list(result.warnings),
+            "name": result.name, "seed": result.seed, "cycles": len(result.scene.agent),
+            "schemes": list(result.schemes), "seconds": dict(result.seconds), "warnings": list(result.warnings),
             "config": dict(result.config),
-        }
+        }  # fmt: skip
         self.mark(DONE, told)
         return self.folder
 
     def put(self, name: str, content: bytes) -> None:
         """Write a file of the run, and note its SHA-256."""
-        self._write(name, content)
+        write_atomic(self.folder / name, content)
+        self.files[name] = hashlib.sha256(content).hexdigest()
 
     def adopt(self, names: Iterable[str]) -> None:
         """Note the SHA-256 of files that are in the folder already, and write the marker."""
@@ -139,17 +136,8 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         except ResultError:
             return False
 
-    def abandon(self) -> None:
-        """Remove the run's marker file if no file was completed."""
-        if not self.files:
-            (self.folder / RUN_FILE).unlink(missing_ok=True)
-
     def _stamp(self) -> dict[str, str]:
         return {"run": self.identity.digest, "scene_sha256": self.identity.content["scene"]["sha256"]}
-
-    def _write(self, name: str, content: bytes) -> None:
-        write_atomic(self.folder / name, content)
-        self.files[name] = hashlib.sha256(content).hexdigest()
 
 
 def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
@@ -162,18 +150,10 @@ def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
     ResultError
         The marker is not as it was written.
     """
-    try:
-        names = sorted(entry.name for entry in folder.iterdir())
-    except FileNotFoundError:
-        if folder.is_symlink():
-            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder") from None
+    if not has_marker(folder, RUN_FILE, LOCK_FILE, "run", "--out "):
+        if folder.is_symlink() and not folder.exists():
+            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder")
         return None
-    except OSError as error:
-        raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
-    if RUN_FILE not in names:
-        if all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
-            return None
-        raise ConfigError(f"--out {folder}: exists and is not a run; give a folder that does not exist yet")
     about = read_marker(folder)
     if about.get("identity") != identity.digest:
         differ = identity.difference({key: about.get(key, {}) for key in identity.content})
@@ -220,7 +200,8 @@ def open_run(folder: Path, identity: RunIdentity) -> Iterator[RunFolder]:
                 store.mark(RUNNING)
                 yield store
             except BaseException:
-                store.abandon()
+                if not store.files:  # nothing was completed
+                    (folder / RUN_FILE).unlink(missing_ok=True)
                 raise
     finally:
         remove_empty(made)
@@ -275,11 +256,6 @@ def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
 def scheme_file(folder: Path, name: str) -> Path:
     """Path of a scheme's NetCDF file in the run folder."""
     return folder / f"scheme_{name}.nc"
-
-
-def given_file(folder: Path, name: str) -> Path:
-    """Path of the NetCDF file with the inputs of a scheme's estimator in the run folder."""
-    return folder / f"measurements_{name}.nc"
 
 
 def read_run(folder: Path) -> SlamResult:
