@@ -16,15 +16,8 @@ from rislam_rt.cli.scenes import open_scene, scene_of
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.run import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.report.studies import classifier
 from rislam_rt.report.studies.claims import write_claims
-from rislam_rt.report.studies.classifier import (
-    classifier_page,
-    classifier_table,
-    draw_importance,
-    draw_panel,
-    draw_scores,
-    weights_file,
-)
 from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
 from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, write_comparison, write_fig4a
 from rislam_rt.report.style import to_png
@@ -181,9 +174,9 @@ def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
 
 PAGE, WEIGHTS = "classifier", "weights.npz"
 PICTURES = {
-    "figures/classifier_scores.png": draw_scores,
-    "figures/classifier_features.png": draw_importance,
-    "figures/classifier_panel.png": draw_panel,
+    "figures/classifier_scores.png": classifier.draw_scores,
+    "figures/classifier_features.png": classifier.draw_importance,
+    "figures/classifier_panel.png": classifier.draw_panel,
 }
 
 
@@ -198,11 +191,11 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     prepare_channel(spec.channel)
     with show_progress() as progress:
         found = train_and_score(gather_sets(scenes, spec, progress=progress), spec)
-    content = {**record, **classifier_table(found)}
+    content = {**record, **classifier.classifier_table(found)}
     contents = {
-        f"{PAGE}.md": classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),
+        f"{PAGE}.md": classifier.classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),
         f"{PAGE}.json": json_file(content),
-        WEIGHTS: weights_file(found),
+        WEIGHTS: classifier.weights_file(found),
     }
     if given.page:
         contents |= {name: to_png(draw(found)) for name, draw in PICTURES.items()}

@@ -152,36 +152,29 @@ def _trace_signals(
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.pipeline.signals import (
-        build_signals,
-        check_space,
-        coded_paths,
-        load_signals_spec,
-        mean_components,
-        signals_size,
-    )
+    from rislam_rt.pipeline import signals
     from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
     check_output(file)
-    spec = load_signals_spec(settings)
-    size = signals_size(scene, spec)
-    check_space(file, size)
+    spec = signals.load_signals_spec(settings)
+    size = signals.signals_size(scene, spec)
+    signals.check_space(file, size)
     warn()
     typer.echo(f"samples: {size}", err=True)
     codes, noise = np.random.default_rng(spec.seed).spawn(2)
     with show_progress() as tell:
         tell("trace", 0, 1)
         begin = perf_counter()
-        paths = coded_paths(scene, channel, depth, spec, rng=codes)
+        paths = signals.coded_paths(scene, channel, depth, spec, rng=codes)
         seconds = perf_counter() - begin
         tell("trace", 1, 1)
         done = count(1)
-        data = build_signals(
+        data = signals.build_signals(
             scene, paths, spec, rng=noise, on_cycle=lambda: tell("estimate", next(done), paths.num_cycles)
         )
     write_dataset(data.assign_attrs(history=MARK), file)
-    shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": mean_components(data)}
+    shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": signals.mean_components(data)}
     return TraceResult(
         paths,
         seconds,

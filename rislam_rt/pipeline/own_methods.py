@@ -20,15 +20,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.errors import ConfigError, RislamError, expect
-from rislam_rt.model import (
-    DataSheet,
-    Paths,
-    RadioConfig,
-    RisCode,
-    Scene,
-    SlamEstimate,
-    Trajectory,
-)
+from rislam_rt.model import DataSheet, Paths, RadioConfig, RisCode, Scene, SlamEstimate, Trajectory
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""

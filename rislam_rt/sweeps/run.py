@@ -8,21 +8,10 @@ from time import monotonic
 from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.sweeps import store
 from rislam_rt.sweeps.cell_work import LOST, CellOutcome, Task, find_function
 from rislam_rt.sweeps.cost import SweepCost, estimate_cost
 from rislam_rt.sweeps.local_pool import Run, local_pool
-from rislam_rt.sweeps.store import (
-    DONE,
-    MISSING,
-    Row,
-    append_timing,
-    check_folder,
-    open_folder,
-    read_row,
-    read_timings,
-    write_cell,
-    write_table,
-)
 from rislam_rt.sweeps.sweep import Cell, Sweep, build_cells
 
 TABLE_SECONDS = 1.0
@@ -63,7 +52,7 @@ class SweepProgress(NamedTuple):
     total: int
     cost: SweepCost
     """Estimated cost of the cells left."""
-    last: Row | None
+    last: store.Row | None
     """The cell that just ended; None at the start."""
 
 
@@ -71,19 +60,19 @@ class SweepProgress(NamedTuple):
 class SweepReport:
     """Result of a sweep: state and result of every cell in its order, and the estimated cost of those left."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[store.Row, ...]
     cost: SweepCost
     """Estimated cost of the cells left, if the sweep was to stop at the estimate."""
 
     @property
-    def failed(self) -> tuple[Row, ...]:
+    def failed(self) -> tuple[store.Row, ...]:
         """Cells that failed, in this run of the sweep or before."""
         return tuple(row for row in self.rows if row.failed)
 
 
 def run_sweep(
     sweep: Sweep, folder: Path, effort: SweepOptions | None = None, *,
-    tell: Callable[[SweepProgress], None] | None = None, grow: Callable[[Sequence[Row]], None] | None = None,
+    tell: Callable[[SweepProgress], None] | None = None, grow: Callable[[Sequence[store.Row]], None] | None = None,
 ) -> SweepReport:  # fmt: skip
     """Run all cells of a sweep that have no file in `folder` yet, and write a file for each.
 
@@ -110,12 +99,12 @@ def run_sweep(
     find_function(sweep.function)
     cells = build_cells(sweep)
     with ExitStack() as stack:
-        check_folder(folder)
-        left = any(read_row(folder, cell).state != DONE for cell in cells)
+        store.check_folder(folder)
+        left = any(store.read_row(folder, cell).state != store.DONE for cell in cells)
         # a cluster first: one that is not there leaves no folder behind
         hired = _hire(stack, effort) if left and effort.dask is not None else None
         shown = effort.only_estimate and (folder / "table.csv").is_file()  # tables of what was run stay as they are
-        stack.enter_context(open_folder(folder, sweep, keep=shown))
+        stack.enter_context(store.open_folder(folder, sweep, keep=shown))
         board = _SweepState(sweep, folder, effort, cells, tell, grow, keep=shown)
         stack.callback(board.write)
         if board.left:
@@ -153,26 +142,26 @@ class _SweepState:
 
     def __init__(
         self, sweep: Sweep, folder: Path, effort: SweepOptions, cells: Sequence[Cell],
-        tell: Callable[[SweepProgress], None] | None, grow: Callable[[Sequence[Row]], None] | None, *, keep: bool,
+        tell: Callable[[SweepProgress], None] | None, grow: Callable[[Sequence[store.Row]], None] | None, *, keep: bool,
     ) -> None:  # fmt: skip
         self.keep = keep
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
-        self.rows = {cell.ident: read_row(folder, cell) for cell in cells}
+        self.rows = {cell.ident: store.read_row(folder, cell) for cell in cells}
         self.left = {
             cell.ident: Task(sweep.function, {**cell.settings, **sweep.local}, cell.seed)
             for cell in cells
-            if self.rows[cell.ident].state in (MISSING, LOST) or (effort.retry and self.rows[cell.ident].failed)
+            if self.rows[cell.ident].state in (store.MISSING, LOST) or (effort.retry and self.rows[cell.ident].failed)
         }
         self.width = effort.jobs
-        self.timings = read_timings(folder)
+        self.timings = store.read_timings(folder)
         self.due = 0.0
         self.known: tuple[float, SweepCost] | None = None
 
     def take(self, ident: str, outcome: CellOutcome) -> None:
         """Store the outcome of a cell that has ended, and report progress."""
         cell = self.rows[ident].cell
-        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.function, outcome)
-        append_timing(self.folder, cell, outcome)
+        self.rows[ident] = row = store.write_cell(self.folder, cell, self.sweep.function, outcome)
+        store.append_timing(self.folder, cell, outcome)
         self.timings.append({"point": cell.point, "seconds": outcome.seconds})
         self.left.pop(ident)
         if monotonic() >= self.due:
@@ -186,11 +175,11 @@ class _SweepState:
             self.known = monotonic() + TABLE_SECONDS, estimate_cost(left, self.timings, self.width)
         return self.known[1]
 
-    def show(self, last: Row | None) -> None:
+    def show(self, last: store.Row | None) -> None:
         """Report the sweep's progress; `last` is the cell that just ended."""
         if self.tell is not None:
             states = [row.state for row in self.rows.values()]
-            done = states.count(DONE)
+            done = states.count(store.DONE)
             failed = len(states) - done - sum(row.cell.ident in self.left for row in self.rows.values())
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
@@ -200,7 +189,7 @@ class _SweepState:
             return
         begin = monotonic()
         rows = list(self.rows.values())
-        write_table(self.folder, rows)
+        store.write_table(self.folder, rows)
         if self.grow is not None:
             self.grow(rows)
         taken = monotonic() - begin

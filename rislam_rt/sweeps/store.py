@@ -13,16 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rislam_rt.errors import RislamError
-from rislam_rt.storage.files import (
-    csv_file,
-    has_marker,
-    json_file,
-    make_folders,
-    remove_empty,
-    remove_temporaries,
-    write_all,
-    write_atomic,
-)
+from rislam_rt.storage import files
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import flatten, read_sealed, seal
 from rislam_rt.sweeps.cell_work import CellOutcome
@@ -65,7 +56,7 @@ def check_folder(folder: Path) -> None:
     ResultError
         `sweep.json` was changed since it was written.
     """
-    if has_marker(folder, SWEEP_FILE, LOCK_FILE, "sweep"):
+    if files.has_marker(folder, SWEEP_FILE, LOCK_FILE, "sweep"):
         read_sealed(folder / SWEEP_FILE)
 
 
@@ -83,16 +74,16 @@ def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None
         It holds something else, or another sweep is at work there.
     """
     check_folder(folder)
-    made = make_folders(folder)
+    made = files.make_folders(folder)
     try:
         with hold(folder, "sweep"):
             check_folder(folder)
-            remove_temporaries((folder, folder / "cells"))
+            files.remove_temporaries((folder, folder / "cells"))
             if not keep:
                 write_sweep(folder, sweep)
             yield
     finally:
-        remove_empty(made)
+        files.remove_empty(made)
 
 
 def write_sweep(folder: Path, sweep: Sweep) -> None:
@@ -108,7 +99,7 @@ def write_sweep(folder: Path, sweep: Sweep) -> None:
         "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes], "base": dict(sweep.base),
         "repetitions": sweep.repetitions, "seed": sweep.seed, "paired": list(sweep.paired),
     }  # fmt: skip
-    write_atomic(folder / SWEEP_FILE, json_file(seal(about), sort_keys=True))
+    files.write_atomic(folder / SWEEP_FILE, files.json_file(seal(about), sort_keys=True))
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
@@ -121,7 +112,7 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) ->
     """
     state = outcome.cause or DONE
     content = {"function": function, "state": state, "message": outcome.message, "result": outcome.result or {}}
-    write_atomic(_file(folder, cell), json_file(seal({**cell._asdict(), **content}), sort_keys=True))
+    files.write_atomic(_file(folder, cell), files.json_file(seal({**cell._asdict(), **content}), sort_keys=True))
     return Row(cell, state, outcome.message, outcome.result or {})
 
 
@@ -182,13 +173,13 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
         fixed = (row.cell.repetition, row.cell.seed, row.state, row.message)
         known = {**row.cell.point, **dict(zip(FIXED, fixed, strict=True))}
         entries.append(known | {f"result.{name}" if name in known else name: result.get(name) for name in results})
-    write_all(folder, {"table.csv": csv_bytes(entries), "table.json": json_file(entries, sort_keys=True)})
+    files.write_all(folder, {"table.csv": csv_bytes(entries), "table.json": files.json_file(entries, sort_keys=True)})
 
 
 def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
     """Encode rows as CSV with the columns of the first row; lists are joined by semicolons."""
     rows = ([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()] for entry in entries)
-    return csv_file(entries[0] if entries else (), rows)
+    return files.csv_file(entries[0] if entries else (), rows)
 
 
 def _file(folder: Path, cell: Cell) -> Path:

@@ -15,14 +15,7 @@ import numpy as np
 
 from rislam_rt.errors import ResultError
 from rislam_rt.model import Body, Paths, Scene, SchemeResult, Trajectory
-from rislam_rt.pipeline.dataset import (
-    check_dataset,
-    dataset_to_paths,
-    dataset_to_scheme,
-    paths_to_dataset,
-    scheme_to_dataset,
-    seal_dataset,
-)
+from rislam_rt.pipeline import dataset
 from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
@@ -86,11 +79,11 @@ def run_slices(
         part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
-            (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),
-            (slice_file(folder, number, f"scheme_{name}.nc"), scheme_to_dataset(part)),
+            (slice_file(folder, number, PATHS_FILE), dataset.paths_to_dataset(own, scene.agent[first:last])),
+            (slice_file(folder, number, f"scheme_{name}.nc"), dataset.scheme_to_dataset(part)),
             (slice_file(folder, number, f"measurements_{name}.nc"), given_to_dataset(part)),
         ):
-            write_dataset(seal_dataset(data, run=run, slice=str(number)), file)
+            write_dataset(dataset.seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
 
 
@@ -119,12 +112,12 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
         for what in (PATHS_FILE, f"scheme_{name}.nc"):
             file = slice_file(folder, number, what)
             data = read_dataset(file)
-            check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
+            dataset.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
             found.append(data)
-        scheme = dataset_to_scheme(found[1])
+        scheme = dataset.dataset_to_scheme(found[1])
         if scheme.scheme != name:
             raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield SlicePart(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
+        yield SlicePart(scene.agent[first:last], dataset.dataset_to_paths(found[0]), scheme)
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:

@@ -15,14 +15,7 @@ from typing import Any
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import SchemeResult, SlamResult, Trajectory
-from rislam_rt.pipeline.dataset import (
-    check_dataset,
-    dataset_to_paths,
-    dataset_to_scheme,
-    paths_to_dataset,
-    scheme_to_dataset,
-    seal_dataset,
-)
+from rislam_rt.pipeline import dataset
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
 from rislam_rt.pipeline.store.identity import RunIdentity
@@ -58,9 +51,9 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             raise KeyError(name) from None
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
-        data = seal_dataset(scheme_to_dataset(result), **self._stamp())
+        data = dataset.seal_dataset(dataset.scheme_to_dataset(result), **self._stamp())
         if result.given is not None:
-            given = seal_dataset(given_to_dataset(result), **self._stamp())
+            given = dataset.seal_dataset(given_to_dataset(result), **self._stamp())
             self.put(f"measurements_{name}.nc", dataset_bytes(given))
         self.put(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
@@ -107,7 +100,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         StoreError
             The disk refused.
         """
-        paths = seal_dataset(paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
+        paths = dataset.seal_dataset(dataset.paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
         self.put(PATHS_FILE, dataset_bytes(paths))
         for name, content in export_files(result, summary).items():
             self.put(name, content)
@@ -276,8 +269,8 @@ def read_run(folder: Path) -> SlamResult:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
         check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
-        check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
-        paths, scene = dataset_to_paths(data), load_scene(folder / "scene")
+        dataset.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
+        paths, scene = dataset.dataset_to_paths(data), load_scene(folder / "scene")
         agent = Trajectory(
             data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
             data["true_heading"].to_numpy(), scene.agent.body,
@@ -314,5 +307,5 @@ def reading_run(folder: Path) -> Iterator[None]:
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
     """Read a scheme's result from its NetCDF file, and check that it is of this scheme and run."""
     data = read_dataset(file)
-    check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
-    return dataset_to_scheme(data)
+    dataset.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
+    return dataset.dataset_to_scheme(data)
