@@ -59,8 +59,7 @@ class BackendInfo:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """One row of the report of `rislam-rt doctor`: a component of the machine, what was found, and whether it will
-    do."""
+    """One row of the report of `rislam-rt doctor`: part of the machine, what was found, and whether it will do."""
 
     name: str
     value: str
@@ -197,8 +196,7 @@ def _threads() -> int:
 
 
 def _choose_llvm() -> tuple[str, str]:
-    """Path and version of the libLLVM to use: the one that DRJIT_LIBLLVM_PATH names, else that of the installed wheel,
-    else the newest of the system."""
+    """Path and version of the libLLVM to use: of DRJIT_LIBLLVM_PATH, else of the wheel, else the system's newest."""
     own = os.environ.get("DRJIT_LIBLLVM_PATH")
     if own:
         if not Path(own).is_file():
@@ -215,8 +213,7 @@ def _choose_llvm() -> tuple[str, str]:
 
 
 def _wheel_llvm() -> Iterator[str]:
-    """Path of the libLLVM of the installed karellen-llvm-core wheel: the file itself, as links to it may be missing in
-    a read-only environment."""
+    """Path of the libLLVM file of the installed karellen-llvm-core wheel; links to it may be missing."""
     try:
         files = metadata.distribution("karellen-llvm-core").files or []
     except metadata.PackageNotFoundError:

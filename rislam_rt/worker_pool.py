@@ -81,15 +81,7 @@ class Worker:
             return Lost(code, monotonic() - begin)
 
     def _hear(self, end: float | None) -> Any:
-        """Receive the next message of a worker process before the time `end` (of `monotonic`; None: no limit).
-
-        Raises
-        ------
-        TimeoutError
-            There is none until `end`.
-        EOFError, OSError
-            The interpreter has ended.
-        """
+        """Next message of a worker process before the time `end` (of `monotonic`); `EOFError` if its process ended."""
         while not self.channel.poll(LOOK_SECONDS if end is None else min(LOOK_SECONDS, max(end - monotonic(), 0.0))):
             if not self.alive:  # a child of its own that lives on keeps the channel open
                 raise EOFError

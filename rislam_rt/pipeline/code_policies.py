@@ -52,10 +52,7 @@ def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolic
 
 
 def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Settings) -> CodePolicy:
-    """Code policy of the genie: designs each code on the true paths of the cycle in which it will take effect.
-
-    The prior of the agent's position is the belief's.
-    """
+    """Code policy of the genie: designs on the true paths of the cycle of the code's use, with the belief's prior."""
 
     def choose(
         belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator

@@ -167,10 +167,7 @@ def _checksum(data: "xr.Dataset") -> str:
 
 
 def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
-    """Attributes of a data set as sorted lists of texts, so that they are alike before and after NetCDF.
-
-    NetCDF gives numbers back as arrays, and a list of one entry as that entry.
-    """
+    """Attributes of a data set as sorted lists of texts: alike before and after NetCDF, which gives back arrays."""
     found = []
     for name in sorted(map(str, attributes)):
         value = attributes[name]

@@ -1,7 +1,6 @@
 """The sweep engine: evaluates a function over axes of settings and seeds, with a file for each cell, resumable."""
 
-from rislam_rt.sweeps.cost import SweepCost
-from rislam_rt.sweeps.run import SweepOptions, SweepProgress, SweepReport, run_sweep
+from rislam_rt.sweeps.run import SweepCost, SweepOptions, SweepProgress, SweepReport, run_sweep
 from rislam_rt.sweeps.store import Row
 from rislam_rt.sweeps.sweep import Axis, Sweep, build_cells, parse_axis
 

@@ -80,20 +80,14 @@ def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None
             check_folder(folder)
             files.remove_temporaries((folder, folder / "cells"))
             if not keep:
-                write_sweep(folder, sweep)
+                _write_sweep(folder, sweep)
             yield
     finally:
         files.remove_empty(made)
 
 
-def write_sweep(folder: Path, sweep: Sweep) -> None:
-    """Write function, axes, base settings and seed of a sweep to `sweep.json`, by which the folder is recognised.
-
-    Raises
-    ------
-    StoreError
-        The disk refused.
-    """
+def _write_sweep(folder: Path, sweep: Sweep) -> None:
+    """Write function, axes, base settings and seed of a sweep to `sweep.json`, by which the folder is recognised."""
     about = {
         "name": sweep.name, "function": sweep.function,
         "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes], "base": dict(sweep.base),

@@ -15,7 +15,7 @@ from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
-from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise, summary_table
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.store import run_folder
 from rislam_rt.pipeline.store.exports import record_files
@@ -63,9 +63,8 @@ def run_long(
     todo = [name for name in spec.schemes if not store.holds(slices.slice_files(name, cycles))]
     seconds = 0.0
     try:
-        for name, outcome in run_side_by_side(
-            slices.run_slices, todo, (scene, body, spec, seeds, folder, run), jobs, progress
-        ):
+        common = (scene, body, spec, seeds, folder, run)
+        for name, outcome in run_side_by_side(slices.run_slices, todo, common, jobs, progress):
             if isinstance(outcome, RislamError):
                 raise outcome
             store.adopt(slices.slice_files(name, cycles))
@@ -77,19 +76,13 @@ def run_long(
         "seconds": {"trace": seconds}, "warnings": list(panel_warnings(scene, spec)),
         "config": spec.model_dump(mode="json"), "slices": len(slices.slice_bounds(cycles)),
     }  # fmt: skip
-    found = gather_long(folder, scene, {**about, "versions": library_versions()}, run)
+    found = _gather(folder, scene, {**about, "versions": library_versions()}, run)
     _complete(store, scene, found, about)
     return found
 
 
-def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
-    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in the run's marker.
-
-    Raises
-    ------
-    ResultError, StoreError
-        A file is missing, damaged or changed.
-    """
+def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
+    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in its marker."""
     schemes, scores, paths, motion = {}, {}, None, scene.agent
     settings = build_settings(PipelineSpec.model_validate(dict(about["config"])))
     for name in about["schemes"]:
@@ -106,12 +99,7 @@ def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) 
         scene=replace(scene, agent=motion), paths=paths, schemes=schemes, warnings=lines,
         **{name: about[name] for name in names},
     )  # fmt: skip
-    summary = {
-        "seed": about["seed"], "cycles": len(scene.agent), "pipeline": about["name"], "scene": scene.name,
-        "source": paths.source, "trace_seconds": about["seconds"].get("trace", 0.0), "warnings": list(lines),
-        "schemes": scores,
-    }  # fmt: skip
-    return LongRun(summary, shown)
+    return LongRun(summary_table(shown, scores, len(scene.agent)), shown)
 
 
 def read_any(folder: Path) -> LongRun:
@@ -135,7 +123,7 @@ def read_any(folder: Path) -> LongRun:
     run_folder.check_files(folder, about)
     with run_folder.reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
-        return gather_long(folder, scene, about, about["identity"])
+        return _gather(folder, scene, about, about["identity"])
 
 
 def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:

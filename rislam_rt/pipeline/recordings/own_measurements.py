@@ -104,7 +104,7 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
             what = "not a readable NetCDF file" if file.exists() else "no such file"
             raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
         try:
-            return check_inputs(dataset_to_inputs(data), str(file))
+            return _check_inputs(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
             said = " ".join(str(error.args[0] if error.args else error).split())
             cause = said.partition(". Did you mean")[0][:80]
@@ -161,17 +161,11 @@ def inputs_of(
         heading = np.full(len(cycles), np.nan)
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
-    return check_inputs(made, place)
+    return _check_inputs(made, place)
 
 
-def check_inputs(inputs: Inputs, place: str) -> Inputs:
-    """Check units and ranges of an estimator's inputs from a user's file, and return them.
-
-    Raises
-    ------
-    ConfigError
-        A delay, cosine, amplitude, standard deviation or time cannot be; the line says which.
-    """
+def _check_inputs(inputs: Inputs, place: str) -> Inputs:
+    """Check units and ranges of an estimator's inputs from a user's file, and return them."""
     for cycle, one in enumerate(inputs.measurements):
         where = f"{place}: cycle {cycle}"
         if (one.tau > LONGEST_DELAY).any():

@@ -34,16 +34,17 @@ class LandmarkTrack(NamedTuple):
 
 def summarise(result: SlamResult) -> dict[str, Any]:
     """All scores of a run and its schemes as a table for JSON."""
+    scores = {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()}
+    return summary_table(result, scores, len(result.scene.agent))
+
+
+def summary_table(result: SlamResult, scores: Mapping[str, Any], cycles: int) -> dict[str, Any]:
+    """Table for JSON of a run of so many cycles, with the scores of its schemes by name."""
     return {
-        "seed": result.seed,
-        "cycles": len(result.scene.agent),
-        "pipeline": result.name,
-        "scene": result.scene.name,
-        "source": result.paths.source,
-        "trace_seconds": result.seconds.get("trace", 0.0),
-        "warnings": list(result.warnings),
-        "schemes": {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()},
-    }
+        "seed": result.seed, "cycles": cycles, "pipeline": result.name, "scene": result.scene.name,
+        "source": result.paths.source, "trace_seconds": result.seconds.get("trace", 0.0),
+        "warnings": list(result.warnings), "schemes": scores,
+    }  # fmt: skip
 
 
 def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]:

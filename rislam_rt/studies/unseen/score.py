@@ -188,10 +188,7 @@ def _nees(truth: Truth, answers: Answers) -> float | None:
 
 
 def _delay(first: Integers, audible: Booleans, time: Floats) -> float | None:
-    """Median time [s] from the first cycle in which a landmark or wall is detectable to the first that has it mapped.
-
-    None if none is both.
-    """
+    """Median time [s] from the first cycle in which a landmark or wall is detectable to the first that maps it."""
     known = (first >= 0) & audible.any(axis=0)
     return _median(time[first[known]] - time[np.argmax(audible[:, known], axis=0)])
 
