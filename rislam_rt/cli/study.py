@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -103,9 +104,7 @@ def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
     for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
 
-    def write(rows: Sequence[Row]) -> Path | None:
-        return write_swept(rows, spec, record, folder, figures=given.page)
-
+    write = partial(write_swept, spec=spec, record=record, folder=folder, figures=given.page)
     run_cells(sweep, cells, spec.time_limit_s, given, record, write)
 
 
@@ -113,18 +112,11 @@ def run_cells(
     sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
     write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run the cells of a study's sweep, rewriting its page as they end; exit code 1 if one failed.
-
-    `show` prints the results at the end.
-    """
-
-    def grow(rows: Sequence[Row]) -> None:
-        write(rows)
-
+    """Run the cells of a study's sweep, rewriting its page as they end, and `show` them; exit code 1 if one failed."""
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
-            report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
+            report = run_sweep(sweep, cells, effort, tell=tell, grow=write)
     except KeyboardInterrupt:
         raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     if show is not None:
@@ -166,10 +158,9 @@ def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
         timings = read_timings(cells)
         return write_unseen(rows, spec, record, folder, tests=tests, timings=timings, figures=given.page)
 
-    def show(rows: Sequence[Row]) -> None:
-        print_cards(rows, read_timings(cells))
-
-    run_cells(sweep, cells, spec.time_limit_s, given, record, write, show)
+    run_cells(
+        sweep, cells, spec.time_limit_s, given, record, write, lambda rows: print_cards(rows, read_timings(cells))
+    )
 
 
 PAGE, WEIGHTS = "classifier", "weights.npz"

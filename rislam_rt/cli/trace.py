@@ -176,8 +176,6 @@ def _trace_signals(
     write_dataset(data.assign_attrs(history=MARK), file)
     shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": signals.mean_components(data)}
     return TraceResult(
-        paths,
-        seconds,
-        AT_REST if spec.code == "zero" else spec.code,
+        paths, seconds, AT_REST if spec.code == "zero" else spec.code,
         {"files": {"signals": str(file)}, "signals": shape},
-    )
+    )  # fmt: skip

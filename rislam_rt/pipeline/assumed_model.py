@@ -58,11 +58,9 @@ def tell_belief(
     return AssumedModel(
         tell_start(motion, float(heading[0]), spec.start, told, settings, rng=start),
         replace(body, tx_offset=body.tx_offset + told.baseline_m * _outwards(body)),
-        None if panel is None else tell_panel(panel, told),
-        tell_settings(settings, told),
-        heading,
+        None if panel is None else tell_panel(panel, told), tell_settings(settings, told), heading,
         motion.time * told.time_scale,
-    )
+    )  # fmt: skip
 
 
 def tell_start(
@@ -111,11 +109,9 @@ def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
     slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
     radio = tell_radio(settings.radio, told)
     sensor = replace(
-        settings.sensor,
-        radio=radio,
-        threshold=settings.sensor.threshold * _amplitude(told.threshold_db) ** 2,
+        settings.sensor, radio=radio, threshold=settings.sensor.threshold * _amplitude(told.threshold_db) ** 2,
         false_alarms=settings.sensor.false_alarms * told.clutter_scale,
-    )
+    )  # fmt: skip
     found = settings._replace(radio=radio, slam=slam, sensor=sensor)
     return found._replace(
         **{
@@ -128,11 +124,9 @@ def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
 def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
     """Assumed radio: true carrier, band and array, with the errors of noise density, antenna gain and patterns."""
     return replace(
-        radio,
-        noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
-        tx_gain=radio.tx_gain * _amplitude(told.gain_db) ** 2,
-        antennas=Antennas() if told.antennas else radio.antennas,
-    )
+        radio, noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
+        tx_gain=radio.tx_gain * _amplitude(told.gain_db) ** 2, antennas=Antennas() if told.antennas else radio.antennas,
+    )  # fmt: skip
 
 
 def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:

@@ -120,14 +120,12 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
     """Result of one scheme from a NetCDF data set that `scheme_to_dataset` made."""
     outcomes = names_of(data.attrs["outcomes"])
     return SchemeResult(
-        scheme=str(data.attrs["scheme"]),
-        levels=int(data.attrs["levels"]),
-        **_values(data, SCHEME, ""),
+        scheme=str(data.attrs["scheme"]), levels=int(data.attrs["levels"]), **_values(data, SCHEME, ""),
         info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
         outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
         map=MapEstimate(**_values(data, MAP, "map_")),
         smoothed=_values(data, SMOOTHED, "")["smoothed"] if "smoothed" in data else None,
-    )
+    )  # fmt: skip
 
 
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":

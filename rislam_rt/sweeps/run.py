@@ -112,7 +112,7 @@ class SweepReport:
 
 def run_sweep(
     sweep: Sweep, folder: Path, effort: SweepOptions | None = None, *,
-    tell: Callable[[SweepProgress], None] | None = None, grow: Callable[[Sequence[store.Row]], None] | None = None,
+    tell: Callable[[SweepProgress], None] | None = None, grow: Callable[[Sequence[store.Row]], object] | None = None,
 ) -> SweepReport:  # fmt: skip
     """Run all cells of a sweep that have no file in `folder` yet, and write a file for each.
 
@@ -145,7 +145,7 @@ def run_sweep(
         hired = _hire(stack, effort) if left and effort.dask is not None else None
         shown = effort.only_estimate and (folder / "table.csv").is_file()  # tables of what was run stay as they are
         stack.enter_context(store.open_folder(folder, sweep, keep=shown))
-        board = _SweepState(sweep, folder, effort, cells, tell, grow, keep=shown)
+        board = _SweepState(sweep, folder, effort, cells, keep=shown, tell=tell, grow=grow)
         stack.callback(board.write)
         if board.left:
             run, board.width = hired or _hire(stack, effort)
@@ -179,8 +179,8 @@ class _SweepState:
     """State of a running sweep: results of its cells, cells left and their cost; writes them and reports progress."""
 
     def __init__(
-        self, sweep: Sweep, folder: Path, effort: SweepOptions, cells: Sequence[Cell],
-        tell: Callable[[SweepProgress], None] | None, grow: Callable[[Sequence[store.Row]], None] | None, *, keep: bool,
+        self, sweep: Sweep, folder: Path, effort: SweepOptions, cells: Sequence[Cell], *, keep: bool,
+        tell: Callable[[SweepProgress], None] | None, grow: Callable[[Sequence[store.Row]], object] | None,
     ) -> None:  # fmt: skip
         self.keep = keep
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow

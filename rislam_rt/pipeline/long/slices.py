@@ -199,13 +199,11 @@ def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
     names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
              "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
     return replace(
-        scheme,
-        **{name: getattr(scheme, name)[rows] for name in names if getattr(scheme, name) is not None},
+        scheme, **{name: getattr(scheme, name)[rows] for name in names if getattr(scheme, name) is not None},
         info={name: values[rows] for name, values in scheme.info.items()},
         smoothed=None if scheme.smoothed is None else scheme.smoothed[rows],
-        outcome=tuple(scheme.outcome[row] for row in rows),
-        given=None,
-    )
+        outcome=tuple(scheme.outcome[row] for row in rows), given=None,
+    )  # fmt: skip
 
 
 def path_columns(parts: Sequence[Paths]) -> list[Integers]:

@@ -167,11 +167,9 @@ def _tables(examples: Examples, kept: Booleans) -> Integers:
 def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
     """Confusion counts among `rows`: kept rightly, kept wrongly, removed wrongly, removed rightly."""
     return (
-        int(np.sum(rows & kept & keep)),
-        int(np.sum(rows & kept & ~keep)),
-        int(np.sum(rows & ~kept & keep)),
+        int(np.sum(rows & kept & keep)), int(np.sum(rows & kept & ~keep)), int(np.sum(rows & ~kept & keep)),
         int(np.sum(rows & ~kept & ~keep)),
-    )
+    )  # fmt: skip
 
 
 def _f1(tables: Any) -> Floats:
