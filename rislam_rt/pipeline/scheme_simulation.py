@@ -9,7 +9,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.doppler import doppler_shift
-from rislam_rt.measurement import FrontEnd
+from rislam_rt.measurement import Clutter, FrontEnd
 from rislam_rt.model import NOTHING, Body, PathKind, Paths, RisCode, Scene, SchemeResult
 from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
 from rislam_rt.pipeline.code_policies import build_designer
@@ -17,7 +17,6 @@ from rislam_rt.pipeline.control_link import open_link
 from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, Receptions, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import RecordedInputs, given_of
-from rislam_rt.pipeline.room.diffuse_clutter import received_clutter
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
@@ -76,7 +75,7 @@ class SchemeSimulation:
         clutter, twin = None, deepcopy(self.sway)  # one array hears both
         if extras is not None:
             extras = perceived_paths(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
-            clutter = received_clutter(extras, motion, self.context.settings.radio)
+            clutter = Clutter(extras, doppler_shift(extras, motion, self.context.settings.radio.wavelength))
         heard = perceived_paths(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
         if first == 0:
             build = np.random.default_rng(self.seeds.hardware)

@@ -1,6 +1,6 @@
 """A long run in slices: simulates the schemes side by side, scores them slice by slice, completes the run folder."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -141,9 +141,12 @@ def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
 
 def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:
     """Write the files of a long run that are not in slices: trajectories, maps, scores and, last, the marker."""
-    tracks = {"truth.tum": _truth_lines(scene)}
+    agent, run = scene.agent, store.identity.digest
+    whole = (agent[first:last] for first, last in slices.slice_bounds(len(agent)))
+    tracks = {"truth.tum": (tum_bytes(motion.time, motion.position, motion.heading) for motion in whole)}
     for name in about["schemes"]:
-        tracks[f"estimate_{name}.tum"] = _estimate_lines(store, name, scene)
+        parts = slices.read_parts(store.folder, name, scene, run)
+        tracks[f"estimate_{name}.tum"] = (tum_bytes(p.motion.time, p.scheme.position, p.scheme.heading) for p in parts)
     for name, pieces in tracks.items():
         write_pieces(store.folder / name, pieces)
     store.adopt(tracks)
@@ -162,16 +165,3 @@ def _remove_unfinished(store: run_folder.RunFolder) -> None:
             place.rmdir()
     with suppress(OSError):
         (store.folder / slices.FOLDER).rmdir()
-
-
-def _truth_lines(scene: Scene) -> Iterator[bytes]:
-    """True trajectory of a long run in TUM format, slice by slice."""
-    for first, last in slices.slice_bounds(len(scene.agent)):
-        motion = scene.agent[first:last]
-        yield tum_bytes(motion.time, motion.position, motion.heading)
-
-
-def _estimate_lines(store: run_folder.RunFolder, name: str, scene: Scene) -> Iterator[bytes]:
-    """Estimated trajectory of one scheme of a long run in TUM format, slice by slice."""
-    for part in slices.read_parts(store.folder, name, scene, store.identity.digest):
-        yield tum_bytes(part.motion.time, part.scheme.position, part.scheme.heading)

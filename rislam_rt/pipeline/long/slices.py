@@ -171,13 +171,16 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
     if any(part.panel is not None for part in parts):
         parts = [replace(p, panel=np.zeros(p.held.shape, int)) if p.panel is None else p for p in parts]
         held.append("panel")
+    # negative numbers (clutter, none) stay; a slice without paths has an entry to look at all the same
+    known = [(part.component_path, np.append(column, -1)) for part, column in zip(parts, columns, strict=True)]
+    taken = [np.where(path >= 0, column[np.maximum(path, 0)], path) for path, column in known]
     course: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in plain}
     course |= {name: _spread([getattr(part, name) for part in parts], places, len(ident)) for name in held}
     return replace(
         parts[-1],
         **course,
         gain=_spread([part.gain for part in parts], columns, count),
-        component_path=_stacked([_renamed(p.component_path, c) for p, c in zip(parts, columns, strict=True)]),
+        component_path=_stacked(taken),
         component_landmark=_stacked([part.component_landmark for part in parts]),
         ident=ident,
         parent=parent,
@@ -227,11 +230,6 @@ def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> An
         table[row : row + len(part)] = block
         row += len(part)
     return table
-
-
-def _renamed(path: Integers, column: Integers) -> Integers:
-    """Path numbers of a slice's components as numbers of the joined paths; negative ones (clutter, none) stay."""
-    return np.where(path >= 0, column[np.maximum(path, 0)] if len(column) else path, path)
 
 
 def _stacked(parts: Sequence[Integers]) -> Integers:
