@@ -83,15 +83,16 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
     """Print the scores of a completed run from its folder, and draw its page if that is missing."""
     from rislam_rt.pipeline.long.run import read_any
-    from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
+    from rislam_rt.pipeline.store.run_folder import hold_run, read_summary
     from rislam_rt.report.page import PAGE, write_report
+    from rislam_rt.storage.lock import LOCK_FILE
 
     summary = read_summary(folder, about)
     typer.echo("this run is complete already; nothing was computed")
     show_scores(summary)
     page = folder / PAGE
     draw = given.page and not page.is_file()
-    if draw or is_left_locked(folder):  # a process died at the report, or is at it
+    if draw or (folder / LOCK_FILE).exists():  # a process died at the report, or is at it
         with hold_run(folder):
             if draw:
                 write_report(read_any(folder).shown, summary, folder)

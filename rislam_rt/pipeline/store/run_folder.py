@@ -216,11 +216,6 @@ def hold_run(folder: Path) -> Iterator[None]:
         yield
 
 
-def is_left_locked(folder: Path) -> bool:
-    """Whether a run folder has a lock file: another process writes there, or ended without removing it."""
-    return (folder / LOCK_FILE).exists()
-
-
 def check_files(folder: Path, about: Mapping[str, Any]) -> None:
     """Check that no file of a completed run was changed since it was written.
 
