@@ -25,18 +25,9 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PARTS = (
-    "rislam_rt",
-    "tests",
-    "pipelines",
-    "scenes",
-    "benchmarks",
-    "docs",
-    "notebooks",
-    "tools",
-    "README.md",
-    "CHANGELOG.md",
-    "Makefile",
-)
+    "rislam_rt", "tests", "pipelines", "scenes", "benchmarks", "docs", "notebooks", "tools", "README.md",
+    "CHANGELOG.md", "Makefile",
+)  # fmt: skip
 ALSO = ("pyproject.toml", "mkdocs.yml", ".ci", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "requirements.lock")
 LEFT_OUT = ("tests/rules", "tests/test_mutants.py")
 """They read the code's text, so that they would notice the edit and not what it does."""
@@ -63,12 +54,9 @@ class Mutant(NamedTuple):
 
 
 OF_THE_BOUND = (
-    "information/test_trajectory.py",
-    "pipeline/scores/test_scheme_bound.py",
-    "reference/test_end_to_end.py",
-    "studies/test_pipeline_sweep.py",
-    "studies/test_studies_swept.py",
-)
+    "information/test_trajectory.py", "pipeline/scores/test_scheme_bound.py", "reference/test_end_to_end.py",
+    "studies/test_pipeline_sweep.py", "studies/test_studies_swept.py",
+)  # fmt: skip
 """Tests that a fault of the bound is likeliest to break, the quickest first."""
 MUTANTS = (
     Mutant("nothing", "constants.py", "", ""),

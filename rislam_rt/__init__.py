@@ -11,21 +11,8 @@ __version__ = "0.1.0"
 _HOMES = {
     "rislam_rt.scene": ("load_scene", "check_scene", "new_scene", "write_scene"),
     "rislam_rt.model": (
-        "Scene",
-        "Trajectory",
-        "Body",
-        "RisPanel",
-        "RisSpec",
-        "RisCode",
-        "RadioConfig",
-        "Paths",
-        "Measurement",
-        "SensorModel",
-        "SlamEstimate",
-        "MapEstimate",
-        "pose_estimate",
-        "SchemeResult",
-        "SlamResult",
+        "Scene", "Trajectory", "Body", "RisPanel", "RisSpec", "RisCode", "RadioConfig", "Paths", "Measurement",
+        "SensorModel", "SlamEstimate", "MapEstimate", "pose_estimate", "SchemeResult", "SlamResult",
     ),
     "rislam_rt.channel.traced": ("TracedChannel",),
     "rislam_rt.channel.image_source": ("ImageSourceChannel",),
@@ -35,17 +22,11 @@ _HOMES = {
     "rislam_rt.slam": ("SlamConfig", "StartPrior"),
     "rislam_rt.pipeline": ("load_spec", "run_slam", "build_radio"),
     "rislam_rt.pipeline.recordings": (
-        "Inputs",
-        "dataset_to_inputs",
-        "localise",
-        "read_inputs",
-        "inputs_of",
-        "replay",
-        "answers_from_arrays",
+        "Inputs", "dataset_to_inputs", "localise", "read_inputs", "inputs_of", "replay", "answers_from_arrays",
     ),
     "rislam_rt.studies.unseen": ("read_recording", "score_run"),
     "rislam_rt.sweeps": ("Axis", "Sweep", "SweepOptions", "run_sweep"),
-}
+}  # fmt: skip
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names}
 """Module of each public name of the package; docs/reference/api.md lists the same names and says what it promises of
 them."""

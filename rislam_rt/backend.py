@@ -34,12 +34,9 @@ PYTHONS = ((3, 11), (3, 13))
 
 _PACKAGES = ("rislam-rt", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core", "numpy", "scipy")
 _SYSTEM_LLVM = (
-    "/usr/lib/*-linux-gnu/libLLVM*.so*",
-    "/usr/lib64/libLLVM*.so*",
-    "/usr/lib/llvm-*/lib/libLLVM*.so*",
-    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
-    "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
-)
+    "/usr/lib/*-linux-gnu/libLLVM*.so*", "/usr/lib64/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*",
+    "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib", "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
+)  # fmt: skip
 _HOW_TO_GET = (
     f"libLLVM {OLDEST_LLVM} or newer is needed: 'pip install karellen-llvm-core' (Linux x86-64), or install one "
     "from your system (Debian: libllvm19, macOS: brew install llvm) and set DRJIT_LIBLLVM_PATH to it"
@@ -62,8 +59,7 @@ class BackendInfo:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """One row of the report of `rislam-rt doctor`: a component of the machine, what was found, and whether it will
-    do."""
+    """One row of the report of `rislam-rt doctor`: part of the machine, what was found, and whether it will do."""
 
     name: str
     value: str
@@ -200,8 +196,7 @@ def _threads() -> int:
 
 
 def _choose_llvm() -> tuple[str, str]:
-    """Path and version of the libLLVM to use: the one that DRJIT_LIBLLVM_PATH names, else that of the installed wheel,
-    else the newest of the system."""
+    """Path and version of the libLLVM to use: of DRJIT_LIBLLVM_PATH, else of the wheel, else the system's newest."""
     own = os.environ.get("DRJIT_LIBLLVM_PATH")
     if own:
         if not Path(own).is_file():
@@ -218,8 +213,7 @@ def _choose_llvm() -> tuple[str, str]:
 
 
 def _wheel_llvm() -> Iterator[str]:
-    """Path of the libLLVM of the installed karellen-llvm-core wheel: the file itself, as links to it may be missing in
-    a read-only environment."""
+    """Path of the libLLVM file of the installed karellen-llvm-core wheel; links to it may be missing."""
     try:
         files = metadata.distribution("karellen-llvm-core").files or []
     except metadata.PackageNotFoundError:

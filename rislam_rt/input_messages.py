@@ -6,37 +6,20 @@ from typing import Any
 from rislam_rt.toml import toml_value
 
 UNITS = {
-    "_m_s2": "m/s^2",
-    "_m_s": "m/s",
-    "_bits_s": "bit/s",
-    "_ns_s": "ns/s",
-    "_s_m": "S/m",
-    "_m2": "m^2",
-    "_ghz": "GHz",
-    "_db": "dB",
-    "_deg": "degrees",
-    "_ns": "ns",
-    "_s": "s",
-    "_m": "m",
-    "_j": "J",
-    "_wavelengths": "wavelengths",
-}
+    "_m_s2": "m/s^2", "_m_s": "m/s", "_bits_s": "bit/s", "_ns_s": "ns/s", "_s_m": "S/m", "_m2": "m^2", "_ghz": "GHz",
+    "_db": "dB", "_deg": "degrees", "_ns": "ns", "_s": "s", "_m": "m", "_j": "J", "_wavelengths": "wavelengths",
+}  # fmt: skip
 """Units by the suffix of a name; the longest that fits. A name without one has its unit in its meaning."""
 
 BOUNDS = {
-    "greater than or equal to": "at least",
-    "less than or equal to": "at most",
-    "greater than": "more than",
+    "greater than or equal to": "at least", "less than or equal to": "at most", "greater than": "more than",
     "less than": "less than",
-}
+}  # fmt: skip
 """Bounds of a range as the models say them, and in plain words; the longer first."""
 
 KINDS = {
-    "int_": "a whole number",
-    "float_": "a number",
-    "bool_": "true or false",
-    "string_type": "text in quotes",
-}
+    "int_": "a whole number", "float_": "a number", "bool_": "true or false", "string_type": "text in quotes",
+}  # fmt: skip
 """What a value of a wrong type must be, by the beginning of the fault's type."""
 
 

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator
+from itertools import takewhile
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
@@ -51,12 +51,5 @@ def name_from_here(folder: Path) -> str:
 
 def first_sentence(pipeline: Path) -> str:
     """Description of a pipeline file: the first sentence of its leading comment."""
-    return re.split(r"(?<=(?<!Fig)\.) ", " ".join(_leading_comment(pipeline)))[0]
-
-
-def _leading_comment(file: Path) -> Iterator[str]:
-    """Lines of the comment at the top of a pipeline file, without `#`."""
-    for line in file.read_text(encoding="utf-8").splitlines():
-        if not line.startswith("#"):
-            return
-        yield line.removeprefix("#").strip()
+    lines = takewhile(lambda line: line.startswith("#"), pipeline.read_text(encoding="utf-8").splitlines())
+    return re.split(r"(?<=(?<!Fig)\.) ", " ".join(line.removeprefix("#").strip() for line in lines))[0]

@@ -81,15 +81,7 @@ class Worker:
             return Lost(code, monotonic() - begin)
 
     def _hear(self, end: float | None) -> Any:
-        """Receive the next message of a worker process before the time `end` (of `monotonic`; None: no limit).
-
-        Raises
-        ------
-        TimeoutError
-            There is none until `end`.
-        EOFError, OSError
-            The interpreter has ended.
-        """
+        """Next message of a worker process before the time `end` (of `monotonic`); `EOFError` if its process ended."""
         while not self.channel.poll(LOOK_SECONDS if end is None else min(LOOK_SECONDS, max(end - monotonic(), 0.0))):
             if not self.alive:  # a child of its own that lives on keeps the channel open
                 raise EOFError
@@ -166,7 +158,10 @@ def open_pool(
     tell
         Called from here with a piece's name and how far it is.
     """
-    pool, threads, news = Pool(environment), ThreadPoolExecutor(jobs, initializer=leave_interrupts), SimpleQueue[Any]()
+    pool, news = Pool(environment), SimpleQueue[Any]()
+    # an interrupt from the keyboard reaches the whole process group: neither these threads nor their workers answer it
+    blocked = (signal.SIG_BLOCK, {signal.SIGINT})
+    threads = ThreadPoolExecutor(jobs, initializer=signal.pthread_sigmask, initargs=blocked)
 
     def lead(name: str, arguments: tuple[Any, ...]) -> None:
         try:
@@ -222,12 +217,6 @@ def run_side_by_side(
             if isinstance(found, Lost):
                 found = RislamError(f"{name}: its process died (exit code {found.code}); run it again alone")
             yield name, found
-
-
-def leave_interrupts() -> None:
-    """Block SIGINT in this thread and in the worker processes started from it: an interrupt from the keyboard reaches
-    the whole process group."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
 
 def serve(handle: int) -> None:

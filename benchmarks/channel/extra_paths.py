@@ -35,13 +35,10 @@ def lead(room: str, settings: list[str], seeds: int, cycles: int) -> tuple[np.nd
     spec = load_spec(
         "pipelines/trace_then_slam.toml",
         [
-            "receiver.estimator=bound",
-            "receiver.alternation=false",
-            f"cycles={cycles}",
-            "schemes=['optimized']",
+            "receiver.estimator=bound", "receiver.alternation=false", f"cycles={cycles}", "schemes=['optimized']",
             *settings,
         ],
-    )
+    )  # fmt: skip
     stage = prepare_setup(load_scene(room), spec, rng=np.random.default_rng(7))
     errors, false = [], []
     for seed in range(seeds):

@@ -154,12 +154,9 @@ def disturbed(truth: SlamEstimate, std: float, *, rng: np.random.Generator) -> S
     position = truth.position + std * rng.normal(size=3) * level
     shift = std * rng.normal(size=truth.map.position.shape)
     return replace(
-        truth,
-        position=position,
-        samples=position + std * rng.normal(size=(64, 3)) * level,
-        covariance=np.diag([std**2] * 3 + [0.01] * 3),
-        map=replace(truth.map, position=truth.map.position + shift),
-    )
+        truth, position=position, samples=position + std * rng.normal(size=(64, 3)) * level,
+        covariance=np.diag([std**2] * 3 + [0.01] * 3), map=replace(truth.map, position=truth.map.position + shift),
+    )  # fmt: skip
 
 
 def random_belief(scene: Scene, *, rng: np.random.Generator, std: float = 0.05) -> SlamEstimate:

@@ -16,18 +16,9 @@ UNCERTIFIED = DesignConfig(certify=False)
 
 
 def design_along(
-    paths: Paths,
-    tx: Floats,
-    rx: Floats,
-    radio: RadioConfig,
-    ris: DataSheet,
-    *,
-    method: str,
-    rng: np.random.Generator,
-    prior: Floats | None = None,
-    least_snr: float = 0.0,
-    config: DesignConfig = UNCERTIFIED,
-) -> RisCode:
+    paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, ris: DataSheet, *, method: str, rng: np.random.Generator,
+    prior: Floats | None = None, least_snr: float = 0.0, config: DesignConfig = UNCERTIFIED,
+) -> RisCode:  # fmt: skip
     """The genie's codes (K, N, M), one for each cycle of known paths; for places of a grid as well.
 
     `tx`, `rx` (K, 3) [m]. Where the panel is out of sight the code is a random one.
@@ -54,16 +45,9 @@ def design_along(
 
 
 def position_error_map(
-    paths: Paths,
-    tx: Floats,
-    rx: Floats,
-    radio: RadioConfig,
-    *,
-    mode: GradientMode = "exact",
-    prior: Floats | float = 0.0,
-    least_snr: float = 0.0,
-    use_vt: bool = False,
-) -> PositionBound:
+    paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, *, mode: GradientMode = "exact",
+    prior: Floats | float = 0.0, least_snr: float = 0.0, use_vt: bool = False,
+) -> PositionBound:  # fmt: skip
     """Horizontal position bound (K,) at K places, for the code that the paths' gains carry; the map is known.
 
     Parameters

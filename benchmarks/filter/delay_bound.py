@@ -116,12 +116,9 @@ def main() -> None:
     print("| SNR [dB] | along, across [m] | the same, 3 mm at least [m] | reckoned across [m] |\n" + "| --- " * 4 + "|")
     for snr in arguments.snr:
         told = (
-            "receiver.estimator=bound",
-            "receiver.alternation=false",
-            "channel=image_source",
-            "motion.sigma_a_m_s2=0.01",
-            f"cycles={arguments.cycles}",
-        )
+            "receiver.estimator=bound", "receiver.alternation=false", "channel=image_source",
+            "motion.sigma_a_m_s2=0.01", f"cycles={arguments.cycles}",
+        )  # fmt: skip
         spec = load_spec(
             ROOT / "pipelines" / "trace_then_slam.toml", (*told, f"radio.reference_snr_db={snr}", 'schemes=["bp_slam"]')
         )

@@ -243,13 +243,10 @@ def row_of(runs: list[dict[str, Any]], kind: int) -> Row:
         none = np.full(3, np.nan)
         return Row(float(np.mean(loud[:, 2])) if len(loud) else np.nan, 0.0, none, none, none, np.nan)
     return Row(
-        float(np.mean(loud[:, 2])) if len(loud) else np.nan,
-        len(mine) / sum(int(one["cycles"]) for one in runs),
-        np.quantile(error / deviation, 0.683, axis=0),
-        np.median(deviation, axis=0),
-        np.quantile(error, 0.683, axis=0),
+        float(np.mean(loud[:, 2])) if len(loud) else np.nan, len(mine) / sum(int(one["cycles"]) for one in runs),
+        np.quantile(error / deviation, 0.683, axis=0), np.median(deviation, axis=0), np.quantile(error, 0.683, axis=0),
         float(np.mean((error / deviation > FAR).any(axis=1))),
-    )
+    )  # fmt: skip
 
 
 def report(names: list[str], found: dict[str, list[dict[str, Any]]]) -> None:
@@ -328,11 +325,8 @@ def draw(names: list[str], found: dict[str, list[dict[str, Any]]], file: str) ->
         rows = [row_of(found[name], kind) for kind in CLASSES]
         place = np.arange(len(CLASSES)) + (number - (len(names) - 1) / 2.0) * 0.8 / len(names)
         values = (
-            [r.found for r in rows],
-            [r.deviation[0] for r in rows],
-            [r.ratio[0] for r in rows],
-            [r.tail for r in rows],
-        )
+            [r.found for r in rows], [r.deviation[0] for r in rows], [r.ratio[0] for r in rows], [r.tail for r in rows],
+        )  # fmt: skip
         for axis, heights in zip(axes, values, strict=True):
             axis.bar(place, heights, 0.8 / len(names), label=name)
     for axis, title in zip(axes, titles, strict=True):

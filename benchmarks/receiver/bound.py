@@ -54,14 +54,9 @@ def received(tau: Floats, cosines: Floats, snr_db: float, phase: Floats) -> Rece
     up = np.sqrt(1.0 - np.sum(cosines**2, axis=1))
     count = len(tau)
     return Received(
-        np.arange(count),
-        tau / RADIO.bandwidth,
-        np.column_stack([cosines, up]),
-        amplitude * np.exp(1j * phase),
-        np.full(count, -1),
-        np.full(count, 10.0),
-        np.zeros(count),
-    )
+        np.arange(count), tau / RADIO.bandwidth, np.column_stack([cosines, up]), amplitude * np.exp(1j * phase),
+        np.full(count, -1), np.full(count, 10.0), np.zeros(count),
+    )  # fmt: skip
 
 
 def lone_path(snr_db: float, trials: int, rng: np.random.Generator) -> Floats:

@@ -14,9 +14,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.design import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.model import PathKind, Paths, RadioConfig, Scene, Trajectory
 from rislam_rt.scene import load_scene
 
 RADII = np.array([0.02, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9, 1.1, 1.4, 1.8])
@@ -79,11 +79,7 @@ def focused(scene: Scene, tracer: Channel) -> Paths:
     still = np.zeros_like(places)
     motion = Trajectory(np.arange(float(len(places))), places, still, np.full(len(places), HEADING), scene.agent.body)
     paths = tracer.paths(motion)
-    assert paths.ris is not None
-    direct = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
-    response = paths.ris.tx[:, paths.ris.tx_leg[direct]] * paths.ris.rx[:, paths.ris.rx_leg[direct]]
-    index, _ = exact_code(response.reshape(len(places), -1), scene.ris.spec.levels)
-    return tracer.respond(paths, RisCode(index.reshape(response.shape), scene.ris.spec.levels))
+    return tracer.respond(paths, focus_codes(paths, scene.ris.spec.levels))
 
 
 def run(paths: Paths, panel: int, radio: RadioConfig, alternation: bool, trials: int) -> Outcome:

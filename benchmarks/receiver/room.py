@@ -16,10 +16,10 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.protocol import Channel
-from rislam_rt.design import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement import ReceiverConfig, detection_probability, measure, receive, with_reference_snr
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.model import PathKind, Paths, RadioConfig, Scene, Trajectory
 from rislam_rt.scene import load_scene
 
 REFERENCES_DB = (0.0, 13.0, 30.0)
@@ -103,11 +103,7 @@ def focused(scene: Scene, tracer: Channel, motion: Trajectory) -> Paths:
     """Paths with the panel set, in every cycle, to the best code of its direct path."""
     paths = tracer.paths(motion)
     assert scene.ris is not None
-    assert paths.ris is not None
-    direct = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
-    response = paths.ris.tx[:, paths.ris.tx_leg[direct]] * paths.ris.rx[:, paths.ris.rx_leg[direct]]
-    index, _ = exact_code(response.reshape(len(motion), -1), scene.ris.spec.levels)
-    return tracer.respond(paths, RisCode(index.reshape(response.shape), scene.ris.spec.levels))
+    return tracer.respond(paths, focus_codes(paths, scene.ris.spec.levels))
 
 
 def run(paths: Paths, motion: Trajectory, radio: RadioConfig, config: ReceiverConfig, seed: int) -> Findings:

@@ -15,10 +15,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.design import exact_code
+from rislam_rt.design import focus_codes
 from rislam_rt.measurement import ReceiverConfig, measure, receive, with_reference_snr
 from rislam_rt.measurement.slot_motion import split_by_code
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene, Trajectory
+from rislam_rt.model import PathKind, Paths, RadioConfig, Scene, Trajectory
 from rislam_rt.scene import load_scene
 
 SLOTS = {
@@ -68,11 +68,7 @@ def focused(scene: Scene, radio: RadioConfig, motion: Trajectory) -> Paths:
     tracer = ImageSourceChannel(scene, radio, 2)
     paths = tracer.paths(motion)
     assert scene.ris is not None
-    assert paths.ris is not None
-    direct = int(np.flatnonzero(paths.kind == PathKind.RIS)[0])
-    response = paths.ris.tx[:, paths.ris.tx_leg[direct]] * paths.ris.rx[:, paths.ris.rx_leg[direct]]
-    index, _ = exact_code(response.reshape(len(motion), -1), scene.ris.spec.levels)
-    return tracer.respond(paths, RisCode(index.reshape(response.shape), scene.ris.spec.levels))
+    return tracer.respond(paths, focus_codes(paths, scene.ris.spec.levels))
 
 
 def leaks(paths: Paths, motion: Trajectory, radio: RadioConfig, config: ReceiverConfig, shift: Floats) -> Floats:

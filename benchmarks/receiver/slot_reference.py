@@ -18,11 +18,9 @@ from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.scene import load_scene
 
 WAYS = {
-    "10 us": ("receiver.code_dwell=1e-5",),
-    "A-B-B-A": (),
-    "A-B": ('receiver.order="AB"',),
+    "10 us": ("receiver.code_dwell=1e-5",), "A-B-B-A": (), "A-B": ('receiver.order="AB"',),
     "A-B, taken for the panel's": ('receiver.order="AB"',),
-}
+}  # fmt: skip
 
 
 def main() -> None:

@@ -74,13 +74,9 @@ def compare_hearing() -> None:
         scene = replace(scene, agent=scene.agent[:CYCLES])
         schemes = '["genie", "random", "optimized"]' if scene.ris else '["no_ris"]'
         changed = [
-            "receiver.estimator=bound",
-            "receiver.alternation=false",
-            f"radio.reference_snr_db={snr}",
-            "channel=image_source",
-            f"schemes={schemes}",
-            "design.method=exact",
-        ]
+            "receiver.estimator=bound", "receiver.alternation=false", f"radio.reference_snr_db={snr}",
+            "channel=image_source", f"schemes={schemes}", "design.method=exact",
+        ]  # fmt: skip
         spec = load_spec(PIPELINE, changed)
         advice = advise(scene, build_settings(spec), rng=np.random.default_rng(SEED))
         result = rislam_rt.run_slam(scene, spec, rng=np.random.default_rng(SEED))

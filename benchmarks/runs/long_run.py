@@ -59,12 +59,9 @@ def main() -> int:
     parser.add_argument("--set", action="append", default=[], dest="settings")
     given = parser.parse_args()
     settings = [
-        "receiver.estimator=bound",
-        "receiver.alternation=false",
-        "channel=image_source",
-        'schemes=["random"]',
+        "receiver.estimator=bound", "receiver.alternation=false", "channel=image_source", 'schemes=["random"]',
         *given.settings,
-    ]
+    ]  # fmt: skip
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
     peaks: dict[int, float] = {}
 

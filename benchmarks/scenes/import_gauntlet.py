@@ -143,14 +143,9 @@ def scan(folder: Path) -> tuple[Path, list[str]]:
 
 
 CASES: dict[str, tuple[Callable[[Path], tuple[Path, list[str]]], list[str]]] = {
-    "glb": (drawn("glb"), []),
-    "obj": (drawn("obj"), []),
-    "stl": (drawn("stl"), []),
-    "ply": (drawn("ply"), []),
-    "planes": (drawn("glb"), ["--curved", "planes"]),
-    "svg": (plan, []),
-    "scan": (scan, []),
-}
+    "glb": (drawn("glb"), []), "obj": (drawn("obj"), []), "stl": (drawn("stl"), []), "ply": (drawn("ply"), []),
+    "planes": (drawn("glb"), ["--curved", "planes"]), "svg": (plan, []), "scan": (scan, []),
+}  # fmt: skip
 
 
 def command(*words: object) -> tuple[float, str, bool]:

@@ -152,11 +152,7 @@ def _legs(rows: list[SolverLeg], device: Floats, far: Floats, depth: int, radio:
         return values
 
     return SpecularLegs(
-        walls=table,
-        valid=dense(np.ones(len(cycle), dtype=np.bool_)),
-        length=dense(length),
-        at_device=dense(geometry.at_device),
-        at_far_end=dense(geometry.at_far_end),
-        coefficient=dense(field * 4.0 * np.pi * length / radio.wavelength),
-        vertices=dense(geometry.vertices),
-    )
+        walls=table, valid=dense(np.ones(len(cycle), dtype=np.bool_)), length=dense(length),
+        at_device=dense(geometry.at_device), at_far_end=dense(geometry.at_far_end),
+        coefficient=dense(field * 4.0 * np.pi * length / radio.wavelength), vertices=dense(geometry.vertices),
+    )  # fmt: skip

@@ -8,13 +8,9 @@ from rislam_rt.cli.options import Depth, JsonFile, RadioSettings, SceneFolder, S
 
 
 def command(
-    scene: SceneFolder,
-    poses: Annotated[int, typer.Option(min=1, max=100_000, help="Number of random poses.")] = 50,
-    depth: Depth = 2,
-    seed: Seed = 7,
-    set_: RadioSettings = None,
-    json: JsonFile = None,
-) -> None:
+    scene: SceneFolder, poses: Annotated[int, typer.Option(min=1, max=100_000, help="Number of random poses.")] = 50,
+    depth: Depth = 2, seed: Seed = 7, set_: RadioSettings = None, json: JsonFile = None,
+) -> None:  # fmt: skip
     """Compare traced and analytic paths one by one at random poses. Exit code 1 if a path that one side lacks is
     unexplained, or an error of a path that both have is beyond what precision and geometry explain.
 

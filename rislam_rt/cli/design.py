@@ -12,13 +12,10 @@ from rislam_rt.cli.output_files import OUTPUT
 def command(
     scene: SceneFolder,
     at: Annotated[str, typer.Option(metavar="X,Y,Z", help="The agent's midpoint, in metres.", show_default=False)],
-    depth: Depth = 2,
-    channel: ChannelName = "image_source",
-    seed: Seed = 7,
-    set_: RadioSettings = None,
+    depth: Depth = 2, channel: ChannelName = "image_source", seed: Seed = 7, set_: RadioSettings = None,
     figure: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the codes (PNG or SVG)."), OUTPUT] = None,
     json: JsonFile = None,
-) -> None:
+) -> None:  # fmt: skip
     """Design the panel's code for one position with every method, and say how far each is from the optimum.
 
     Example: rislam-rt design paper_room --at 1.5,1.5,0 --figure codes.png

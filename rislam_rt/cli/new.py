@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from rislam_rt.cli.options import parse_numbers, parse_point
+from rislam_rt.cli.options import parse_point
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")]
 _ROOM = "paper_room"
@@ -109,13 +109,7 @@ def command(
 
 
 def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:
-    """Check that the options of `new` name one origin of the room: a file, a floor plan, a seed or a template.
-
-    Raises
-    ------
-    ConfigError
-        They name two.
-    """
+    """Check that the options of `new` name one origin of the room: a file, a floor plan, a seed or a template."""
     from rislam_rt.errors import ConfigError
 
     origins = {"--from": source, "--floorplan": floorplan, "--seed": seed, "--template": template}
@@ -125,18 +119,16 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
 
 
 def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:
-    """Write a scene folder from an XML scene of Mitsuba or Sionna RT, which has its own units, axes and materials.
-
-    Raises
-    ------
-    ConfigError
-        Options for units, axes or materials are given (`useless`).
-    """
+    """Write a scene folder from an XML scene, for whose units and materials options are `useless`."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.xml import new_from_xml
 
     if useless:
         raise ConfigError(f"{useless[0]}: an XML scene is in metres, z up, and names its materials; leave it out")
-    for note in new_from_xml(str(source), folder, within=parse_numbers("--within", within), overwrite=overwrite):
+    try:
+        window = [float(word) for word in within.split(",")] if within.strip() else []
+    except ValueError:
+        raise ConfigError(f"--within: '{within[:60]}' received; give numbers parted by commas") from None
+    for note in new_from_xml(str(source), folder, within=window, overwrite=overwrite):
         typer.echo(f"- {note}")
     typer.echo(f"{folder}: made from '{source}'; edit its scene.toml")

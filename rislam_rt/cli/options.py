@@ -86,22 +86,6 @@ class StudyOptions(NamedTuple):
     """Whether to draw the figures and the page."""
 
 
-def parse_numbers(option: str, text: str) -> list[float]:
-    """Numbers of a command line option, separated by commas; none from an empty text.
-
-    Raises
-    ------
-    ConfigError
-        Something in it is no number.
-    """
-    from rislam_rt.errors import ConfigError
-
-    try:
-        return [float(word) for word in text.split(",")] if text.strip() else []
-    except ValueError:
-        raise ConfigError(f"{option}: '{text[:60]}' received; give numbers parted by commas") from None
-
-
 def parse_point(option: str, text: str) -> "Floats":
     """Point or vector (3,) from the text `x,y,z` of a command line option.
 
@@ -121,11 +105,6 @@ def parse_point(option: str, text: str) -> "Floats":
     if values.shape != (3,) or not (np.abs(values) <= FARTHEST).all():
         raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
     return values
-
-
-def beside(pipeline: Path, name: str) -> Path:
-    """Path of a folder that a pipeline file names relative to itself."""
-    return Path(os.path.normpath(pipeline.parent / name))
 
 
 def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":

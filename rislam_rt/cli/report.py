@@ -7,7 +7,7 @@ import typer
 
 from rislam_rt.cli.options import JsonFile, write_json
 from rislam_rt.cli.output_files import OUTPUT
-from rislam_rt.cli.scores import show_scores
+from rislam_rt.cli.run import show_scores
 
 if TYPE_CHECKING:
     from rislam_rt.model import SlamResult

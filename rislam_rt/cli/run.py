@@ -1,12 +1,12 @@
 """The command `rislam-rt run PIPELINE`: runs a SLAM pipeline or a study, or goes on with one that was stopped."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
-from rislam_rt.cli.scores import show_scores
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.spelling import counted
 
@@ -49,16 +49,13 @@ def command(
     if isinstance(spec, PipelineSpec):
         run_main_job(spec, given)
         return
-    from rislam_rt.cli import study, training, unseen
+    from rislam_rt.cli import study
     from rislam_rt.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, UnseenSpec
 
     runs: dict[type, Callable[[Any, StudyOptions], None]] = {
-        CompareSpec: study.run_compare_channels,
-        Fig4aSpec: study.run_gain_curves,
-        UnseenSpec: unseen.run_unseen,
-        ClaimsSpec: study.run_claims,
-        ClassifierSpec: training.run_classifier,
-    }
+        CompareSpec: study.run_compare_channels, Fig4aSpec: study.run_gain_curves, UnseenSpec: study.run_unseen,
+        ClaimsSpec: study.run_claims, ClassifierSpec: study.run_classifier,
+    }  # fmt: skip
     runs.get(type(spec), study.run_swept)(spec, given)
 
 
@@ -86,15 +83,16 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
     """Print the scores of a completed run from its folder, and draw its page if that is missing."""
     from rislam_rt.pipeline.long.run import read_any
-    from rislam_rt.pipeline.store.run_folder import hold_run, is_left_locked, read_summary
+    from rislam_rt.pipeline.store.run_folder import hold_run, read_summary
     from rislam_rt.report.page import PAGE, write_report
+    from rislam_rt.storage.lock import LOCK_FILE
 
     summary = read_summary(folder, about)
     typer.echo("this run is complete already; nothing was computed")
     show_scores(summary)
     page = folder / PAGE
     draw = given.page and not page.is_file()
-    if draw or is_left_locked(folder):  # a process died at the report, or is at it
+    if draw or (folder / LOCK_FILE).exists():  # a process died at the report, or is at it
         with hold_run(folder):
             if draw:
                 write_report(read_any(folder).shown, summary, folder)
@@ -146,3 +144,12 @@ def compute_run(
         raise Interrupted(f"interrupted: {said}") from None
     typer.echo(f"run folder: {folder}")
     write_json(given.json, summary)
+
+
+def show_scores(summary: Mapping[str, Any]) -> None:
+    """Print the scores of a run from its summary, then its warnings on the error stream."""
+    from rislam_rt.report.terminal_tables import print_summary
+
+    print_summary(summary)
+    for line in summary["warnings"]:
+        warn(line)

@@ -162,7 +162,7 @@ def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
 
     from rislam_rt.scene.write import tum_bytes
     from rislam_rt.storage.files import csv_file, json_file, write_all
-    from rislam_rt.sweeps.plain_data import plain_result
+    from rislam_rt.sweeps.cell_work import plain_result
 
     position = np.array([one.position for one in answers.estimates])
     heading = np.array([one.heading for one in answers.estimates])

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,46 +10,50 @@ import numpy as np
 import typer
 
 from rislam_rt.cli.interrupts import Interrupted
-from rislam_rt.cli.options import StudyOptions, beside, write_json
+from rislam_rt.cli.options import StudyOptions, write_json
 from rislam_rt.cli.output_files import page_files, study_folder
 from rislam_rt.cli.progress import show_progress, show_sweep
 from rislam_rt.cli.scenes import open_scene, scene_of
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.run import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.report.studies import classifier
 from rislam_rt.report.studies.claims import write_claims
 from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
 from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, write_comparison, write_fig4a
+from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.terminal_tables import print_validation
+from rislam_rt.report.unseen import write_unseen
+from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.scene.file_names import safe_name
 from rislam_rt.shipped import room_beside
-from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec
+from rislam_rt.storage.files import json_file, write_all
+from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec, UnseenSpec
 from rislam_rt.studies.claims import SOURCE, judge, read_results
+from rislam_rt.studies.classifier.sets import gather_sets
+from rislam_rt.studies.classifier.spec import ClassifierSpec
+from rislam_rt.studies.classifier.train import ALL, train_and_score
 from rislam_rt.studies.compare import comparison_table, run_comparison
 from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept import build_sweep
 from rislam_rt.studies.swept.sweep import swept_record
+from rislam_rt.studies.unseen import build_unseen, count_tests
+from rislam_rt.studies.unseen.sweep import unseen_record
 from rislam_rt.sweeps import Row, Sweep, SweepOptions, build_cells, run_sweep
-from rislam_rt.sweeps.store import check_folder
+from rislam_rt.sweeps.store import check_folder, read_timings
 
 
-def refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
-    """Raise an error if `--scene` is given for a study that names its own rooms, or has none.
-
-    Raises
-    ------
-    ConfigError
-        It was given.
-    """
+def _refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
+    """Raise an error if `--scene` is given for a study that names its own rooms, or has none."""
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
 
 
 def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
     """Run the study that compares ray tracer and image sources, and write its page; exit code 1 if they differ."""
-    refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
+    _refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
     scenes = [one.scene for one in opened]
@@ -99,9 +104,7 @@ def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
     for kind in {cell.depends["config"]["channel"] for cell in found}:
         prepare_channel(kind)
 
-    def write(rows: Sequence[Row]) -> Path | None:
-        return write_swept(rows, spec, record, folder, figures=given.page)
-
+    write = partial(write_swept, spec=spec, record=record, folder=folder, figures=given.page)
     run_cells(sweep, cells, spec.time_limit_s, given, record, write)
 
 
@@ -109,18 +112,11 @@ def run_cells(
     sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
     write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run the cells of a study's sweep, rewriting its page as they end; exit code 1 if one failed.
-
-    `show` prints the results at the end.
-    """
-
-    def grow(rows: Sequence[Row]) -> None:
-        write(rows)
-
+    """Run the cells of a study's sweep, rewriting its page as they end, and `show` them; exit code 1 if one failed."""
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
-            report = run_sweep(sweep, cells, effort, tell=tell, grow=grow)
+            report = run_sweep(sweep, cells, effort, tell=tell, grow=write)
     except KeyboardInterrupt:
         raise Interrupted("interrupted: what is done is kept; the same command goes on from there") from None
     if show is not None:
@@ -134,8 +130,8 @@ def run_cells(
 
 def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
     """Check the paper's claims against the results of other studies, and write the page."""
-    refuse_scene(given, "claims", "runs in no room; leave it out")
-    results = read_results(beside(given.pipeline, spec.results))
+    _refuse_scene(given, "claims", "runs in no room; leave it out")
+    results = read_results(Path(os.path.normpath(given.pipeline.parent / spec.results)))
     found = judge(results)
     sources = {study: {name: content[name] for name in SOURCE} for study, content in results.items()}
     folder = study_folder(given.out, spec.name, results, page_files(spec.name))
@@ -143,3 +139,58 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
         typer.echo(f"{claim.verdict}: {claim.claim}")
     typer.echo(f"page: {write_claims(found, spec.name, sources, folder)}")
     write_json(given.json, {"claims": [claim._asdict() for claim in found]})
+
+
+def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
+    """Run the study in unseen random rooms, print the scores and write its page; exit code 1 if a room failed."""
+    _refuse_scene(given, "unseen", "draws its rooms; leave it out")
+    cells = Path("sweeps") / spec.name
+    record = unseen_record(spec)
+    files = page_files(spec.name, figure=given.page)
+    folder = study_folder(given.out, f"{spec.name}-{spec.first}", record, files)
+    check_folder(cells)
+    sweep = build_unseen(spec, given.pipeline, Path("sweeps") / f"{spec.name}_data")
+    for kind in {cell.depends["config"]["channel"] for cell in build_cells(sweep)}:
+        prepare_channel(kind)
+    tests = count_tests(spec, given.pipeline)
+
+    def write(rows: Sequence[Row]) -> Path | None:
+        timings = read_timings(cells)
+        return write_unseen(rows, spec, record, folder, tests=tests, timings=timings, figures=given.page)
+
+    run_cells(
+        sweep, cells, spec.time_limit_s, given, record, write, lambda rows: print_cards(rows, read_timings(cells))
+    )
+
+
+PAGE, WEIGHTS = "classifier", "weights.npz"
+PICTURES = {
+    "figures/classifier_scores.png": classifier.draw_scores,
+    "figures/classifier_features.png": classifier.draw_importance,
+    "figures/classifier_panel.png": classifier.draw_panel,
+}
+
+
+def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
+    """Train and score the classifier of multipath components, and write weights, page, data and figures."""
+    _refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
+    radio = build_radio(spec.radio)
+    scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]
+    record = study_record(spec, scenes)
+    files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *(PICTURES if given.page else ()))
+    folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
+    prepare_channel(spec.channel)
+    with show_progress() as progress:
+        found = train_and_score(gather_sets(scenes, spec, progress=progress), spec)
+    content = {**record, **classifier.classifier_table(found)}
+    contents = {
+        f"{PAGE}.md": classifier.classifier_page(found, spec, (*PICTURES,) if given.page else None).encode(),
+        f"{PAGE}.json": json_file(content),
+        WEIGHTS: classifier.weights_file(found),
+    }
+    if given.page:
+        contents |= {name: to_png(draw(found)) for name, draw in PICTURES.items()}
+    page = write_all(folder, contents)
+    typer.echo(f"F1 on all test rooms: {found.scores[ALL]['network'].f1:.4f}")
+    typer.echo(f"page: {page}")
+    write_json(given.json, content)

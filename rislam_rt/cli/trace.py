@@ -78,17 +78,17 @@ def command(
         raise ConfigError(f"--set {beyond[0][:60]}: without --signals radio.* alone; add it, or leave this out")
     radio = signal_settings(load_signals_spec(set_ or ()))[0] if signals else load_radio(set_ or ())
     opened = open_scene(scene, radio)
-    room = part_of_motion(opened.scene, cycles, stride)
+    room = _part_of_motion(opened.scene, cycles, stride)
     if deepmimo is not None:
-        check_new(deepmimo)
+        _check_new(deepmimo)
     prepare_channel(channel)
     if signals:
-        traced = trace_signals(
+        traced = _trace_signals(
             room, channel, depth, set_ or (), out or Path(f"{safe_name(room.name)}-signals.nc"), opened.warn
         )
     else:
         opened.warn()
-        traced = trace_paths(room, radio, channel, depth, out)
+        traced = _trace_paths(room, radio, channel, depth, out)
     if deepmimo is not None:
         traced.content.setdefault("files", {})["deepmimo"] = str(deepmimo)
         write_files(deepmimo_files(room, traced.paths, radio, depth), deepmimo)
@@ -100,14 +100,8 @@ def command(
     write_json(json, {**content, "seconds": traced.seconds, "classes": table, **traced.content})
 
 
-def check_new(folder: Path) -> None:
-    """Check the folder of `trace --deepmimo` before paths are traced: it must not exist.
-
-    Raises
-    ------
-    ConfigError
-        It exists, or has a name that the DeepMIMO package cannot load.
-    """
+def _check_new(folder: Path) -> None:
+    """Check the folder of `trace --deepmimo` before paths are traced: it must not exist, and have a name that loads."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.report.exports.deepmimo import check_name
 
@@ -116,14 +110,8 @@ def check_new(folder: Path) -> None:
         raise ConfigError(f"--deepmimo {folder}: exists already; give a folder that does not exist yet")
 
 
-def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
-    """Scene with the first `cycles` of its trajectory alone, of these every `stride`-th.
-
-    Raises
-    ------
-    ConfigError
-        The trajectory has fewer cycles.
-    """
+def _part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
+    """Scene with the first `cycles` of its trajectory alone, of these every `stride`-th; an error if it has fewer."""
     from dataclasses import replace
 
     from rislam_rt.errors import ConfigError
@@ -136,7 +124,7 @@ def part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     return replace(scene, agent=agent)
 
 
-def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> TraceResult:
+def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, file: Path | None) -> TraceResult:
     """Find all paths along a scene's trajectory, RIS panel at phase level 0, and write them to a file if given."""
     from time import perf_counter
 
@@ -154,7 +142,7 @@ def trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int, 
     return TraceResult(paths, seconds, AT_REST, {"files": {"paths": str(file)}})
 
 
-def trace_signals(
+def _trace_signals(
     scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
 ) -> TraceResult:
     """Find all paths under phase codes, simulate received samples and components, and write the data set to a file."""
@@ -164,39 +152,30 @@ def trace_signals(
     import numpy as np
 
     from rislam_rt.cli.progress import show_progress
-    from rislam_rt.pipeline.signals import (
-        build_signals,
-        check_space,
-        coded_paths,
-        load_signals_spec,
-        mean_components,
-        signals_size,
-    )
+    from rislam_rt.pipeline import signals
     from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
     check_output(file)
-    spec = load_signals_spec(settings)
-    size = signals_size(scene, spec)
-    check_space(file, size)
+    spec = signals.load_signals_spec(settings)
+    size = signals.signals_size(scene, spec)
+    signals.check_space(file, size)
     warn()
     typer.echo(f"samples: {size}", err=True)
     codes, noise = np.random.default_rng(spec.seed).spawn(2)
     with show_progress() as tell:
         tell("trace", 0, 1)
         begin = perf_counter()
-        paths = coded_paths(scene, channel, depth, spec, rng=codes)
+        paths = signals.coded_paths(scene, channel, depth, spec, rng=codes)
         seconds = perf_counter() - begin
         tell("trace", 1, 1)
         done = count(1)
-        data = build_signals(
+        data = signals.build_signals(
             scene, paths, spec, rng=noise, on_cycle=lambda: tell("estimate", next(done), paths.num_cycles)
         )
     write_dataset(data.assign_attrs(history=MARK), file)
-    shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": mean_components(data)}
+    shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": signals.mean_components(data)}
     return TraceResult(
-        paths,
-        seconds,
-        AT_REST if spec.code == "zero" else spec.code,
+        paths, seconds, AT_REST if spec.code == "zero" else spec.code,
         {"files": {"signals": str(file)}, "signals": shape},
-    )
+    )  # fmt: skip

@@ -15,11 +15,9 @@ if TYPE_CHECKING:
 __all__ = ["PipelineSpec", "build_radio", "load_spec", "run_slam"]
 
 _HOME = {
-    "build_radio": "specification.radio",
-    "load_spec": "specification.read",
-    "run_slam": "run",
+    "build_radio": "specification.radio", "load_spec": "specification.read", "run_slam": "run",
     "PipelineSpec": "specification.spec",
-}
+}  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -5,7 +5,7 @@ errors of `[told]`; `perceived_paths` changes the true paths as a tilt or a cloc
 of. `docs/told.md` lists the quantities.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,14 +55,13 @@ def tell_belief(
     told = spec.told
     noise = np.radians(told.compass_noise_deg) * compass.standard_normal(len(motion))
     heading = motion.heading + np.radians(told.compass_bias_deg) + noise
+    span = body.tx_offset - body.rx_offset
     return AssumedModel(
         tell_start(motion, float(heading[0]), spec.start, told, settings, rng=start),
-        replace(body, tx_offset=body.tx_offset + told.baseline_m * _outwards(body)),
-        None if panel is None else tell_panel(panel, told),
-        tell_settings(settings, told),
-        heading,
+        replace(body, tx_offset=body.tx_offset + told.baseline_m * (span / np.linalg.norm(span))),
+        None if panel is None else tell_panel(panel, told), tell_settings(settings, told), heading,
         motion.time * told.time_scale,
-    )
+    )  # fmt: skip
 
 
 def tell_start(
@@ -80,12 +79,9 @@ def tell_start(
     heading = motion.heading[0] + turn + np.radians(told.start_heading_deg) if free_heading else compass
     return StartPrior(
         motion.position[0] + shift * start.position_std_m * axes + [0.0, 0.0, told.height_m],
-        motion.velocity[0] + push * start.velocity_std_m_s * axes,
-        float(heading),
-        start.position_std_m,
-        start.velocity_std_m_s,
-        float(np.radians(start.heading_std_deg)),
-    )
+        motion.velocity[0] + push * start.velocity_std_m_s * axes, float(heading), start.position_std_m,
+        start.velocity_std_m_s, float(np.radians(start.heading_std_deg)),
+    )  # fmt: skip
 
 
 def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:
@@ -114,28 +110,21 @@ def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
     slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
     radio = tell_radio(settings.radio, told)
     sensor = replace(
-        settings.sensor,
-        radio=radio,
-        threshold=settings.sensor.threshold * _amplitude(told.threshold_db) ** 2,
+        settings.sensor, radio=radio, threshold=settings.sensor.threshold * _amplitude(told.threshold_db) ** 2,
         false_alarms=settings.sensor.false_alarms * told.clutter_scale,
-    )
+    )  # fmt: skip
     found = settings._replace(radio=radio, slam=slam, sensor=sensor)
-    return found._replace(
-        **{
-            name: _scale_process_noise(getattr(found, name), told.process_noise_scale)
-            for name in ("slam", *ESTIMATOR_SECTIONS)
-        }
-    )
+    configs: dict[str, Any] = {name: getattr(found, name) for name in ("slam", *ESTIMATOR_SECTIONS)}
+    scale = told.process_noise_scale
+    return found._replace(**{name: replace(one, sigma_a=one.sigma_a * scale) for name, one in configs.items()})
 
 
 def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
     """Assumed radio: true carrier, band and array, with the errors of noise density, antenna gain and patterns."""
     return replace(
-        radio,
-        noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
-        tx_gain=radio.tx_gain * _amplitude(told.gain_db) ** 2,
-        antennas=Antennas() if told.antennas else radio.antennas,
-    )
+        radio, noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
+        tx_gain=radio.tx_gain * _amplitude(told.gain_db) ** 2, antennas=Antennas() if told.antennas else radio.antennas,
+    )  # fmt: skip
 
 
 def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:
@@ -187,18 +176,6 @@ def _rotations(pitch: Floats, roll: Floats) -> Floats:
     about_y = np.stack([cp, zero, -sp, zero, one, zero, sp, zero, cp], axis=-1).reshape(*pitch.shape, 3, 3)
     about_x = np.stack([one, zero, zero, zero, cr, -sr, zero, sr, cr], axis=-1).reshape(*pitch.shape, 3, 3)
     return np.asarray(about_y @ about_x)
-
-
-def _outwards(body: Body) -> Floats:
-    """Unit vector (3,) from the Rx to the Tx, along which the assumed Tx-Rx baseline is too long."""
-    span = body.tx_offset - body.rx_offset
-    return np.asarray(span / np.linalg.norm(span))
-
-
-def _scale_process_noise(config: Any, scale: float) -> Any:
-    """Settings of an estimator with its process noise `sigma_a` multiplied by `scale`."""
-    assert "sigma_a" in {field.name for field in fields(config)}
-    return replace(config, sigma_a=config.sigma_a * scale)
 
 
 def _amplitude(decibel: float) -> float:

@@ -52,10 +52,7 @@ def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolic
 
 
 def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Settings) -> CodePolicy:
-    """Code policy of the genie: designs each code on the true paths of the cycle in which it will take effect.
-
-    The prior of the agent's position is the belief's.
-    """
+    """Code policy of the genie: designs on the true paths of the cycle of the code's use, with the belief's prior."""
 
     def choose(
         belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
@@ -65,14 +62,9 @@ def _on_truth(method: str, panel: DataSheet, spec: PipelineSpec, settings: Setti
         there = room.trajectory[due : due + 1]
         try:
             problem = problem_from_paths(
-                room.at(due),
-                there.tx[0],
-                there.rx[0],
-                settings.radio,
-                panel.levels,
-                prior=prior,
+                room.at(due), there.tx[0], there.rx[0], settings.radio, panel.levels, prior=prior,
                 least_snr=spec.design.least_snr,
-            )
+            )  # fmt: skip
         except ConfigError:  # the panel is out of sight: any code will do
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         return designer(method)(problem, rng=rng, config=settings.design).code

@@ -36,18 +36,17 @@ def send_code(
     """
     arrives = bool(rng.random() >= control.loss_probability)
     sent = quantise(code, control.levels)
-    heard = _damaged(sent, control.levels or code.levels, bit_flip, rng=rng) if bit_flip else sent
+    heard = sent
+    if bit_flip:
+        levels = control.levels or code.levels
+        step = code.levels // levels
+        message = RisCode(sent.index // step, levels)
+        heard = RisCode(flip_bits(message, bit_flip, rng=rng).index * step, code.levels)
     waiting = (*link.waiting, (sent, heard if arrives else None))
     if len(waiting) <= control.delay_cycles:
         return link._replace(waiting=waiting)
     (due, came), *rest = waiting
     return ControlLink(link.applied if came is None else came, due, tuple(rest))
-
-
-def _damaged(code: RisCode, levels: int, bit_flip: float, *, rng: np.random.Generator) -> RisCode:
-    """Phase code that arrives of one sent over the control link with `levels` levels, with random bits flipped."""
-    step = code.levels // levels
-    return RisCode(flip_bits(RisCode(code.index // step, levels), bit_flip, rng=rng).index * step, code.levels)
 
 
 def quantise(code: RisCode, levels: int | None) -> RisCode:

@@ -56,11 +56,6 @@ class GroundTruth(NamedTuple):
         """True paths of one cycle alone."""
         return self.paths.of_cycle(cycle - self.first)
 
-    def clutter_at(self, cycle: int) -> Clutter | None:
-        """Diffuse and diffracted paths of one cycle; None if there are none."""
-        row = cycle - self.first
-        return None if self.clutter is None else self.clutter.of_cycle(row)
-
 
 class Agent(NamedTuple):
     """State that the agent carries from cycle to cycle: of its estimator, its control link and its receiver."""
@@ -81,12 +76,9 @@ class Receptions(dict[tuple[int, bytes, int], tuple[Measurement | None, Measurem
     """
 
     def measure(
-        self,
-        cycle: int,
-        code: bytes,
-        previous: Measurement | None,
+        self, cycle: int, code: bytes, previous: Measurement | None,
         receive: Callable[[], tuple[Measurement, PathTruth]],
-    ) -> tuple[Measurement, PathTruth, float]:
+    ) -> tuple[Measurement, PathTruth, float]:  # fmt: skip
         """Return a cycle's measurement, its true paths and the seconds it took; `receive` is called if none is kept."""
         key = cycle, code, id(previous)
         if key not in self:
@@ -171,12 +163,14 @@ def run_cycle(
     if link is not None:
         applied = link.applied if room.faults is None else room.faults.applied(link.applied)
         paths = rephase(paths, applied, 1.0 if room.faults is None else room.faults.weight)
+    row = cycle - room.first
+    clutter = None if room.clutter is None else room.clutter.of_cycle(row)
     kept = Receptions() if context.receptions is None else context.receptions
     measurement, truth, acquired = kept.measure(
         cycle, b"" if applied is None else applied.index.tobytes(), agent.heard,
         lambda: measure(
             paths, 0, float(room.trajectory.heading[cycle]), context.settings.radio, context.settings.receiver,
-            agent.heard, room.doppler[cycle - room.first], room.front_end, room.clutter_at(cycle), rng=rng.noise,
+            agent.heard, room.doppler[row], room.front_end, clutter, rng=rng.noise,
         ),
     )  # fmt: skip
     clock.append(perf_counter())

@@ -71,11 +71,8 @@ MAP: dict[str, Entry] = {
 }
 
 AXES: dict[str, list[str]] = {
-    "xyz": ["x", "y", "z"],
-    "cosine": ["x", "y"],
-    "state": ["x", "y", "z", "vx", "vy", "vz"],
-    "step": list(STEPS),
-}
+    "xyz": ["x", "y", "z"], "cosine": ["x", "y"], "state": ["x", "y", "z", "vx", "vy", "vz"], "step": list(STEPS),
+}  # fmt: skip
 """Labels along axes, for `.sel`."""
 
 
@@ -123,14 +120,12 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
     """Result of one scheme from a NetCDF data set that `scheme_to_dataset` made."""
     outcomes = names_of(data.attrs["outcomes"])
     return SchemeResult(
-        scheme=str(data.attrs["scheme"]),
-        levels=int(data.attrs["levels"]),
-        **_values(data, SCHEME, ""),
+        scheme=str(data.attrs["scheme"]), levels=int(data.attrs["levels"]), **_values(data, SCHEME, ""),
         info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
         outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
         map=MapEstimate(**_values(data, MAP, "map_")),
         smoothed=_values(data, SMOOTHED, "")["smoothed"] if "smoothed" in data else None,
-    )
+    )  # fmt: skip
 
 
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
@@ -170,10 +165,7 @@ def _checksum(data: "xr.Dataset") -> str:
 
 
 def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
-    """Attributes of a data set as sorted lists of texts, so that they are alike before and after NetCDF.
-
-    NetCDF gives numbers back as arrays, and a list of one entry as that entry.
-    """
+    """Attributes of a data set as sorted lists of texts: alike before and after NetCDF, which gives back arrays."""
     found = []
     for name in sorted(map(str, attributes)):
         value = attributes[name]

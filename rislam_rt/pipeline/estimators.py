@@ -45,12 +45,13 @@ class Estimator(NamedTuple):
     """Returns smoothed positions (K, 3) [m] of all cycles; None of an estimator that does not smooth."""
 
 
-class Outcomes(NamedTuple):
-    """Diagnostics that stand for those of a user's own estimator, which gives none."""
+class OwnDiagnostics(NamedTuple):
+    """Diagnostics that stand for those of a user's own or an external estimator in one cycle."""
 
     landmark: Integers
-    """(M,) -1: no component is known to be of a landmark."""
+    """(M,) number of the landmark that each component was associated with, -1 for none."""
     outcome: str = "ok"
+    """`diverged` where the estimator holds itself for lost."""
 
 
 def own_estimator(name: str) -> Estimator:
@@ -72,30 +73,26 @@ def own_estimator(name: str) -> Estimator:
             )
         return found
 
+    @own_method_errors(name)
     def init(start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, config: Any,
              *, rng: np.random.Generator) -> Any:  # fmt: skip
-        with own_method_errors(name):
-            return own.init(start, body, panel, sensor, rng=rng)
+        return own.init(start, body, panel, sensor, rng=rng)
 
+    @own_method_errors(name)
     def estimate(state: Any, config: Any = None) -> SlamEstimate:
-        with own_method_errors(name):
-            found: SlamEstimate = own.estimate(state)
-        return checked(found, "estimate")
+        return checked(own.estimate(state), "estimate")
 
+    @own_method_errors(name)
     def predict(state: Any, ahead: float, config: Any) -> SlamEstimate:
-        if not hasattr(own, "predict"):
-            return estimate(state)
-        with own_method_errors(name):
-            found: SlamEstimate = own.predict(state, ahead)
-        return checked(found, "predict")
+        return checked(own.predict(state, ahead), "predict") if hasattr(own, "predict") else estimate(state)
 
+    @own_method_errors(name)
     def step(
         state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
         *, rng: np.random.Generator,
-    ) -> tuple[Any, Outcomes]:  # fmt: skip
-        with own_method_errors(name):
-            state = own.step(state, measurement, code, dt, heading, rng=rng)
-        return state, Outcomes(np.full(len(measurement), -1))
+    ) -> tuple[Any, OwnDiagnostics]:  # fmt: skip
+        state = own.step(state, measurement, code, dt, heading, rng=rng)
+        return state, OwnDiagnostics(np.full(len(measurement), -1))
 
     return Estimator(init, predict, step, estimate, lambda settings: None, use_vt=lambda settings: False)
 

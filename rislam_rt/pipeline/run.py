@@ -111,14 +111,9 @@ def check_one_piece(cycles: int, way_out: str) -> None:
 
 
 def run_slam(
-    scene: Scene,
-    spec: PipelineSpec,
-    *,
-    rng: np.random.Generator,
-    jobs: int = 1,
-    done: MutableMapping[str, SchemeResult] | None = None,
-    progress: Tell = tell_nobody,
-) -> SlamResult:
+    scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator, jobs: int = 1,
+    done: MutableMapping[str, SchemeResult] | None = None, progress: Tell = tell_nobody,
+) -> SlamResult:  # fmt: skip
     """Simulate all schemes of a pipeline specification in a scene, and return their estimates with the true paths.
 
     Parameters
@@ -159,16 +154,10 @@ def result_of(
 ) -> SlamResult:
     """Result of a run from the results of its schemes and their common setup."""
     return SlamResult(
-        name=spec.name,
-        scene=setup.scene,
-        paths=replace(setup.paths, ris=None),
-        schemes=schemes,
-        config=spec.model_dump(mode="json"),
-        seed=seed,
-        versions=library_versions(),
-        seconds={"trace": setup.seconds},
+        name=spec.name, scene=setup.scene, paths=replace(setup.paths, ris=None), schemes=schemes,
+        config=spec.model_dump(mode="json"), seed=seed, versions=library_versions(), seconds={"trace": setup.seconds},
         warnings=panel_warnings(setup.scene, spec),
-    )
+    )  # fmt: skip
 
 
 def run_scheme(

@@ -13,7 +13,7 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.errors import StoreError
+from rislam_rt.errors import ConfigError, StoreError
 
 PREFIX, SUFFIX = ".rislam-rt-", ".tmp"
 TEMPORARY = re.compile(r"\.rislam-rt-[a-z0-9_]{8}\.tmp")
@@ -129,6 +129,25 @@ def remove_temporaries(folders: Iterable[Path]) -> None:
             for entry in os.scandir(folder):
                 if TEMPORARY.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
                     os.unlink(entry.path)
+
+
+def has_marker(folder: Path, marker: str, ignored: str, what: str, option: str = "") -> bool:
+    """Whether a folder holds the file `marker`; if not, it must be empty (but for `ignored`), or not there.
+
+    Raises
+    ------
+    ConfigError
+        It holds something else than `what`, or cannot be read; the line begins with `option`.
+    """
+    try:
+        names = [entry.name for entry in folder.iterdir()]
+    except FileNotFoundError:
+        return False
+    except OSError as error:
+        raise ConfigError(f"{option}{folder}: cannot be used ({error.strerror}); give another folder") from None
+    if marker not in names and not all(name == ignored or TEMPORARY.fullmatch(name) for name in names):
+        raise ConfigError(f"{option}{folder}: exists and is not a {what}; give a folder that does not exist yet")
+    return marker in names
 
 
 def make_folders(folder: Path) -> list[Path]:

@@ -18,14 +18,8 @@ def seal(content: Mapping[str, Any]) -> dict[str, Any]:
     return {**found, "checksum": checksum(found)}
 
 
-def check_seal(content: Any, file: Path) -> dict[str, Any]:
-    """Check schema version and checksum of data read from `file`, and return the data.
-
-    Raises
-    ------
-    ResultError
-        One is missing or does not fit.
-    """
+def _check_seal(content: Any, file: Path) -> dict[str, Any]:
+    """Check schema version and checksum of data read from `file`, and return the data."""
     if not isinstance(content, dict) or "schema" not in content or "checksum" not in content:
         raise ResultError(f"{file}: no schema or no checksum, so not written by this version; give another folder")
     if content["schema"] != SCHEMA:
@@ -45,7 +39,7 @@ def read_sealed(file: Path) -> dict[str, Any]:
         It cannot be read, or is not as it was written.
     """
     try:
-        return check_seal(json.loads(file.read_bytes()), file)
+        return _check_seal(json.loads(file.read_bytes()), file)
     except OSError as error:
         raise ResultError(f"{file}: cannot be read ({error.strerror}); give another folder") from None
     except (ValueError, RecursionError):

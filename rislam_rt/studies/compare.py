@@ -113,11 +113,8 @@ def comparison_table(comparison: Comparison) -> list[dict[str, Any]]:
     """Comparison of both channels in every room as plain data for JSON, one-sided paths with their explanations."""
     return [
         {
-            "scene": row.scene,
-            "depth": row.depth,
-            "numbers": row.numbers,
-            **row.report.as_dict(),
+            "scene": row.scene, "depth": row.depth, "numbers": row.numbers, **row.report.as_dict(),
             "one_sided": [path._asdict() for path in row.report.one_sided],
         }
         for row in comparison.rows
-    ]
+    ]  # fmt: skip

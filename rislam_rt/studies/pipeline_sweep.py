@@ -21,9 +21,8 @@ from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.sweeps.axes import Axis, Scalar, Value, parse_axis
-from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes
-from rislam_rt.sweeps.sweep import Sweep
+from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes, rows_by_point
+from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
 
 FUNCTION = f"{__name__}:run_cell"
 
@@ -130,16 +129,10 @@ def slam_sweep(
     spec = build_spec(table, PipelineSpec, build_settings)
     typed = tuple(typed_axis(axis) for axis in found.values())
     return Sweep(
-        FUNCTION,
-        typed,
-        spec.model_dump(mode="json", exclude={"seed", "description"}),
-        repeat or section.repeat,
-        spec.seed,
-        tuple(section.paired if section.paired is not None else found),
-        {"beside": os.path.abspath(path.parent)},
-        _depends(path, tuple(found)),
-        spec.name,
-    )
+        FUNCTION, typed, spec.model_dump(mode="json", exclude={"seed", "description"}), repeat or section.repeat,
+        spec.seed, tuple(section.paired if section.paired is not None else found),
+        {"beside": os.path.abspath(path.parent)}, _depends(path, tuple(found)), spec.name,
+    )  # fmt: skip
 
 
 def typed_axis(axis: Axis) -> Axis:
@@ -176,11 +169,8 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
     """Scores of every scheme at every point of a pipeline's sweep; failures are counted, never dropped."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(repr(row.cell.point), []).append(row)
     scores = []
-    for group in groups.values():
+    for group in rows_by_point(rows):
         point = group[0].cell.point
         missing = sum(row.state == MISSING for row in group)
         for scheme in group[0].cell.settings["schemes"]:

@@ -25,8 +25,8 @@ class ComparedRoomSection(Section):
     """Whether the picture of the paths at one pose is of this room."""
 
 
-class StudySpec(Section):
-    """Settings that all studies share."""
+class NamedSpec(Section):
+    """Settings that the files of all studies share."""
 
     kind: str
     """Kind of the pipeline file."""
@@ -34,16 +34,25 @@ class StudySpec(Section):
     """Name of the study, in folders and on pages."""
     description: str = ""
     """Text for readers alone."""
+
+
+class StudySpec(NamedSpec):
+    """Settings that all studies share which compute something."""
+
     seed: Seed = 7
     """Seed of every random draw."""
+
+
+class RadioStudySpec(StudySpec):
+    """Settings that all studies share which have one radio throughout."""
+
     radio: RadioSection = RadioSection()
 
 
-class CompareSpec(StudySpec):
+class CompareSpec(RadioStudySpec):
     """Comparison of the ray tracer's paths with exact image sources at random poses in many rooms."""
 
     kind: Literal["compare_channels"]
-    """Kind of the pipeline file."""
     poses: Annotated[int, Field(ge=1, le=100_000)] = 200
     """Number of random poses in each room."""
     rooms: Annotated[list[ComparedRoomSection], Field(min_length=1)]
@@ -58,11 +67,10 @@ class CompareSpec(StudySpec):
         return self
 
 
-class Fig4aSpec(StudySpec):
+class Fig4aSpec(RadioStudySpec):
     """Study of the gain of the direct path over the panel against distance, as in Fig. 4(a) of the paper."""
 
     kind: Literal["fig4a"]
-    """Kind of the pipeline file."""
     scene: str | None = None
     """Scene folder, relative to the pipeline file, or a built-in room's name; `--scene` comes first."""
     channel: Literal["traced", "image_source"] = "traced"
@@ -90,15 +98,10 @@ class Fig4aSpec(StudySpec):
         return self
 
 
-class ClaimsSpec(Section):
+class ClaimsSpec(NamedSpec):
     """Check of the paper's claims against the results of other studies."""
 
     kind: Literal["claims"]
-    """Kind of the pipeline file."""
-    name: Name
-    """Name of the study, in folders and on pages."""
-    description: str = ""
-    """Text for readers alone."""
     results: str = "../docs/results"
     """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
 
@@ -106,11 +109,7 @@ class ClaimsSpec(Section):
 def study_record(spec: Any, scenes: list[Scene], **more: Any) -> dict[str, Any]:
     """Record for JSON of what is needed to repeat a study: configuration, seed, versions, hashes of scenes, `more`."""
     return {
-        "kind": spec.kind,
-        "name": spec.name,
-        "seed": spec.seed,
-        "scenes": {scene.name: {"sha256": scene.digest} for scene in scenes},
-        "versions": library_versions(),
-        "config": spec.model_dump(mode="json"),
-        **more,
-    }
+        "kind": spec.kind, "name": spec.name, "seed": spec.seed,
+        "scenes": {scene.name: {"sha256": scene.digest} for scene in scenes}, "versions": library_versions(),
+        "config": spec.model_dump(mode="json"), **more,
+    }  # fmt: skip

@@ -1,29 +1,58 @@
-"""Running a sweep: does the cells that have no file yet, records failures, keeps the table of results up to date."""
+"""Running a sweep: does the cells that have no file yet, estimates their cost, and keeps the table of results."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.sweeps import store
 from rislam_rt.sweeps.cell_work import LOST, CellOutcome, Task, find_function
-from rislam_rt.sweeps.cost import SweepCost, estimate_cost
-from rislam_rt.sweeps.local_pool import Run, local_pool
-from rislam_rt.sweeps.store import (
-    DONE,
-    MISSING,
-    Row,
-    append_timing,
-    check_folder,
-    open_folder,
-    read_row,
-    read_timings,
-    write_cell,
-    write_table,
-)
+from rislam_rt.sweeps.pools import Run, cluster_pool, local_pool
 from rislam_rt.sweeps.sweep import Cell, Sweep, build_cells
+
+
+class SweepCost(NamedTuple):
+    """Estimated time of the cells of a sweep that are left."""
+
+    cells: int
+    """Number of cells left."""
+    cell_seconds: float | None
+    """Mean time of one cell [s]; None before any is done."""
+    seconds: float | None
+    """Time until all are done [s]; None before any is done."""
+
+
+def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], width: int) -> SweepCost:
+    """Estimate the time of the cells left, run `width` at a time, each from the mean of done cells of similar settings.
+
+    The most similar cells share the most values along the axes: if the number of particles is an axis, cells with the
+    same number count rather than others.
+    """
+    if not left:
+        return SweepCost(0, None, 0.0)
+    if not known:
+        return SweepCost(len(left), None, None)
+    points: dict[str, tuple[Mapping[str, Any], int]] = {}
+    for cell in left:
+        key = repr(cell.point)
+        points[key] = cell.point, points.get(key, (cell.point, 0))[1] + 1
+    each = [(_similar(point, known), count) for point, count in points.values()]
+    total = sum(seconds * count for seconds, count in each)
+    return SweepCost(
+        len(left), total / len(left), max(total / min(width, len(left)), max(seconds for seconds, _ in each))
+    )
+
+
+def _similar(point: Mapping[str, Any], known: Sequence[Mapping[str, Any]]) -> float:
+    """Mean time [s] of the known cells that share the most values along the axes with a point."""
+    shared = [sum(other["point"].get(key) == value for key, value in point.items()) for other in known]
+    most = max(shared)
+    seconds = [float(other["seconds"]) for other, number in zip(known, shared, strict=True) if number == most]
+    return sum(seconds) / len(seconds)
+
 
 TABLE_SECONDS = 1.0
 """Least time [s] between two updates of the table of results."""
@@ -63,7 +92,7 @@ class SweepProgress(NamedTuple):
     total: int
     cost: SweepCost
     """Estimated cost of the cells left."""
-    last: Row | None
+    last: store.Row | None
     """The cell that just ended; None at the start."""
 
 
@@ -71,24 +100,20 @@ class SweepProgress(NamedTuple):
 class SweepReport:
     """Result of a sweep: state and result of every cell in its order, and the estimated cost of those left."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[store.Row, ...]
     cost: SweepCost
     """Estimated cost of the cells left, if the sweep was to stop at the estimate."""
 
     @property
-    def failed(self) -> tuple[Row, ...]:
+    def failed(self) -> tuple[store.Row, ...]:
         """Cells that failed, in this run of the sweep or before."""
         return tuple(row for row in self.rows if row.failed)
 
 
 def run_sweep(
-    sweep: Sweep,
-    folder: Path,
-    effort: SweepOptions | None = None,
-    *,
-    tell: Callable[[SweepProgress], None] | None = None,
-    grow: Callable[[Sequence[Row]], None] | None = None,
-) -> SweepReport:
+    sweep: Sweep, folder: Path, effort: SweepOptions | None = None, *,
+    tell: Callable[[SweepProgress], None] | None = None, grow: Callable[[Sequence[store.Row]], object] | None = None,
+) -> SweepReport:  # fmt: skip
     """Run all cells of a sweep that have no file in `folder` yet, and write a file for each.
 
     A sweep that was stopped in any way goes on from the cells that are there when it is called again; the files are the
@@ -114,13 +139,13 @@ def run_sweep(
     find_function(sweep.function)
     cells = build_cells(sweep)
     with ExitStack() as stack:
-        check_folder(folder)
-        left = any(read_row(folder, cell).state != DONE for cell in cells)
+        store.check_folder(folder)
+        left = any(store.read_row(folder, cell).state != store.DONE for cell in cells)
         # a cluster first: one that is not there leaves no folder behind
         hired = _hire(stack, effort) if left and effort.dask is not None else None
         shown = effort.only_estimate and (folder / "table.csv").is_file()  # tables of what was run stay as they are
-        stack.enter_context(open_folder(folder, sweep, keep=shown))
-        board = _SweepState(sweep, folder, effort, cells, tell, grow, keep=shown)
+        stack.enter_context(store.open_folder(folder, sweep, keep=shown))
+        board = _SweepState(sweep, folder, effort, cells, keep=shown, tell=tell, grow=grow)
         stack.callback(board.write)
         if board.left:
             run, board.width = hired or _hire(stack, effort)
@@ -136,8 +161,6 @@ def _hire(stack: ExitStack, effort: SweepOptions) -> tuple[Run, int]:
     """Start the local or Dask workers of a sweep; return the function that runs cells, and how many run at a time."""
     if effort.dask is None:
         return stack.enter_context(local_pool(effort.jobs, effort.time_limit)), effort.jobs
-    from rislam_rt.sweeps.cluster import cluster_pool
-
     return stack.enter_context(cluster_pool(effort.dask, effort.time_limit))
 
 
@@ -156,34 +179,27 @@ class _SweepState:
     """State of a running sweep: results of its cells, cells left and their cost; writes them and reports progress."""
 
     def __init__(
-        self,
-        sweep: Sweep,
-        folder: Path,
-        effort: SweepOptions,
-        cells: Sequence[Cell],
-        tell: Callable[[SweepProgress], None] | None,
-        grow: Callable[[Sequence[Row]], None] | None,
-        *,
-        keep: bool,
-    ) -> None:
+        self, sweep: Sweep, folder: Path, effort: SweepOptions, cells: Sequence[Cell], *, keep: bool,
+        tell: Callable[[SweepProgress], None] | None, grow: Callable[[Sequence[store.Row]], object] | None,
+    ) -> None:  # fmt: skip
         self.keep = keep
         self.sweep, self.folder, self.effort, self.tell, self.grow = sweep, folder, effort, tell, grow
-        self.rows = {cell.ident: read_row(folder, cell) for cell in cells}
+        self.rows = {cell.ident: store.read_row(folder, cell) for cell in cells}
         self.left = {
             cell.ident: Task(sweep.function, {**cell.settings, **sweep.local}, cell.seed)
             for cell in cells
-            if self.rows[cell.ident].state in (MISSING, LOST) or (effort.retry and self.rows[cell.ident].failed)
+            if self.rows[cell.ident].state in (store.MISSING, LOST) or (effort.retry and self.rows[cell.ident].failed)
         }
         self.width = effort.jobs
-        self.timings = read_timings(folder)
+        self.timings = store.read_timings(folder)
         self.due = 0.0
         self.known: tuple[float, SweepCost] | None = None
 
     def take(self, ident: str, outcome: CellOutcome) -> None:
         """Store the outcome of a cell that has ended, and report progress."""
         cell = self.rows[ident].cell
-        self.rows[ident] = row = write_cell(self.folder, cell, self.sweep.function, outcome)
-        append_timing(self.folder, cell, outcome)
+        self.rows[ident] = row = store.write_cell(self.folder, cell, self.sweep.function, outcome)
+        store.append_timing(self.folder, cell, outcome)
         self.timings.append({"point": cell.point, "seconds": outcome.seconds})
         self.left.pop(ident)
         if monotonic() >= self.due:
@@ -197,11 +213,11 @@ class _SweepState:
             self.known = monotonic() + TABLE_SECONDS, estimate_cost(left, self.timings, self.width)
         return self.known[1]
 
-    def show(self, last: Row | None) -> None:
+    def show(self, last: store.Row | None) -> None:
         """Report the sweep's progress; `last` is the cell that just ended."""
         if self.tell is not None:
             states = [row.state for row in self.rows.values()]
-            done = states.count(DONE)
+            done = states.count(store.DONE)
             failed = len(states) - done - sum(row.cell.ident in self.left for row in self.rows.values())
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
@@ -211,7 +227,7 @@ class _SweepState:
             return
         begin = monotonic()
         rows = list(self.rows.values())
-        write_table(self.folder, rows)
+        store.write_table(self.folder, rows)
         if self.grow is not None:
             self.grow(rows)
         taken = monotonic() - begin

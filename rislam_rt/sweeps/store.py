@@ -12,17 +12,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.storage.files import (
-    TEMPORARY,
-    csv_file,
-    json_file,
-    make_folders,
-    remove_empty,
-    remove_temporaries,
-    write_all,
-    write_atomic,
-)
+from rislam_rt.errors import RislamError
+from rislam_rt.storage import files
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.seal import flatten, read_sealed, seal
 from rislam_rt.sweeps.cell_work import CellOutcome
@@ -65,16 +56,8 @@ def check_folder(folder: Path) -> None:
     ResultError
         `sweep.json` was changed since it was written.
     """
-    try:
-        names = [entry.name for entry in folder.iterdir()]
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        raise ConfigError(f"{folder}: cannot be used ({error.strerror}); give another folder") from None
-    if SWEEP_FILE in names:
+    if files.has_marker(folder, SWEEP_FILE, LOCK_FILE, "sweep"):
         read_sealed(folder / SWEEP_FILE)
-    elif not all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
-        raise ConfigError(f"{folder}: exists and is not a sweep; give a folder that does not exist yet")
 
 
 @contextmanager
@@ -91,36 +74,26 @@ def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None
         It holds something else, or another sweep is at work there.
     """
     check_folder(folder)
-    made = make_folders(folder)
+    made = files.make_folders(folder)
     try:
         with hold(folder, "sweep"):
             check_folder(folder)
-            remove_temporaries((folder, folder / "cells"))
+            files.remove_temporaries((folder, folder / "cells"))
             if not keep:
-                write_sweep(folder, sweep)
+                _write_sweep(folder, sweep)
             yield
     finally:
-        remove_empty(made)
+        files.remove_empty(made)
 
 
-def write_sweep(folder: Path, sweep: Sweep) -> None:
-    """Write function, axes, base settings and seed of a sweep to `sweep.json`, by which the folder is recognised.
-
-    Raises
-    ------
-    StoreError
-        The disk refused.
-    """
+def _write_sweep(folder: Path, sweep: Sweep) -> None:
+    """Write function, axes, base settings and seed of a sweep to `sweep.json`, by which the folder is recognised."""
     about = {
-        "name": sweep.name,
-        "function": sweep.function,
-        "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes],
-        "base": dict(sweep.base),
-        "repetitions": sweep.repetitions,
-        "seed": sweep.seed,
-        "paired": list(sweep.paired),
-    }
-    write_atomic(folder / SWEEP_FILE, json_file(seal(about), sort_keys=True))
+        "name": sweep.name, "function": sweep.function,
+        "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes], "base": dict(sweep.base),
+        "repetitions": sweep.repetitions, "seed": sweep.seed, "paired": list(sweep.paired),
+    }  # fmt: skip
+    files.write_atomic(folder / SWEEP_FILE, files.json_file(seal(about), sort_keys=True))
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
@@ -133,7 +106,7 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) ->
     """
     state = outcome.cause or DONE
     content = {"function": function, "state": state, "message": outcome.message, "result": outcome.result or {}}
-    write_atomic(_file(folder, cell), json_file(seal({**cell._asdict(), **content}), sort_keys=True))
+    files.write_atomic(_file(folder, cell), files.json_file(seal({**cell._asdict(), **content}), sort_keys=True))
     return Row(cell, state, outcome.message, outcome.result or {})
 
 
@@ -149,17 +122,21 @@ def read_row(folder: Path, cell: Cell) -> Row:
     return Row(cell, MISSING, "", {})
 
 
+def rows_by_point(rows: Sequence[Row]) -> list[list[Row]]:
+    """Rows of a sweep in groups with the same values along the axes, groups and rows in their order."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(repr(row.cell.point), []).append(row)
+    return list(groups.values())
+
+
 def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
     """Append the time and machine of a cell to `timings.jsonl`, from which costs are estimated; errors are ignored."""
     line = {
-        "ident": cell.ident,
-        "point": dict(cell.point),
-        "repetition": cell.repetition,
-        "seconds": round(outcome.seconds, 4),
-        "cpu_seconds": round(outcome.cpu_seconds, 4),
-        "host": outcome.host,
+        "ident": cell.ident, "point": dict(cell.point), "repetition": cell.repetition,
+        "seconds": round(outcome.seconds, 4), "cpu_seconds": round(outcome.cpu_seconds, 4), "host": outcome.host,
         **({"timing": outcome.timing} if outcome.timing else {}),
-    }
+    }  # fmt: skip
     with suppress(OSError), (folder / "timings.jsonl").open("a", encoding="utf-8") as file:
         file.write(json.dumps(line) + "\n")
 
@@ -190,13 +167,13 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
         fixed = (row.cell.repetition, row.cell.seed, row.state, row.message)
         known = {**row.cell.point, **dict(zip(FIXED, fixed, strict=True))}
         entries.append(known | {f"result.{name}" if name in known else name: result.get(name) for name in results})
-    write_all(folder, {"table.csv": csv_bytes(entries), "table.json": json_file(entries, sort_keys=True)})
+    files.write_all(folder, {"table.csv": csv_bytes(entries), "table.json": files.json_file(entries, sort_keys=True)})
 
 
 def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
     """Encode rows as CSV with the columns of the first row; lists are joined by semicolons."""
     rows = ([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()] for entry in entries)
-    return csv_file(entries[0] if entries else (), rows)
+    return files.csv_file(entries[0] if entries else (), rows)
 
 
 def _file(folder: Path, cell: Cell) -> Path:

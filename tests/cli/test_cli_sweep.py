@@ -77,10 +77,10 @@ def test_bad_input_is_one_line_and_leaves_nothing(sweep, tmp_path, words):
 
 
 def test_no_scheduler_is_exit_3(sweep, tmp_path, monkeypatch):
-    from rislam_rt.sweeps import cluster
+    from rislam_rt.sweeps import pools
 
-    assert cluster.CONNECT_SECONDS <= 3  # the command as a whole is to end within 10 s
-    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
+    assert pools.CONNECT_SECONDS <= 3  # the command as a whole is to end within 10 s
+    monkeypatch.setattr(pools, "CONNECT_SECONDS", 0.2)
     for address in ("tcp://127.0.0.1:9", "nonsense", "nonsense://here", "tcp://127.0.0.1:99999"):
         code, _, err = sweep(PIPELINE, *TINY, "--dask", address)
         assert code == 3

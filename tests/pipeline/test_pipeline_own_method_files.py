@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.pipeline.own_method_files import own_digest
+from rislam_rt.pipeline.own_methods import own_digest
 
 FILES = {
     "mine.py": "import numpy as np\nimport beside\nfrom tools import deep\n",

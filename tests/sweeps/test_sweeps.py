@@ -16,7 +16,7 @@ import sweep_cells
 
 from rislam_rt.errors import ConfigError, ResultError, SetupError
 from rislam_rt.sweeps import Axis, Sweep, SweepOptions, build_cells, parse_axis, run_sweep
-from rislam_rt.sweeps.cost import estimate_cost
+from rislam_rt.sweeps.run import estimate_cost
 
 HERE = Path(__file__).parent
 AXES = (Axis("x", (1, 2, 3)), Axis("word", ("one", "two")))
@@ -370,8 +370,8 @@ def test_dask_gives_the_same_bytes(whole, tmp_path):
 
 
 def test_no_scheduler_is_one_line(tmp_path, monkeypatch):
-    from rislam_rt.sweeps import cluster
+    from rislam_rt.sweeps import pools
 
-    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.2)
+    monkeypatch.setattr(pools, "CONNECT_SECONDS", 0.2)
     with pytest.raises(SetupError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler answers [^\n]*$"):
         run_sweep(DRAW, tmp_path, SweepOptions(dask="tcp://127.0.0.1:9"))

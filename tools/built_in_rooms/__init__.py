@@ -12,19 +12,10 @@ from rislam_rt.scene.room_files import RoomFiles
 ROOMS: dict[str, Callable[[], RoomFiles]] = {
     room.__name__: room
     for room in (
-        paper_room,
-        empty_box,
-        l_room,
-        tilted_room,
-        office,
-        two_scatterers,
-        two_panels,
-        itu_room,
-        large_hall,
-        imported_glb,
-        shaded_room,
+        paper_room, empty_box, l_room, tilted_room, office, two_scatterers, two_panels, itu_room, large_hall,
+        imported_glb, shaded_room,
     )
-}
+}  # fmt: skip
 """Name of the template -> its builder."""
 
 __all__ = ["ROOMS", "RoomFiles"]

@@ -1,6 +1,6 @@
 """A long run in slices: simulates the schemes side by side, scores them slice by slice, completes the run folder."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -12,30 +12,13 @@ from pydantic import ValidationError
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline.long import slices
-from rislam_rt.pipeline.long.slices import (
-    FOLDER,
-    SHOWN,
-    read_parts,
-    run_slices,
-    slice_bounds,
-    slice_files,
-    subsample_scheme,
-)
 from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
-from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.scores.summary import summarise, summary_table
 from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.store import run_folder
 from rislam_rt.pipeline.store.exports import record_files
-from rislam_rt.pipeline.store.run_folder import (
-    DONE,
-    RUN_FILE,
-    RunFolder,
-    check_files,
-    read_marker,
-    read_run,
-    reading_run,
-)
 from rislam_rt.progress import Tell
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import tum_bytes
@@ -58,8 +41,9 @@ def is_long(scene: Scene, spec: PipelineSpec) -> bool:
 
 
 def run_long(
-    scene: Scene, spec: PipelineSpec, store: RunFolder, *, rng: np.random.Generator, jobs: int, progress: Tell
-) -> LongRun:
+    scene: Scene, spec: PipelineSpec, store: run_folder.RunFolder, *, rng: np.random.Generator, jobs: int,
+    progress: Tell,
+) -> LongRun:  # fmt: skip
     """Simulate all schemes of a long run slice by slice, write each slice to the run folder, and complete the folder.
 
     Schemes that are there already are not run again. Neither memory nor what is returned grows with the cycles: the
@@ -76,68 +60,46 @@ def run_long(
     """
     scene, body, seeds = set_scene(scene, spec, rng=rng)
     run, folder, cycles = store.identity.digest, store.folder, len(scene.agent)
-    todo = [name for name in spec.schemes if not store.holds(slice_files(name, cycles))]
+    todo = [name for name in spec.schemes if not store.holds(slices.slice_files(name, cycles))]
     seconds = 0.0
     try:
-        for name, outcome in run_side_by_side(
-            run_slices, todo, (scene, body, spec, seeds, folder, run), jobs, progress
-        ):
+        common = (scene, body, spec, seeds, folder, run)
+        for name, outcome in run_side_by_side(slices.run_slices, todo, common, jobs, progress):
             if isinstance(outcome, RislamError):
                 raise outcome
-            store.adopt(slice_files(name, cycles))
+            store.adopt(slices.slice_files(name, cycles))
             seconds = max(seconds, float(outcome))
     finally:
         _remove_unfinished(store)
     about = {
-        "name": spec.name,
-        "seed": spec.seed,
-        "cycles": cycles,
-        "schemes": list(spec.schemes),
-        "seconds": {"trace": seconds},
-        "warnings": list(panel_warnings(scene, spec)),
-        "config": spec.model_dump(mode="json"),
-        "slices": len(slice_bounds(cycles)),
-    }
-    found = gather_long(folder, scene, {**about, "versions": library_versions()}, run)
+        "name": spec.name, "seed": spec.seed, "cycles": cycles, "schemes": list(spec.schemes),
+        "seconds": {"trace": seconds}, "warnings": list(panel_warnings(scene, spec)),
+        "config": spec.model_dump(mode="json"), "slices": len(slices.slice_bounds(cycles)),
+    }  # fmt: skip
+    found = _gather(folder, scene, {**about, "versions": library_versions()}, run)
     _complete(store, scene, found, about)
     return found
 
 
-def gather_long(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
-    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in the run's marker.
-
-    Raises
-    ------
-    ResultError, StoreError
-        A file is missing, damaged or changed.
-    """
+def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
+    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in its marker."""
     schemes, scores, paths, motion = {}, {}, None, scene.agent
     settings = build_settings(PipelineSpec.model_validate(dict(about["config"])))
     for name in about["schemes"]:
         tally = Tally(scene, about["config"]["budget"], use_vt=uses_wall_returns(name, settings))
-        parts = tally.counting(read_parts(folder, name, scene, run))
-        motion, paths, schemes[name] = subsample_scheme(parts, scene)
+        parts = tally.counting(slices.read_parts(folder, name, scene, run))
+        motion, paths, schemes[name] = slices.subsample_scheme(parts, scene)
         scores[name] = tally.scores()
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
-    stride = -(-len(scene.agent) // SHOWN)
+    stride = -(-len(scene.agent) // slices.SHOWN)
     lines = (*about["warnings"], f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
     names = ("name", "seed", "config", "versions", "seconds")
     shown = SlamResult(
         scene=replace(scene, agent=motion), paths=paths, schemes=schemes, warnings=lines,
         **{name: about[name] for name in names},
     )  # fmt: skip
-    summary = {
-        "seed": about["seed"],
-        "cycles": len(scene.agent),
-        "pipeline": about["name"],
-        "scene": scene.name,
-        "source": paths.source,
-        "trace_seconds": about["seconds"].get("trace", 0.0),
-        "warnings": list(lines),
-        "schemes": scores,
-    }
-    return LongRun(summary, shown)
+    return LongRun(summary_table(shown, scores, len(scene.agent)), shown)
 
 
 def read_any(folder: Path) -> LongRun:
@@ -150,18 +112,18 @@ def read_any(folder: Path) -> LongRun:
     ConfigError
         The folder is not a completed run.
     """
-    about = read_marker(folder) if (folder / RUN_FILE).is_file() else {}
+    about = run_folder.read_marker(folder) if (folder / run_folder.RUN_FILE).is_file() else {}
     if "config" in about:
         _check_settings(folder, about["config"])
     if "slices" not in about:
-        result = read_run(folder)
+        result = run_folder.read_run(folder)
         return LongRun(summarise(result), result)
-    if about["state"] != DONE:
+    if about["state"] != run_folder.DONE:
         raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
-    check_files(folder, about)
-    with reading_run(folder):
+    run_folder.check_files(folder, about)
+    with run_folder.reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
-        return gather_long(folder, scene, about, about["identity"])
+        return _gather(folder, scene, about, about["identity"])
 
 
 def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
@@ -177,39 +139,29 @@ def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
         ) from None
 
 
-def _complete(store: RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:
+def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:
     """Write the files of a long run that are not in slices: trajectories, maps, scores and, last, the marker."""
-    tracks = {"truth.tum": _truth_lines(scene)}
+    agent, run = scene.agent, store.identity.digest
+    whole = (agent[first:last] for first, last in slices.slice_bounds(len(agent)))
+    tracks = {"truth.tum": (tum_bytes(motion.time, motion.position, motion.heading) for motion in whole)}
     for name in about["schemes"]:
-        tracks[f"estimate_{name}.tum"] = _estimate_lines(store, name, scene)
+        parts = slices.read_parts(store.folder, name, scene, run)
+        tracks[f"estimate_{name}.tum"] = (tum_bytes(p.motion.time, p.scheme.position, p.scheme.heading) for p in parts)
     for name, pieces in tracks.items():
         write_pieces(store.folder / name, pieces)
     store.adopt(tracks)
     for name, content in record_files(found.shown, scene, found.summary).items():
         store.put(name, content)
-    store.mark(DONE, about)
+    store.mark(run_folder.DONE, about)
 
 
-def _remove_unfinished(store: RunFolder) -> None:
+def _remove_unfinished(store: run_folder.RunFolder) -> None:
     """Remove the slices of schemes that were interrupted in a long run: these schemes begin anew."""
-    for place in sorted((store.folder / FOLDER).glob("*")):
+    for place in sorted((store.folder / slices.FOLDER).glob("*")):
         for file in place.glob("*.nc"):
             if str(file.relative_to(store.folder)) not in store.files:
                 file.unlink(missing_ok=True)
         with suppress(OSError):
             place.rmdir()
     with suppress(OSError):
-        (store.folder / FOLDER).rmdir()
-
-
-def _truth_lines(scene: Scene) -> Iterator[bytes]:
-    """True trajectory of a long run in TUM format, slice by slice."""
-    for first, last in slice_bounds(len(scene.agent)):
-        motion = scene.agent[first:last]
-        yield tum_bytes(motion.time, motion.position, motion.heading)
-
-
-def _estimate_lines(store: RunFolder, name: str, scene: Scene) -> Iterator[bytes]:
-    """Estimated trajectory of one scheme of a long run in TUM format, slice by slice."""
-    for part in read_parts(store.folder, name, scene, store.identity.digest):
-        yield tum_bytes(part.motion.time, part.scheme.position, part.scheme.heading)
+        (store.folder / slices.FOLDER).rmdir()

@@ -5,25 +5,18 @@ and the cycles' records are not, so that memory does not grow with the cycles. N
 its distribution is that of a run in one piece, its draws are not.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt.arrays import Integers
 from rislam_rt.errors import ResultError
-from rislam_rt.model import Body, Paths, Scene, SchemeResult, Trajectory
-from rislam_rt.pipeline.dataset import (
-    check_dataset,
-    dataset_to_paths,
-    dataset_to_scheme,
-    paths_to_dataset,
-    scheme_to_dataset,
-    seal_dataset,
-)
-from rislam_rt.pipeline.long.join import join_paths, join_schemes, subsampled_paths, subsampled_scheme
+from rislam_rt.model import NOTHING, Body, Paths, Scene, SchemeResult, Trajectory
+from rislam_rt.pipeline import dataset
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
 from rislam_rt.pipeline.run import build_channel
@@ -86,11 +79,11 @@ def run_slices(
         part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
-            (slice_file(folder, number, PATHS_FILE), paths_to_dataset(own, scene.agent[first:last])),
-            (slice_file(folder, number, f"scheme_{name}.nc"), scheme_to_dataset(part)),
+            (slice_file(folder, number, PATHS_FILE), dataset.paths_to_dataset(own, scene.agent[first:last])),
+            (slice_file(folder, number, f"scheme_{name}.nc"), dataset.scheme_to_dataset(part)),
             (slice_file(folder, number, f"measurements_{name}.nc"), given_to_dataset(part)),
         ):
-            write_dataset(seal_dataset(data, run=run, slice=str(number)), file)
+            write_dataset(dataset.seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
 
 
@@ -119,12 +112,12 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
         for what in (PATHS_FILE, f"scheme_{name}.nc"):
             file = slice_file(folder, number, what)
             data = read_dataset(file)
-            check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
+            dataset.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
             found.append(data)
-        scheme = dataset_to_scheme(found[1])
+        scheme = dataset.dataset_to_scheme(found[1])
         if scheme.scheme != name:
             raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield SlicePart(scene.agent[first:last], dataset_to_paths(found[0]), scheme)
+        yield SlicePart(scene.agent[first:last], dataset.dataset_to_paths(found[0]), scheme)
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
@@ -140,3 +133,106 @@ def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajecto
         last_map = part.scheme.map
     joined = replace(join_schemes(schemes, paths), map=last_map)
     return scene.agent[::stride], join_paths(paths), joined
+
+
+Identity = tuple[int, int, tuple[int, ...], tuple[int, ...]]
+"""Identity of a path: kind, landmark, walls on the Tx leg, walls on the Rx leg."""
+
+
+def join_paths(parts: Sequence[Paths]) -> Paths:
+    """Join the true paths of consecutive slices of a long run; a path that a slice lacks is not valid there."""
+    columns = path_columns(parts)
+    count = max((int(c.max(initial=-1)) for c in columns), default=-1) + 1
+    first: dict[str, Any] = {}
+    for name, empty in (("kind", -1), ("landmark", -1), ("num_vertices", 0)):
+        first[name] = np.full(count, empty)
+    for name in ("tx_walls", "rx_walls"):
+        first[name] = np.full((count, max(getattr(p, name).shape[1] for p in parts)), -1)
+    for part, column in zip(parts, columns, strict=True):
+        for name, value in first.items():
+            own = getattr(part, name)
+            value[(column, *(slice(0, int(n)) for n in own.shape[1:]))] = own
+    names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
+    course = {name: _spread([getattr(p, name) for p in parts], columns, count) for name in names}
+    return replace(parts[0], **first, **course, ris=None)
+
+
+def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> SchemeResult:
+    """Join the results of one scheme over consecutive slices, gains in columns by path identity as in `paths`."""
+    columns = path_columns(paths)
+    count = max((int(c.max(initial=-1)) for c in columns), default=-1) + 1
+    ident = np.unique(np.concatenate([part.ident for part in parts]))
+    places = [np.searchsorted(ident, part.ident) for part in parts]
+    parent = np.full(len(ident), -1)
+    for part, place in zip(parts, places, strict=True):
+        parent[place] = np.where(part.parent >= 0, part.parent, parent[place])
+    plain = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "seconds")
+    held = ["held", "landmark_position", "ris_probability"]
+    if any(part.panel is not None for part in parts):
+        parts = [replace(p, panel=np.zeros(p.held.shape, int)) if p.panel is None else p for p in parts]
+        held.append("panel")
+    # negative numbers (clutter, none) stay; a slice without paths has an entry to look at all the same
+    known = [(part.component_path, np.append(column, -1)) for part, column in zip(parts, columns, strict=True)]
+    taken = [np.where(path >= 0, column[np.maximum(path, 0)], path) for path, column in known]
+    course: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in plain}
+    course |= {name: _spread([getattr(part, name) for part in parts], places, len(ident)) for name in held}
+    return replace(
+        parts[-1],
+        **course,
+        gain=_spread([part.gain for part in parts], columns, count),
+        component_path=_stacked(taken),
+        component_landmark=_stacked([part.component_landmark for part in parts]),
+        ident=ident,
+        parent=parent,
+        info={name: np.concatenate([part.info[name] for part in parts]) for name in parts[0].info},
+        outcome=tuple(outcome for part in parts for outcome in part.outcome),
+        smoothed=None,  # a part looks no further back than its own beginning
+        given=None,
+    )
+
+
+def subsampled_paths(paths: Paths, rows: Integers) -> Paths:
+    """Paths of the cycles in `rows` alone."""
+    names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
+    return replace(paths, **{name: getattr(paths, name)[rows] for name in names}, ris=None)
+
+
+def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
+    """Result of a scheme for the cycles in `rows` alone."""
+    names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
+             "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
+    return replace(
+        scheme, **{name: getattr(scheme, name)[rows] for name in names if getattr(scheme, name) is not None},
+        info={name: values[rows] for name, values in scheme.info.items()},
+        smoothed=None if scheme.smoothed is None else scheme.smoothed[rows],
+        outcome=tuple(scheme.outcome[row] for row in rows), given=None,
+    )  # fmt: skip
+
+
+def path_columns(parts: Sequence[Paths]) -> list[Integers]:
+    """For each slice of a long run, the joined column (P,) of each of its paths, by order of first appearance."""
+    numbers: dict[Identity, int] = {}
+    return [
+        np.array([numbers.setdefault(p.identity(i), len(numbers)) for i in range(p.num_paths)], dtype=np.int64)
+        for p in parts
+    ]
+
+
+def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> Any:
+    """Array (K, count, ...) of arrays (K_i, P_i, ...) under each other, each at its `columns`; zero elsewhere."""
+    tail = tuple(max(sizes) for sizes in zip(*(part.shape[2:] for part in parts), strict=True))
+    table = np.zeros((sum(map(len, parts)), count, *tail), dtype=parts[0].dtype)
+    row = 0
+    for part, column in zip(parts, columns, strict=True):
+        block = np.zeros((len(part), count, *tail), dtype=part.dtype)
+        where: Any = (slice(None), column, *(slice(0, n) for n in part.shape[2:]))
+        block[where] = part
+        table[row : row + len(part)] = block
+        row += len(part)
+    return table
+
+
+def _stacked(parts: Sequence[Integers]) -> Integers:
+    """Arrays of different width under each other, rows filled up with `NOTHING`."""
+    width = max(part.shape[1] for part in parts)
+    return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=NOTHING) for p in parts])

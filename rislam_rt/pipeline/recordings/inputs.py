@@ -88,7 +88,8 @@ def given_of(
 def given_to_dataset(result: SchemeResult) -> "xr.Dataset":
     """NetCDF data set of the inputs of a scheme's estimator, as `rislam-rt slam` reads it, without anything true."""
     inputs, seed = result.given
-    return inputs_to_dataset(inputs, scheme=result.scheme, **seed_marks(seed))
+    key = np.array(seed.spawn_key, dtype=np.int64)
+    return inputs_to_dataset(inputs, scheme=result.scheme, filter_entropy=str(seed.entropy), filter_spawn_key=key)
 
 
 def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
@@ -132,11 +133,6 @@ def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
     body = Body(data["tx_offset"].to_numpy(), data["rx_offset"].to_numpy())
     time, heading = data["time"].to_numpy(), data["heading"].to_numpy()
     return Inputs(start, body, panel, time, heading, _measurements(data), codes)
-
-
-def seed_marks(seed: np.random.SeedSequence) -> dict[str, Any]:
-    """Attributes of a NetCDF recording that hold the seed of the estimator's random numbers."""
-    return {"filter_entropy": str(seed.entropy), "filter_spawn_key": np.array(seed.spawn_key, dtype=np.int64)}
 
 
 def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:

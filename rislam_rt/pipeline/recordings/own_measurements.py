@@ -12,7 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
-from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, marked_rng
+from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.slam import StartPrior
@@ -38,6 +38,8 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "panel_probability": ("1", "that it ran over the panel, where the receiver can tell"),
 }
 """Columns of a user's table of measurements, by name: unit and meaning."""
+NETCDF = (".nc", ".h5", ".hdf5")
+"""Suffixes of files that are read as NetCDF, which is HDF5; all others are CSV."""
 LONGEST_DELAY = 1e-5
 """[s] Largest delay accepted, 3 km: a larger number is in another unit."""
 ROUNDING = 1e-6
@@ -76,12 +78,7 @@ def run_rng(file: str | Path) -> np.random.Generator | None:
 
     None for a file of another origin.
     """
-    return marked_rng(read_dataset(Path(file))) if _is_netcdf(Path(file)) else None
-
-
-def _is_netcdf(file: Path) -> bool:
-    """Whether a file's suffix is one of NetCDF or HDF5."""
-    return file.suffix.lower() in (".nc", ".h5", ".hdf5")
+    return marked_rng(read_dataset(Path(file))) if Path(file).suffix.lower() in NETCDF else None
 
 
 def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, body: Body | None = None) -> Inputs:
@@ -100,14 +97,14 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
         The file cannot be read, or a value is of a wrong unit or range; the line says which.
     """
     file = Path(file)
-    if _is_netcdf(file):
+    if file.suffix.lower() in NETCDF:
         try:
             data = read_dataset(file)
         except StoreError:
             what = "not a readable NetCDF file" if file.exists() else "no such file"
             raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
         try:
-            return check_inputs(dataset_to_inputs(data), str(file))
+            return _check_inputs(dataset_to_inputs(data), str(file))
         except (KeyError, ValueError, TypeError) as error:
             said = " ".join(str(error.args[0] if error.args else error).split())
             cause = said.partition(". Did you mean")[0][:80]
@@ -148,7 +145,7 @@ def inputs_of(
     measurements = []
     for number in range(len(cycles)):
         rows = cycle[heard] == number
-        parts = {name: filled[name][rows] for name in _PARTS}
+        parts = {name: filled[name][rows] for name in PARTS}
         measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
     first = np.searchsorted(cycle, np.arange(len(cycles)))
     heading = columns.get("heading_rad", np.zeros(len(time)))[first]
@@ -164,17 +161,11 @@ def inputs_of(
         heading = np.full(len(cycles), np.nan)
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
-    return check_inputs(made, place)
+    return _check_inputs(made, place)
 
 
-def check_inputs(inputs: Inputs, place: str) -> Inputs:
-    """Check units and ranges of an estimator's inputs from a user's file, and return them.
-
-    Raises
-    ------
-    ConfigError
-        A delay, cosine, amplitude, standard deviation or time cannot be; the line says which.
-    """
+def _check_inputs(inputs: Inputs, place: str) -> Inputs:
+    """Check units and ranges of an estimator's inputs from a user's file, and return them."""
     for cycle, one in enumerate(inputs.measurements):
         where = f"{place}: cycle {cycle}"
         if (one.tau > LONGEST_DELAY).any():
@@ -204,9 +195,6 @@ def check_inputs(inputs: Inputs, place: str) -> Inputs:
     return inputs
 
 
-_PARTS = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std")
-
-
 def _numbers(column: Any, name: str, place: str) -> Floats:
     """Column of a user's table of measurements as real numbers."""
     if np.iscomplexobj(column):
@@ -222,13 +210,8 @@ def _check_names(columns: Mapping[str, Floats], place: str) -> None:
     for name in columns:
         if name not in COLUMNS:
             raise ConfigError(f"{place}: {name}: unknown column; the known ones are {', '.join(COLUMNS)}")
-    for needed in (
-        ("time_s",),
-        ("delay_s",),
-        ("cos_x", "theta_r_rad"),
-        ("cos_y", "phi_r_rad"),
-        ("amplitude", "snr_db"),
-    ):
+    pairs = ("cos_x", "theta_r_rad"), ("cos_y", "phi_r_rad"), ("amplitude", "snr_db")
+    for needed in (("time_s",), ("delay_s",), *pairs):
         if not any(name in columns for name in needed):
             raise ConfigError(f"{place}: {' or '.join(needed)}: column missing; add it")
         if len(needed) == 2 and all(name in columns for name in needed):
@@ -265,15 +248,13 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> di
             )
         cosines = np.sin(theta)[:, None] * np.stack([np.cos(phi), np.sin(phi)], axis=-1)
     bound = measurement_std(snr, radio)
-    std = np.stack(
-        [columns.get(name, bound.cosines[:, axis]) for axis, name in enumerate(("cos_x_std", "cos_y_std"))], axis=-1
-    )
+    std = [columns.get(name, bound.cosines[:, axis]) for axis, name in enumerate(("cos_x_std", "cos_y_std"))]
     found = {
         "tau": columns["delay_s"],
         "cosines": cosines,
         "amplitude": amplitude,
         "tau_std": columns.get("delay_std_s", bound.tau),
-        "cosines_std": std,
+        "cosines_std": np.stack(std, axis=-1),
         "amplitude_std": columns.get("amplitude_std", np.full(len(snr), amplitude_std(radio))),
     }
     for name, value in found.items():

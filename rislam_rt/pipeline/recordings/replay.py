@@ -11,7 +11,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.assumed_model import tell_settings
-from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
+from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator, OwnDiagnostics
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.read import Table, build_spec
@@ -31,23 +31,10 @@ class Answers(NamedTuple):
     """Mean CPU time [s] of a cycle, step and estimate."""
 
 
-class ReplayDiagnostics(NamedTuple):
-    """Diagnostics of an external estimator in one cycle: its data association, and whether it holds itself for lost."""
-
-    landmark: Integers
-    """(M,) number of the landmark that each component was associated with, -1 for none."""
-    outcome: str = "ok"
-    """`diverged` where the estimator holds itself for lost."""
-
-
 def answers_from_arrays(
-    inputs: Inputs,
-    position: Floats,
-    covariance: Floats | None = None,
-    maps: Sequence[MapEstimate] | None = None,
-    lost: Booleans | None = None,
-    landmark: Sequence[Integers] | None = None,
-) -> Answers:
+    inputs: Inputs, position: Floats, covariance: Floats | None = None, maps: Sequence[MapEstimate] | None = None,
+    lost: Booleans | None = None, landmark: Sequence[Integers] | None = None,
+) -> Answers:  # fmt: skip
     """Answers of an external estimator to a recording, from plain arrays of positions and maps, so they can be scored.
 
     Parameters
@@ -69,12 +56,9 @@ def answers_from_arrays(
         An array is of another shape; the line names it.
     """
     cycles, known = len(inputs.time), list(maps or [])
-    shapes = {
-        "position": (position, (cycles, 3)),
-        "covariance": (covariance, (cycles, 3, 3)),
-        "lost": (lost, (cycles,)),
-    }
-    for name, (given, wanted) in shapes.items():
+    for name, given, wanted in (
+        ("position", position, (cycles, 3)), ("covariance", covariance, (cycles, 3, 3)), ("lost", lost, (cycles,)),
+    ):  # fmt: skip
         if given is not None and np.shape(given) != wanted:
             raise ConfigError(f"{name}: shape {np.shape(given)} received; give {wanted}, a row a cycle")
     if len(known) > cycles or (landmark is not None and len(landmark) != cycles):
@@ -90,11 +74,9 @@ def answers_from_arrays(
     ]
     none = [np.full(len(m), -1) for m in inputs.measurements]
     said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
-    infos = [
-        ReplayDiagnostics(np.asarray(own), "diverged" if s else "ok")
-        for own, s in zip(landmark or none, said, strict=True)
-    ]
-    return Answers(tuple(estimates), tuple(infos), 0.0)
+    told = zip(landmark or none, said, strict=True)
+    infos = tuple(OwnDiagnostics(np.asarray(own), "diverged" if is_lost else "ok") for own, is_lost in told)
+    return Answers(tuple(estimates), infos, 0.0)
 
 
 class Recorder:
@@ -127,7 +109,7 @@ class Recorder:
     def _init(
         self, start: StartPrior, body: Body, panel: DataSheet | None, *settings: Any, rng: np.random.Generator
     ) -> Any:
-        self.begin = (start, body, panel)
+        self.begin = start, body, panel
         return self.inner.init(start, body, panel, *settings, rng=rng)
 
     def _step(
@@ -154,14 +136,9 @@ GONE = ("gate", "window", "birth_margin", "max_misses", "merge_distance")
 
 
 def replay(
-    inputs: Inputs,
-    config: Mapping[str, Any],
-    scheme: str,
-    changes: Mapping[str, Any] | None = None,
-    estimator: Estimator | None = None,
-    *,
-    rng: np.random.Generator,
-) -> Answers:
+    inputs: Inputs, config: Mapping[str, Any], scheme: str, changes: Mapping[str, Any] | None = None,
+    estimator: Estimator | None = None, *, rng: np.random.Generator,
+) -> Answers:  # fmt: skip
     """Run an estimator on the recorded inputs of a run, cycle by cycle, and return its estimates; no paths are traced.
 
     Phase codes are those of the recording, even if the estimator's belief would have led to others. Where no component

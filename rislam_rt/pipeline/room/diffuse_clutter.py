@@ -2,11 +2,9 @@
 
 from dataclasses import replace
 
-from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.errors import ConfigError
-from rislam_rt.measurement import Clutter
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.specification.diffuse import DiffuseSection
+from rislam_rt.pipeline.specification.spec import DiffuseSection
 
 
 def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:
@@ -43,8 +41,3 @@ def trace_diffuse_clutter(
         scene = replace(scene, reflectors=tuple(smooth))
     config = DiffuseConfig(diffraction=section.diffraction, depth=section.depth, samples=section.samples)
     return as_paths(trace_diffuse_paths(scene, radio, motion, config), motion, radio)
-
-
-def received_clutter(paths: Paths, motion: Trajectory, radio: RadioConfig) -> Clutter:
-    """Clutter of diffuse and diffracted paths, with their Doppler shifts."""
-    return Clutter(paths, doppler_shift(paths, motion, radio.wavelength))

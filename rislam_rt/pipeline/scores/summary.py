@@ -5,17 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt import evaluate
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.evaluate import (
-    align,
-    association_score,
-    gospa,
-    match_points,
-    normalised_squares,
-    position_errors,
-    rmse,
-    root_mean_square,
-)
 from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
@@ -43,32 +34,33 @@ class LandmarkTrack(NamedTuple):
 
 def summarise(result: SlamResult) -> dict[str, Any]:
     """All scores of a run and its schemes as a table for JSON."""
+    scores = {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()}
+    return summary_table(result, scores, len(result.scene.agent))
+
+
+def summary_table(result: SlamResult, scores: Mapping[str, Any], cycles: int) -> dict[str, Any]:
+    """Table for JSON of a run of so many cycles, with the scores of its schemes by name."""
     return {
-        "seed": result.seed,
-        "cycles": len(result.scene.agent),
-        "pipeline": result.name,
-        "scene": result.scene.name,
-        "source": result.paths.source,
-        "trace_seconds": result.seconds.get("trace", 0.0),
-        "warnings": list(result.warnings),
-        "schemes": {name: summarise_scheme(result, scheme) for name, scheme in result.schemes.items()},
-    }
+        "seed": result.seed, "cycles": cycles, "pipeline": result.name, "scene": result.scene.name,
+        "source": result.paths.source, "trace_seconds": result.seconds.get("trace", 0.0),
+        "warnings": list(result.warnings), "schemes": scores,
+    }  # fmt: skip
 
 
 def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]:
     """Scores of one scheme in a run: position RMSE and bound, NEES, landmarks, walls, GOSPA, association, times."""
     scene, truth = result.scene, result.scene.agent.position
-    errors = position_errors(scheme.position, truth)
+    errors = evaluate.position_errors(scheme.position, truth)
     least = run_bound(result, scheme)
     limit = least.agent if least else None
-    error, bound = root_mean_square(errors), None if limit is None else root_mean_square(limit)
+    error, bound = evaluate.root_mean_square(errors), None if limit is None else evaluate.root_mean_square(limit)
     squares = nees_per_dof(scheme, truth)
     nees = None if squares is None else float(np.mean(squares))
     largest = float(errors.max())
     panels = len(scene.panels) if scheme.levels else 0
     settings = build_settings(PipelineSpec.model_validate(dict(result.config)), panels)
     use_vt = uses_wall_returns(scheme.scheme, settings)
-    score = association_score(*component_labels(scene, result.paths, scheme, use_vt=use_vt))
+    score = evaluate.association_score(*component_labels(scene, result.paths, scheme, use_vt=use_vt))
     audible = seconds_audible(scene, result.paths, settings, scheme.gain, use_vt=use_vt)
     walls = wall_scores(scene, scheme.map, least, audible)
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
@@ -78,7 +70,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "over_bound": error / bound if bound else None,
         "final_m": float(errors[-1]),
         "largest_m": largest,
-        "rmse_aligned_m": rmse(align(scheme.position, truth), truth) if len(truth) > 1 else None,
+        "rmse_aligned_m": evaluate.rmse(evaluate.align(scheme.position, truth), truth) if len(truth) > 1 else None,
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
         "diverged": has_diverged(errors, limit),
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
@@ -99,7 +91,7 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
     if not len(axes):
         return None
     block = scheme.covariance[:, axes[:, None], axes]
-    return normalised_squares((scheme.position - truth)[:, axes], block) / len(axes)
+    return evaluate.normalised_squares((scheme.position - truth)[:, axes], block) / len(axes)
 
 
 def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
@@ -122,7 +114,7 @@ def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dic
     """
     points = estimate.position[estimate.parent < 0]
     truth = scene.landmark_positions if panel else scene.landmark_positions[: len(scene.scatterers)]
-    found = gospa(points, truth, cutoff=NEAR_LANDMARK)
+    found = evaluate.gospa(points, truth, cutoff=NEAR_LANDMARK)
     names = ("gospa_m", "localisation_m", "missed", "false")
     return dict(zip(names, found, strict=True))
 
@@ -140,11 +132,11 @@ def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
     points = scheme.held & (scheme.parent < 0)
     for cycle in range(len(error)):
         candidates = np.flatnonzero(points[cycle])
-        match = match_points(scheme.landmark_position[cycle, candidates], truth, cutoff=NEAR_LANDMARK)
+        match = evaluate.match_points(scheme.landmark_position[cycle, candidates], truth, cutoff=NEAR_LANDMARK)
         found = np.flatnonzero(match >= 0)
         column[cycle, found] = candidates[match[found]]
         where = scheme.landmark_position[cycle, column[cycle, found]]
-        error[cycle, found] = position_errors(where, truth[found])
+        error[cycle, found] = evaluate.position_errors(where, truth[found])
     return LandmarkTrack(error, column)
 
 

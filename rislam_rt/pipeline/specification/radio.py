@@ -108,15 +108,10 @@ def build_radio(section: RadioSection) -> RadioConfig:
         )
     array = RxArray(section.array.rows, section.array.cols, section.array.spacing_wavelengths, section.array.pattern)
     radio = RadioConfig(
-        carrier=section.carrier_ghz * 1e9,
-        bandwidth=section.bandwidth_ghz * 1e9,
-        tx_gain=linear(section.tx_gain_db),
-        rx_gain=linear(section.rx_gain_db),
-        energy=section.energy,
-        array=array,
-        antennas=section.antennas,
+        carrier=section.carrier_ghz * 1e9, bandwidth=section.bandwidth_ghz * 1e9, tx_gain=linear(section.tx_gain_db),
+        rx_gain=linear(section.rx_gain_db), energy=section.energy, array=array, antennas=section.antennas,
         **({} if section.noise_psd is None else {"noise_psd": section.noise_psd}),
-    )
+    )  # fmt: skip
     if section.noise_psd is None:
         radio = with_reference_snr(radio, 13.0 if section.reference_snr_db is None else section.reference_snr_db)
     return radio

@@ -78,12 +78,13 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     path = Path(path)
     content = _read_toml(path)
     changed = tuple(_override(content, setting) for setting in overrides)
-    _make_way(content, changed)
-    return Table(path, content, changed, content.pop("sweep", None))
+    table = Table(path, content, changed, content.pop("sweep", None))
+    make_way(table, changed)
+    return table
 
 
 def make_way(table: Table, keys: Sequence[str]) -> None:
-    """Remove from a pipeline's table the keys that exclude one of `keys` (dotted), which a sweep sets later.
+    """Remove from a pipeline's table the keys that exclude one of `keys` (dotted), which are set over the file.
 
     A key that the command line set is kept, so that the contradiction is reported.
     """
@@ -167,15 +168,6 @@ def _override(table: dict[str, Any], setting: str) -> str:
             raise ConfigError(f"--set {setting[:80]!r}: '{part}' is not a section; mend the key")
     table[parts[-1]] = parse_value(text.strip())
     return ".".join(parts)
-
-
-def _make_way(table: dict[str, Any], changed: Sequence[str]) -> None:
-    """Remove from a pipeline's table the keys of the file that exclude one that the command line set."""
-    for section, *keys in EITHER:
-        given = [key for key in keys if f"{section}.{key}" in changed]
-        if len(given) == 1:
-            for key in set(keys) - set(given):
-                table[section].pop(key, None)
 
 
 def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:

@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.input_messages import unit_of
-from rislam_rt.pipeline.specification.section import Choices
+from rislam_rt.pipeline.specification.section import Choices, Section
 from rislam_rt.pipeline.specification.spec import RECORDS
 from rislam_rt.spelling import did_you_mean, nearest
 
@@ -104,9 +104,9 @@ def _meanings(declared: type) -> dict[str, str]:
     """Meanings of settings by name: docstrings of the fields of a class and its parents, in one line each."""
     found: dict[str, str] = {}
     for parent in declared.__bases__:
-        found |= _meanings(parent) if is_dataclass(parent) else {}
-    body = _classes(declared.__module__)[declared.__name__].body
-    for field, doc in pairwise(body):
+        found |= _meanings(parent) if is_dataclass(parent) or issubclass(parent, Section) else {}
+    tree = _classes(declared.__module__).get(declared.__name__)  # None of a table that was made from a record
+    for field, doc in pairwise(tree.body if tree else ()):
         if isinstance(field, ast.AnnAssign) and isinstance(doc, ast.Expr) and isinstance(doc.value, ast.Constant):
             assert isinstance(field.target, ast.Name)
             found[field.target.id] = " ".join(str(doc.value.value).split())

@@ -12,7 +12,6 @@ from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
-from rislam_rt.pipeline.specification.diffuse import DiffuseSection
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio, linear
 from rislam_rt.pipeline.specification.section import (
@@ -32,58 +31,62 @@ from rislam_rt.slam.schemes.bp_slam import BpSlamConfig
 from rislam_rt.slam.schemes.bp_slam_aoa import BpSlamAoaConfig
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
 
+
+class DiffuseSection(Section):
+    """Which diffuse and diffracted paths the ray tracer adds to the received signal, unknown to the agent."""
+
+    diffuse: bool = False
+    """Whether rough walls scatter: those whose material has `scattering`, or all by `room.scattering`."""
+    diffraction: bool = False
+    """Whether edges of walls, objects and openings diffract."""
+    depth: Annotated[int, Field(ge=1, le=3)] = 1
+    """Largest number of interactions of a diffuse or diffracted path."""
+    samples: Annotated[int, Field(ge=100, le=1_000_000)] = 2000
+    """Rays shot in every cycle; the mean power does not depend on them, its fluctuation does."""
+
+    @property
+    def wanted(self) -> bool:
+        """Whether diffuse or diffracted paths are to be traced."""
+        return self.diffuse or self.diffraction
+
+
 RECORDS: dict[type, type] = {}
 """Configuration record of each section that was made from one."""
 
 
-def _section(name: str, record: type, doc: str, *, without: tuple[str, ...] = ()) -> Any:
-    """Make a table of a pipeline file with the fields, types and defaults of a configuration record.
-
-    The record checks its own ranges.
-    """
+def _table_of(record: type, *, without: tuple[str, ...] = ()) -> Any:
+    """Table of a pipeline file with the fields, types and defaults of a record, which checks its own ranges."""
     kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
-    section = create_model(name, __base__=Section, __doc__=doc, **kinds)
+    section = create_model(f"{record.__name__}Table", __base__=Section, **kinds)
     RECORDS[section] = record
     return section
 
 
-_Filter = _section("_Filter", SlamConfig, "Fields of `SlamConfig`.", without=("nested",))
-_Nested = _section("_Nested", NestedConfig, "Fields of `NestedConfig`.")
-_Receiver = _section("_Receiver", ReceiverConfig, "Fields of `ReceiverConfig`.", without=("slot", "panels"))
-_BpSlam = _section("_BpSlam", BpSlamConfig, "Fields of `BpSlamConfig`.")
-_BpSlamAoa = _section("_BpSlamAoa", BpSlamAoaConfig, "Fields of `BpSlamAoaConfig`.")
-_ChannelSlam = _section("_ChannelSlam", ChannelSlamConfig, "Fields of `ChannelSlamConfig`.")
-_Designers = _section("_Designers", DesignConfig, "Fields of `DesignConfig`.", without=("certify",))
-
-
-_Hardware = _section("_Hardware", HardwareConfig, "Fields of `HardwareConfig`.")
-
-
-class SlamSection(_Filter):  # type: ignore[misc, valid-type]
+class SlamSection(_table_of(SlamConfig, without=("nested",))):  # type: ignore[misc]
     """Settings of the SLAM filter, SI units."""
 
 
-class NestedSection(_Nested):  # type: ignore[misc, valid-type]
+class NestedSection(_table_of(NestedConfig)):  # type: ignore[misc]
     """Settings of the nested particle filter (`slam.filter = "nested"`) beside those of `slam`, SI units."""
 
 
-class BpSlamSection(_BpSlam):  # type: ignore[misc, valid-type]
+class BpSlamSection(_table_of(BpSlamConfig)):  # type: ignore[misc]
     """Settings of the scheme `bp_slam`, SI units."""
 
 
-class BpSlamAoaSection(_BpSlamAoa):  # type: ignore[misc, valid-type]
+class BpSlamAoaSection(_table_of(BpSlamAoaConfig)):  # type: ignore[misc]
     """Settings of the scheme `bp_slam_aoa`, SI units."""
 
 
-class ChannelSlamSection(_ChannelSlam):  # type: ignore[misc, valid-type]
+class ChannelSlamSection(_table_of(ChannelSlamConfig)):  # type: ignore[misc]
     """Settings of the scheme `channel_slam`, SI units."""
 
 
-class ReceiverSection(_Receiver):  # type: ignore[misc, valid-type]
+class ReceiverSection(_table_of(ReceiverConfig, without=("slot", "panels"))):  # type: ignore[misc]
     """Settings of the receiver, SI units; its measurement slot is `budget.measure_s`, its panels are the scene's."""
 
 
-class HardwareSection(_Hardware):  # type: ignore[misc, valid-type]
+class HardwareSection(_table_of(HardwareConfig)):  # type: ignore[misc]
     """Impairments of the receiver's front end (with `receiver.estimator = "waveform"`); none by default."""
 
 
@@ -100,7 +103,7 @@ SchemeName = Annotated[str, AfterValidator(check_scheme), Choices(SCHEMES)]
 ChannelName = Annotated[str, AfterValidator(_check_channel), Choices(CHANNELS)]
 
 
-class DesignerSection(_Designers):  # type: ignore[misc, valid-type]
+class DesignerSection(_table_of(DesignConfig, without=("certify",))):  # type: ignore[misc]
     """Designer of phase codes and its settings."""
 
     method: Literal[tuple(DESIGNERS)] = "genetic"  # type: ignore[valid-type]
@@ -288,9 +291,9 @@ def share_settings(content: dict[str, Any]) -> dict[str, Any]:
     motion, slam = content.get("motion", {}), content.get("slam", {})
     if not isinstance(motion, dict) or not isinstance(slam, dict):
         return content
-    told = {"sigma_a": motion.get("sigma_a_m_s2") or _Filter.model_fields["sigma_a"].default}
+    told = {"sigma_a": motion.get("sigma_a_m_s2") or SlamSection.model_fields["sigma_a"].default}
     slam = {**told, **slam}
-    shared = {key: slam.get(key, _Filter.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
+    shared = {key: slam.get(key, SlamSection.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
     found = {**content, "slam": slam}
     for name, keys in ESTIMATOR_SECTIONS.items():
         section = content.get(name, {})
@@ -341,16 +344,11 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
     """
     radio, receiver = build_radio(spec.radio), build_receiver(spec.receiver, panels, slot=spec.budget.measure_s)
     return Settings(
-        radio,
-        receiver,
-        SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
-        build_design(spec.design),
-        BpSlamConfig(**spec.bp_slam.model_dump()),
-        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()),
-        ChannelSlamConfig(**spec.channel_slam.model_dump()),
-        build_sensor(radio, receiver),
-        _build_hardware(spec.hardware, receiver),
-    )
+        radio, receiver, SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
+        build_design(spec.design), BpSlamConfig(**spec.bp_slam.model_dump()),
+        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()), ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver), _build_hardware(spec.hardware, receiver),
+    )  # fmt: skip
 
 
 def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
@@ -371,4 +369,5 @@ def build_design(section: DesignerSection) -> DesignConfig:
     ConfigError
         A value is out of range.
     """
-    return DesignConfig(**{name: getattr(section, name) for name in _Designers.model_fields}, certify=False)
+    names = [field.name for field in fields(DesignConfig) if field.name != "certify"]
+    return DesignConfig(**{name: getattr(section, name) for name in names}, certify=False)

@@ -15,19 +15,12 @@ from typing import Any
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import SchemeResult, SlamResult, Trajectory
-from rislam_rt.pipeline.dataset import (
-    check_dataset,
-    dataset_to_paths,
-    dataset_to_scheme,
-    paths_to_dataset,
-    scheme_to_dataset,
-    seal_dataset,
-)
+from rislam_rt.pipeline import dataset
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
-from rislam_rt.storage.files import TEMPORARY, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
+from rislam_rt.storage.files import has_marker, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.netcdf import dataset_bytes, read_dataset
 from rislam_rt.storage.seal import file_digest, read_sealed, seal
@@ -58,11 +51,11 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             raise KeyError(name) from None
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
-        data = seal_dataset(scheme_to_dataset(result), **self._stamp())
+        data = dataset.seal_dataset(dataset.scheme_to_dataset(result), **self._stamp())
         if result.given is not None:
-            given = seal_dataset(given_to_dataset(result), **self._stamp())
-            self._write(given_file(self.folder, name).name, dataset_bytes(given))
-        self._write(scheme_file(self.folder, name).name, dataset_bytes(data))
+            given = dataset.seal_dataset(given_to_dataset(result), **self._stamp())
+            self.put(f"measurements_{name}.nc", dataset_bytes(given))
+        self.put(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
 
     def __delitem__(self, name: str) -> None:
@@ -107,25 +100,22 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         StoreError
             The disk refused.
         """
-        paths = seal_dataset(paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
-        self._write(PATHS_FILE, dataset_bytes(paths))
+        paths = dataset.seal_dataset(dataset.paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
+        self.put(PATHS_FILE, dataset_bytes(paths))
         for name, content in export_files(result, summary).items():
-            self._write(name, content)
+            self.put(name, content)
         told = {
-            "name": result.name,
-            "seed": result.seed,
-            "cycles": len(result.scene.agent),
-            "schemes": list(result.schemes),
-            "seconds": dict(result.seconds),
-            "warnings": list(result.warnings),
+            "name": result.name, "seed": result.seed, "cycles": len(result.scene.agent),
+            "schemes": list(result.schemes), "seconds": dict(result.seconds), "warnings": list(result.warnings),
             "config": dict(result.config),
-        }
+        }  # fmt: skip
         self.mark(DONE, told)
         return self.folder
 
     def put(self, name: str, content: bytes) -> None:
         """Write a file of the run, and note its SHA-256."""
-        self._write(name, content)
+        write_atomic(self.folder / name, content)
+        self.files[name] = hashlib.sha256(content).hexdigest()
 
     def adopt(self, names: Iterable[str]) -> None:
         """Note the SHA-256 of files that are in the folder already, and write the marker."""
@@ -139,17 +129,8 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         except ResultError:
             return False
 
-    def abandon(self) -> None:
-        """Remove the run's marker file if no file was completed."""
-        if not self.files:
-            (self.folder / RUN_FILE).unlink(missing_ok=True)
-
     def _stamp(self) -> dict[str, str]:
         return {"run": self.identity.digest, "scene_sha256": self.identity.content["scene"]["sha256"]}
-
-    def _write(self, name: str, content: bytes) -> None:
-        write_atomic(self.folder / name, content)
-        self.files[name] = hashlib.sha256(content).hexdigest()
 
 
 def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
@@ -162,18 +143,10 @@ def find_run(folder: Path, identity: RunIdentity) -> dict[str, Any] | None:
     ResultError
         The marker is not as it was written.
     """
-    try:
-        names = sorted(entry.name for entry in folder.iterdir())
-    except FileNotFoundError:
-        if folder.is_symlink():
-            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder") from None
+    if not has_marker(folder, RUN_FILE, LOCK_FILE, "run", "--out "):
+        if folder.is_symlink() and not folder.exists():
+            raise ConfigError(f"--out {folder}: a link to nothing; mend it, or give another folder")
         return None
-    except OSError as error:
-        raise ConfigError(f"--out {folder}: cannot be used ({error.strerror}); give another folder") from None
-    if RUN_FILE not in names:
-        if all(name == LOCK_FILE or TEMPORARY.fullmatch(name) for name in names):
-            return None
-        raise ConfigError(f"--out {folder}: exists and is not a run; give a folder that does not exist yet")
     about = read_marker(folder)
     if about.get("identity") != identity.digest:
         differ = identity.difference({key: about.get(key, {}) for key in identity.content})
@@ -220,7 +193,8 @@ def open_run(folder: Path, identity: RunIdentity) -> Iterator[RunFolder]:
                 store.mark(RUNNING)
                 yield store
             except BaseException:
-                store.abandon()
+                if not store.files:  # nothing was completed
+                    (folder / RUN_FILE).unlink(missing_ok=True)
                 raise
     finally:
         remove_empty(made)
@@ -240,11 +214,6 @@ def hold_run(folder: Path) -> Iterator[None]:
     with hold(folder, "run"):
         remove_temporaries([*(folder / part for part in OWN_FOLDERS), *folder.glob("slices/*")])
         yield
-
-
-def is_left_locked(folder: Path) -> bool:
-    """Whether a run folder has a lock file: another process writes there, or ended without removing it."""
-    return (folder / LOCK_FILE).exists()
 
 
 def check_files(folder: Path, about: Mapping[str, Any]) -> None:
@@ -277,11 +246,6 @@ def scheme_file(folder: Path, name: str) -> Path:
     return folder / f"scheme_{name}.nc"
 
 
-def given_file(folder: Path, name: str) -> Path:
-    """Path of the NetCDF file with the inputs of a scheme's estimator in the run folder."""
-    return folder / f"measurements_{name}.nc"
-
-
 def read_run(folder: Path) -> SlamResult:
     """Read a completed run from its folder, after checking all files.
 
@@ -300,30 +264,21 @@ def read_run(folder: Path) -> SlamResult:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
         check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
-        check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
-        paths, scene = dataset_to_paths(data), load_scene(folder / "scene")
+        dataset.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
+        paths, scene = dataset.dataset_to_paths(data), load_scene(folder / "scene")
         agent = Trajectory(
-            data["time"].to_numpy(),
-            data["true_position"].to_numpy(),
-            data["true_velocity"].to_numpy(),
-            data["true_heading"].to_numpy(),
-            scene.agent.body,
-        )
+            data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
+            data["true_heading"].to_numpy(), scene.agent.body,
+        )  # fmt: skip
         schemes = {
             name: _read_scheme(scheme_file(folder, name), name, about["identity"], about["cycles"])
             for name in about["schemes"]
         }
         return SlamResult(
-            name=about["name"],
-            scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]),
-            paths=paths,
-            schemes=schemes,
-            config=about["config"],
-            seed=about["seed"],
-            versions=about["versions"],
-            seconds=about["seconds"],
-            warnings=tuple(about["warnings"]),
-        )
+            name=about["name"], scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]), paths=paths,
+            schemes=schemes, config=about["config"], seed=about["seed"], versions=about["versions"],
+            seconds=about["seconds"], warnings=tuple(about["warnings"]),
+        )  # fmt: skip
 
 
 @contextmanager
@@ -347,5 +302,5 @@ def reading_run(folder: Path) -> Iterator[None]:
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
     """Read a scheme's result from its NetCDF file, and check that it is of this scheme and run."""
     data = read_dataset(file)
-    check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
-    return dataset_to_scheme(data)
+    dataset.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
+    return dataset.dataset_to_scheme(data)

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.slam.classify import FEATURES, network_arrays
-from rislam_rt.studies.classifier.codes import POLICIES
-from rislam_rt.studies.classifier.run import Training
 from rislam_rt.studies.classifier.score import ClassifierScore, by_value, mistakes, panel_dropped, rules
 from rislam_rt.studies.classifier.spec import ClassifierSpec
+from rislam_rt.studies.classifier.train import Training
 from rislam_rt.studies.classifier.training_examples import Examples
+from rislam_rt.studies.classifier.walks import POLICIES
 
 COLOUR = {"network": "#0072B2", "single": "#56B4E9", "geometric": "#D55E00", "amplitude": "#009E73"}
 MARK = {"network": "o", "single": "^", "geometric": "s", "amplitude": "D"}

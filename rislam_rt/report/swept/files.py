@@ -23,7 +23,7 @@ from rislam_rt.studies.swept import (
     group_rows,
 )
 from rislam_rt.sweeps import Row
-from rislam_rt.sweeps.plain_data import plain_result
+from rislam_rt.sweeps.cell_work import plain_result
 
 
 class StudyLayout(NamedTuple):

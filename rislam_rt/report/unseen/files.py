@@ -13,7 +13,7 @@ from rislam_rt.report.unseen.score_cards import SchemeRun, by_series, card, clas
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.sweeps import Row
-from rislam_rt.sweeps.plain_data import plain_result
+from rislam_rt.sweeps.cell_work import plain_result
 from rislam_rt.sweeps.store import csv_bytes
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval, bootstrap, median_over_runs, share_interval
 from rislam_rt.report.swept.entries import mean_known
-from rislam_rt.studies.unseen.sweep import SNR
+from rislam_rt.studies.swept.sweep import SNR
 from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.store import DONE
 

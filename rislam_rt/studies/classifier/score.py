@@ -9,8 +9,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import PathKind
 from rislam_rt.slam.classify import FEATURES, Network, blend, classify_geometric, log_odds
-from rislam_rt.studies.classifier.codes import POLICIES
 from rislam_rt.studies.classifier.training_examples import Examples
+from rislam_rt.studies.classifier.walks import POLICIES
 
 AMPLITUDE_RULE = 0.35
 """Ratio of amplitude to free-space amplitude above which the amplitude rule removes (`SlamConfig.specular_ratio`)."""
@@ -77,14 +77,9 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
     hit, false, missed, right = tables.sum(axis=0)
     clutter = kept[~labelled]
     return ClassifierScore(
-        float(_f1(tables.sum(axis=0)[None])[0]),
-        float(low),
-        float(high),
-        _share(hit, hit + false),
-        _share(hit, hit + missed),
-        _share(right, right + false),
-        float(clutter.mean()) if len(clutter) else 0.0,
-    )
+        float(_f1(tables.sum(axis=0)[None])[0]), float(low), float(high), _share(hit, hit + false),
+        _share(hit, hit + missed), _share(right, right + false), float(clutter.mean()) if len(clutter) else 0.0,
+    )  # fmt: skip
 
 
 def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
@@ -172,11 +167,9 @@ def _tables(examples: Examples, kept: Booleans) -> Integers:
 def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
     """Confusion counts among `rows`: kept rightly, kept wrongly, removed wrongly, removed rightly."""
     return (
-        int(np.sum(rows & kept & keep)),
-        int(np.sum(rows & kept & ~keep)),
-        int(np.sum(rows & ~kept & keep)),
+        int(np.sum(rows & kept & keep)), int(np.sum(rows & kept & ~keep)), int(np.sum(rows & ~kept & keep)),
         int(np.sum(rows & ~kept & ~keep)),
-    )
+    )  # fmt: skip
 
 
 def _f1(tables: Any) -> Floats:

@@ -16,10 +16,9 @@ from rislam_rt.pipeline.specification.spec import build_receiver
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.scene.random_rooms.box_rooms import random_room
-from rislam_rt.studies.classifier.codes import AIMED, POLICIES, set_codes
 from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec
 from rislam_rt.studies.classifier.training_examples import Examples, gather_walk, join
-from rislam_rt.studies.classifier.walks import random_walk
+from rislam_rt.studies.classifier.walks import AIMED, POLICIES, random_walk, set_codes
 
 DEPTH = 2
 """Largest number of wall bounces on a path in random rooms, both legs together."""
@@ -86,7 +85,7 @@ def gather_random(number: int, spec: ClassifierSpec) -> Examples:
     radio, policies = with_reference_snr(build_radio(spec.radio), snr), (rng.choice(BLIND), rng.choice(AIMED))
     if number % 2:
         scene = draw_room(LEARNT_FIRST + LEARNT_FIRST * (spec.seed % LEARNT_FIRST) + number).scene
-        return gather_motion(scene, first_cycles(scene, spec.cycles), DEPTH, radio, spec, number, policies, rng=rng)
+        return gather_motion(scene, scene.agent[: spec.cycles], DEPTH, radio, spec, number, policies, rng=rng)
     for _ in range(_TRIES):
         scene = random_room(f"random_{number}", rng=rng)
         try:
@@ -102,7 +101,7 @@ def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
     scene, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
     policies = range(len(POLICIES))
     return gather_motion(
-        scene, first_cycles(scene, spec.cycles), DEPTH, build_radio(spec.radio), spec, seed, policies, rng=rng
+        scene, scene.agent[: spec.cycles], DEPTH, build_radio(spec.radio), spec, seed, policies, rng=rng
     )
 
 
@@ -133,9 +132,3 @@ def gather_motion(
         lit = set_codes(paths, panel, POLICIES[policy], rng=rng)
         parts.append(gather_walk(lit, motion, radio, receiver, (walk, policy), spec.stride, rng=rng))
     return join(parts)
-
-
-def first_cycles(scene: Scene, cycles: int) -> Trajectory:
-    """First `cycles` of a scene's own trajectory."""
-    agent, rows = scene.agent, slice(cycles)
-    return replace(agent, **{name: getattr(agent, name)[rows] for name in ("time", "position", "velocity", "heading")})

@@ -4,11 +4,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from rislam_rt.pipeline.specification.radio import RadioSection
 from rislam_rt.pipeline.specification.section import Count, Positive, Section
 from rislam_rt.pipeline.specification.spec import ReceiverSection
 from rislam_rt.scene.random_rooms import CYCLES
-from rislam_rt.studies.spec import ComparedRoomSection, StudySpec
+from rislam_rt.studies.spec import ComparedRoomSection, RadioStudySpec
 
 LEARNT_FIRST = 1_000_000
 """Number of the first drawn room that may be in the training set; those below it never are."""
@@ -35,11 +34,10 @@ class NetworkSection(Section):
     """Number of random starts; the best on the validation rooms is kept."""
 
 
-class ClassifierSpec(StudySpec):
+class ClassifierSpec(RadioStudySpec):
     """Training of the classifier of multipath components on random rooms, and its score on named ones."""
 
     kind: Literal["train_classifier"]
-    """Kind of the pipeline file."""
     channel: Literal["traced", "image_source"] = "image_source"
     """Channel model: ray tracer, or exact image sources."""
     train: Annotated[int, Field(ge=2, le=10_000)] = 160
@@ -64,7 +62,6 @@ class ClassifierSpec(StudySpec):
     """Upper end of the range of reference SNRs in random rooms."""
     coverage: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Confidence level of the intervals, by resampling whole walks."""
-    radio: RadioSection = RadioSection()
     receiver: ReceiverSection = ReceiverSection()
     network: NetworkSection = NetworkSection()
 

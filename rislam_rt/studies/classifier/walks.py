@@ -1,12 +1,14 @@
-"""Random walks of the agent through a room, for the training of the component classifier."""
+"""Random walks of the agent through a room and the panel's phase codes along them, for training the classifier."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.compare.poses import random_poses
+from rislam_rt.design import focus_codes
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.model import Scene, Trajectory
+from rislam_rt.model import DataSheet, PathKind, Paths, RisCode, Scene, Trajectory
+from rislam_rt.ris import rephase
 
 CLEARANCE = 0.2
 """Least distance [m] of a walk from every surface."""
@@ -48,3 +50,32 @@ def _arc(scene: Scene, start: Floats, cycles: int, rng: np.random.Generator) -> 
     steps: Floats = np.concatenate([np.zeros((1, 3)), 0.5 * CYCLE * (velocity[1:] + velocity[:-1])])
     turned = np.arctan2(np.sin(heading), np.cos(heading))
     return Trajectory(time, start + np.cumsum(steps, axis=0), velocity, turned, scene.agent.body)
+
+
+POLICIES = ("random", "held", "aimed", "exact")
+"""Code policies: a random code each cycle; one random code throughout; the best code for the direct panel path at the
+middle of the walk, throughout; the best for that path in each cycle."""
+AIMED = tuple(POLICIES.index(name) for name in ("aimed", "exact"))
+"""Indices of the code policies that know where the agent is."""
+
+
+def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.random.Generator) -> Paths:
+    """True paths of a walk with gains under the phase codes of a policy; unchanged without a RIS panel.
+
+    Where no path over the panel is without walls, the policies that aim take one random code.
+    """
+    if panel is None or paths.ris is None:
+        return paths
+    shape = (paths.num_cycles, panel.rows, panel.cols)
+    if policy in ("aimed", "exact") and np.any(paths.kind == PathKind.RIS):
+        best = focus_codes(paths, panel.levels).index
+        index = best if policy == "exact" else best[_middle(paths)]
+    else:
+        index = rng.integers(panel.levels, size=shape if policy == "random" else shape[1:])
+    return rephase(paths, RisCode(index, panel.levels))
+
+
+def _middle(paths: Paths) -> int:
+    """Cycle at which the code of the policy `aimed` is designed: the middle one of those with a direct panel path."""
+    there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
+    return int(there[len(there) // 2]) if len(there) else 0

@@ -15,20 +15,6 @@ from rislam_rt.studies.swept.spec import (
 from rislam_rt.studies.swept.sweep import build_sweep, check_swept
 
 __all__ = [
-    "SWEPT",
-    "AblationsSpec",
-    "Fig4bSpec",
-    "Fig4cSpec",
-    "Group",
-    "HardwareSpec",
-    "RobustnessSpec",
-    "RoomsSpec",
-    "SweptSpec",
-    "build_sweep",
-    "cell_spec",
-    "check_swept",
-    "group_rows",
-    "paired_difference",
-    "paired_gain",
-    "spread",
-]
+    "SWEPT", "AblationsSpec", "Fig4bSpec", "Fig4cSpec", "Group", "HardwareSpec", "RobustnessSpec", "RoomsSpec",
+    "SweptSpec", "build_sweep", "cell_spec", "check_swept", "group_rows", "paired_difference", "paired_gain", "spread",
+]  # fmt: skip

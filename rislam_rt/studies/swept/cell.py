@@ -1,7 +1,6 @@
 """One cell of a swept study: one room and seed, paths found once, every scheme simulated with the same noise."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -10,6 +9,7 @@ import numpy as np
 
 from rislam_rt.measurement import paper_snr_db
 from rislam_rt.pipeline.cycle import Receptions
+from rislam_rt.pipeline.long.slices import subsampled_paths
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, result_of, run_scheme
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.pipeline.specification.read import Table, build_spec
@@ -69,8 +69,6 @@ def _paper_snr(setup: RunSetup, spec: PipelineSpec) -> float:
     """SNR [dB] in the paper's definition, of the mean power over some twenty cycles, RIS panel at phase level 0."""
     settings, rows = build_settings(spec), np.arange(len(setup.scene.agent))
     rows = rows[:: max(1, len(rows) // 20)]
-    per_cycle = ("valid", "tau", "departure", "arrival", "gain", "vertices")
-    fields: dict[str, Any] = {name: getattr(setup.paths, name)[rows] for name in per_cycle}
-    few = replace(setup.paths, **fields, ris=None)
+    few = subsampled_paths(setup.paths, rows)
     found = paper_snr_db(few, settings.radio, settings.receiver, heading=setup.scene.agent.heading[rows])
     return float(10.0 * np.log10(np.mean(10.0 ** (found / 10.0))))

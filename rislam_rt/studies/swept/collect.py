@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval, bootstrap, bootstrap_ratio, rms_over_runs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.sweeps import Row
-from rislam_rt.sweeps.store import DONE, MISSING
+from rislam_rt.sweeps.store import DONE, MISSING, rows_by_point
 
 LEVEL = 0.95
 """Confidence level of every interval."""
@@ -64,16 +64,13 @@ class Group(NamedTuple):
 
 def group_rows(rows: Sequence[Row]) -> list[Group]:
     """Group the cells of a swept study by their point on the axes, all in their order."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(repr(row.cell.point), []).append(row)
     return [
         Group(
             group[0].cell.point,
             tuple(row.result if row.state == DONE else None for row in group),
             sum(row.state == MISSING for row in group),
         )
-        for group in groups.values()
+        for group in rows_by_point(rows)
     ]
 
 
@@ -92,25 +89,28 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
     None for fewer than two seeds.
     """
-    both = ~(np.isnan(ours) | np.isnan(theirs))
-    if both.sum() < 2:
+    pairs = _pairs(ours, theirs)
+    if len(pairs) < 2:
         return None
-    value, low, high = bootstrap_ratio(ours[both], theirs[both], rng=np.random.default_rng(0), level=LEVEL)
+    value, low, high = bootstrap_ratio(pairs[:, 0], pairs[:, 1], rng=np.random.default_rng(0), level=LEVEL)
     return Interval(1.0 - value, 1.0 - high, 1.0 - low)
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
     """Difference [m] of their RMSE and ours, with its interval, over seeds that both have; None of fewer than two."""
-    both = ~(np.isnan(ours) | np.isnan(theirs))
-    if both.sum() < 2:
-        return None
 
     def difference(samples: Floats) -> Floats:
         root = rms_over_runs(samples)
         return np.asarray(root[..., 1] - root[..., 0])
 
-    pairs = np.stack([ours[both], theirs[both]], axis=-1)
-    return bootstrap(pairs, rng=np.random.default_rng(0), statistic=difference, level=LEVEL)
+    pairs = _pairs(ours, theirs)
+    return None if len(pairs) < 2 else bootstrap(pairs, rng=np.random.default_rng(0), statistic=difference, level=LEVEL)
+
+
+def _pairs(ours: Floats, theirs: Floats) -> Floats:
+    """Pairs (S, 2) of the values of those seeds that both have."""
+    pairs = np.stack([ours, theirs], axis=-1)
+    return pairs[~np.isnan(pairs).any(axis=1)]
 
 
 def _look(result: Mapping[str, Any] | None, scheme: str, name: Sequence[str]) -> float:

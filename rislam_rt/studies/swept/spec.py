@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.pipeline.specification.section import Decibel, Name, Positive, Section
-from rislam_rt.studies.spec import Seed
+from rislam_rt.studies.spec import StudySpec
 
 
 class VariantSection(Section):
@@ -21,17 +21,9 @@ class VariantSection(Section):
     """Values by dotted key, as `slam.use_vt`."""
 
 
-class SweptSpec(Section):
+class SweptSpec(StudySpec):
     """Settings that all swept studies share."""
 
-    kind: str
-    """Kind of the pipeline file."""
-    name: Name
-    """Name of the study, in folders and on pages."""
-    description: str = ""
-    """Text for readers alone."""
-    seed: Seed = 7
-    """Seed of every random draw."""
     repetitions: Annotated[int, Field(ge=1, le=100_000)] = 20
     """Number of runs with different seeds at every point; a repetition has the same motion and noise at all points."""
     time_limit_s: Positive | None = None
@@ -41,12 +33,14 @@ class SweptSpec(Section):
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """Variants of the SLAM run in the study; none by default."""
-        return []
+        """Variants of the SLAM run in the study: its `variants`, if it has any."""
+        return list(getattr(self, "variants", ()))
 
     @model_validator(mode="after")
     def _each_once(self) -> "SweptSpec":
-        check_names(self.all_variants)
+        names = Counter(variant.name for variant in self.all_variants)
+        if twice := [name for name, count in names.items() if count > 1]:
+            raise ValueError(f"the name '{twice[0]}' comes twice, of a variant or of a level; give each once")
         return self
 
 
@@ -61,7 +55,6 @@ class Fig4bSpec(_OneRoom):
     """Study of the position RMSE against SNR for all schemes, as in Fig. 4(b) of the paper."""
 
     kind: Literal["fig4b"]
-    """Kind of the pipeline file."""
     snr_db: list[Decibel] = Field(default=[-10.0, 0.0, 10.0, 20.0, 30.0], min_length=1)
     """Reference SNRs: of the paper's sphere at 3 m, integrated over the signal and all antennas."""
     cases: Annotated[list[VariantSection], Field(min_length=1)]
@@ -77,7 +70,6 @@ class Fig4cSpec(_OneRoom):
     """Study of the RMSE of agent and panel against the panel's size, as in Fig. 4(c) of the paper."""
 
     kind: Literal["fig4c"]
-    """Kind of the pipeline file."""
     sizes: list[Annotated[int, Field(ge=1, le=256)]] = Field(default=[4, 6, 8, 10, 12, 16], min_length=1)
     """Numbers of elements along one side of a square panel."""
 
@@ -119,7 +111,6 @@ class RobustnessSpec(_OneRoom):
     """Study of model mismatch: the RMSE with one quantity of the assumed model wrong at a time."""
 
     kind: Literal["robustness"]
-    """Kind of the pipeline file."""
     mismatches: Annotated[list[MismatchSection], Field(min_length=1)]
     """Quantities of the assumed model, and how wrong each is."""
 
@@ -134,7 +125,6 @@ class HardwareSpec(_OneRoom):
     """Study of the front end's impairments: errors of the receiver with one at a time, with and without calibration."""
 
     kind: Literal["hardware"]
-    """Kind of the pipeline file."""
     places: Annotated[int, Field(ge=1, le=1000)] = 4
     """Number of cycles evaluated, evenly over the last half of the run, panel focused on the agent."""
     calibration_cycles: Annotated[int, Field(ge=2, le=1000)] = 12
@@ -162,30 +152,18 @@ class RoomsSpec(SweptSpec):
     """Study of all schemes in many rooms."""
 
     kind: Literal["rooms"]
-    """Kind of the pipeline file."""
     scenes: Annotated[list[str], Field(min_length=1)]
     """Scene folders, relative to the pipeline file."""
     variants: list[VariantSection] = Field(default=[])
     """Variants of the SLAM run in every room; `run` alone by default."""
-
-    @property
-    def all_variants(self) -> list[VariantSection]:
-        """Variants of the SLAM run in every room."""
-        return self.variants
 
 
 class AblationsSpec(_OneRoom):
     """Ablation study: the RMSE with one setting of the SLAM run changed at a time."""
 
     kind: Literal["ablations"]
-    """Kind of the pipeline file."""
     variants: Annotated[list[VariantSection], Field(min_length=1)]
     """Variants of the SLAM run; the first is the reference that the others are compared with."""
-
-    @property
-    def all_variants(self) -> list[VariantSection]:
-        """Variants of the SLAM run, the reference first."""
-        return self.variants
 
 
 SWEPT: dict[str, type[SweptSpec]] = {
@@ -197,10 +175,3 @@ SWEPT: dict[str, type[SweptSpec]] = {
     "hardware": HardwareSpec,
 }
 """Specifications of the swept studies by the `kind` of their pipeline file."""
-
-
-def check_names(variants: list[VariantSection]) -> None:
-    """Raise an error if two variants of a study have the same name."""
-    twice = [name for name, count in Counter(variant.name for variant in variants).items() if count > 1]
-    if twice:
-        raise ValueError(f"the name '{twice[0]}' comes twice, of a variant or of a level; give each once")

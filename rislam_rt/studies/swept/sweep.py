@@ -1,14 +1,16 @@
 """Conversion of a swept study to a sweep: its axes, what its cells depend on, a check of all settings, its record."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
+from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.studies.spec import study_record
@@ -104,15 +106,24 @@ def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str,
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         spec = cell_spec({**settings, **local}, pipeline)
         room = load(room_beside(pipeline.parent, str(settings["scene"])))
-        try:
-            check_run(room, spec)
-        except RislamError as error:
-            raise type(error)(f"{pipeline}: {settings['scene']}: {error}") from None
-        config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
-        own = own_digests([*spec.schemes, spec.channel])
-        return {"config": config, "scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
+        found = checked_settings(room, spec, spec.schemes, f"{pipeline}: {settings['scene']}")
+        return {**found, "scene_sha256": room.digest, "versions": versions}
 
     return depends
+
+
+def checked_settings(room: Scene, spec: PipelineSpec, schemes: Sequence[str], place: str) -> dict[str, Any]:
+    """Settings that a cell's result depends on, and the digests of a user's own methods, after a check with the room.
+
+    `schemes` are those that run there; `place` begins an error's line.
+    """
+    try:
+        check_run(room, spec.model_copy(update={"schemes": list(schemes)}))
+    except RislamError as error:
+        raise type(error)(f"{place}: {error}") from None
+    own = own_digests([*spec.schemes, spec.channel])
+    config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
+    return {"config": config} | ({"own": own} if own else {})
 
 
 def swept_record(spec: SweptSpec, sweep: Sweep, pipeline: Path) -> dict[str, Any]:

@@ -9,15 +9,6 @@ from rislam_rt.studies.unseen.sweep import build_unseen, count_tests
 from rislam_rt.studies.unseen.truth import build_truth
 
 __all__ = [
-    "Answers",
-    "Inputs",
-    "Recorder",
-    "UnseenSpec",
-    "answers_from_arrays",
-    "build_truth",
-    "build_unseen",
-    "count_tests",
-    "read_recording",
-    "replay",
-    "score_run",
-]
+    "Answers", "Inputs", "Recorder", "UnseenSpec", "answers_from_arrays", "build_truth", "build_unseen", "count_tests",
+    "read_recording", "replay", "score_run",
+]  # fmt: skip

@@ -1,27 +1,35 @@
-"""One cell of the study in unseen rooms: every scheme in one random room at one SNR under one variant."""
+"""One cell of the study in unseen rooms: every scheme in one random room at one SNR; saves what is asked for."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rislam_rt.model import RisCode, SchemeResult
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
+from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.signals import SignalsSpec, build_signals
 from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec
 from rislam_rt.progress import tell_nobody
+from rislam_rt.ris import rephase
+from rislam_rt.scene import write_scene
 from rislam_rt.scene.random_rooms import RandomRoom, draw_room
+from rislam_rt.storage.netcdf import write_dataset
 from rislam_rt.studies.swept.cell import cell_spec
-from rislam_rt.studies.unseen.recording_file import Recording
-from rislam_rt.studies.unseen.save import save_room, save_run, save_signals
+from rislam_rt.studies.unseen.recording_file import Recording, write_recording
 from rislam_rt.studies.unseen.score import score_run
 from rislam_rt.studies.unseen.truth import build_truth
 from rislam_rt.sweeps.cell_work import one_line
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FUNCTION = f"{__name__}:run_cell"
 SEEN_BY_TRACER_NOT = ("name", "description", "scene", "seed", "schemes", "receiver", "design", "slam")
@@ -39,41 +47,42 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     room, setup = find_setup(int(settings["room"]), trace_key(spec))
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": setup.seconds}
-    keep = KeptOutputs(str(settings.get("save", "nothing")), Path(settings.get("data", ".")), cell_label(settings))
     for asked in spec.schemes:
         try:
-            schemes[asked], timing[asked] = _run(scheme_here(asked, room), setup, spec, room_traits(room), keep)
+            schemes[asked], timing[asked] = _run(scheme_here(asked, room), setup, spec, room_traits(room), settings)
         except Exception as error:  # whatever it is, it is this scheme's alone
             schemes[asked] = {"failed": one_line(error)}
     return {"traits": room_traits(room), "schemes": schemes, "timing": timing}
 
 
-class KeptOutputs(NamedTuple):
-    """Which outputs of a run in an unseen room are saved beside its scores, and where."""
-
-    what: str
-    """`nothing`, `components` or `signals`, as in `UnseenSpec.save`."""
-    folder: Path
-    label: str
-    """Label of the cell in the names of files."""
-
-
 def _run(
-    name: str, setup: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], keep: KeptOutputs
+    name: str, setup: RunSetup, spec: PipelineSpec, traits: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Simulate one scheme in an unseen room, save its outputs if asked, and return scores and times."""
     recorder = Recorder(ESTIMATORS[SCHEMES[name].estimator])
     result = run_scheme(name, setup, spec, tell_nobody, recorder.estimator)
     truth = build_truth(setup.scene, setup.paths, result, spec)
     scores = {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}
-    if keep.what != "nothing":
-        label = f"{keep.label}{name}"
-        config = spec.model_dump(mode="json")
-        save_run(Recording(recorder.inputs, truth, name, config, traits, scores), keep.folder, label)
-        save_room(setup.scene, traits, keep.folder)
-        if keep.what == "signals":
-            save_signals(setup, result, spec, traits, keep.folder, label)
+    if settings.get("save", "nothing") != "nothing":
+        folder = Path(settings.get("data", ".")) / f"room_{int(traits['seed']):05d}"
+        label, config = f"{cell_label(settings)}{name}", spec.model_dump(mode="json")
+        write_recording(Recording(recorder.inputs, truth, name, config, traits, scores), folder / f"{label}.nc")
+        if not (folder / "scene").exists():
+            write_scene(setup.scene, folder / "scene")
+        if settings["save"] == "signals":
+            write_dataset(_applied_signals(setup, result, spec, int(traits["seed"])), folder / f"{label}_signals.nc")
     return scores, {"cycle_s": recorder.answers.seconds}
+
+
+def _applied_signals(setup: RunSetup, result: SchemeResult, spec: PipelineSpec, seed: int) -> "xr.Dataset":
+    """Samples of the received signal under the codes that a run applied; their noise is not that of its components."""
+    section = spec.receiver.model_copy(update={"estimator": "waveform"})
+    own = SignalsSpec(seed=seed, code="zero", radio=spec.radio, receiver=section)
+    paths = without_panel(setup.paths)
+    if result.levels:
+        paths = rephase(setup.paths, RisCode(result.applied, result.levels))
+    rng = np.random.default_rng(setup.seeds.noise)
+    return build_signals(setup.scene, paths, own, rng=rng, on_cycle=lambda: None).assign_attrs(code="as applied")
 
 
 def cell_label(settings: Mapping[str, Any]) -> str:

@@ -4,16 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt import evaluate
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.evaluate import (
-    ghost_planes,
-    gospa,
-    match_planes,
-    match_points,
-    normalised_squares,
-    plane_angle,
-    root_mean_square,
-)
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
@@ -57,7 +49,7 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
         **_ratio("relative_", errors.relative, truth.relative_bound),
         **(_ratio("late_", errors.absolute[late], truth.bound[late]) if late.any() else {}),
         **(_ratio("late_relative_", errors.relative[late], truth.relative_bound[late]) if late.any() else {}),
-        "dead_reckoning_m": root_mean_square(np.linalg.norm(drift, axis=1)),
+        "dead_reckoning_m": evaluate.root_mean_square(np.linalg.norm(drift, axis=1)),
         "nees": _nees(truth, answers),
     }
     own = np.array([np.sqrt(np.trace(estimate.covariance[:3, :3])) for estimate in answers.estimates])
@@ -97,11 +89,11 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
     first = np.full(len(heard), -1)
     match = np.full(len(heard), -1)
     for cycle, found in enumerate(maps):
-        match = match_planes(walls, found.wall_normal, found.wall_offset, heard)
+        match = evaluate.match_planes(walls, found.wall_normal, found.wall_offset, heard)
         first[(match >= 0) & (first < 0)] = cycle
     last = maps[-1]
     held = np.flatnonzero(match >= 0)
-    angle = plane_angle(walls, last.wall_normal)[held, match[held]]
+    angle = evaluate.plane_angle(walls, last.wall_normal)[held, match[held]]
     normal, offset = last.wall_normal[match[held]], last.wall_offset[match[held]]
     shift = np.abs(np.einsum("wi,wi->w", normal, walls.middle[held]) - offset)
     return {
@@ -111,7 +103,7 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
         "wall_deg": _median(angle),
         "wall_m": _median(shift),
         "wall_delay_s": _delay(first, truth.wall_audible, time),
-        "ghost_walls": int(ghost_planes(walls, last.wall_normal, last.wall_offset).sum()),
+        "ghost_walls": int(evaluate.ghost_planes(walls, last.wall_normal, last.wall_offset).sum()),
     }
 
 
@@ -124,13 +116,13 @@ def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Fl
     match = first
     for cycle, found in enumerate(maps):
         points = np.flatnonzero(found.parent < 0)
-        match = match_points(found.position[points] - told, there, cutoff=NEAR_POINT)
+        match = evaluate.match_points(found.position[points] - told, there, cutoff=NEAR_POINT)
         first[(match >= 0) & (first < 0)] = cycle
         held = np.flatnonzero(match >= 0)
         ris = found.ris_probability[points[match[held]]] > 0.5
         named[held[ris & (named[held] < 0)]] = cycle
     last = maps[-1].position[maps[-1].parent < 0] - told
-    score = gospa(last, there, cutoff=NEAR_POINT)
+    score = evaluate.gospa(last, there, cutoff=NEAR_POINT)
     held = np.flatnonzero((match >= 0) & heard)
     error = np.linalg.norm(last[match[held]] - there[held], axis=1)
     panel = inputs.panel is not None and bool(heard[-1])
@@ -180,7 +172,7 @@ def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:
 
 def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
     """Position RMSE [m], RMS posterior bound and their ratio, by name."""
-    rmse, least = root_mean_square(errors), root_mean_square(bound)
+    rmse, least = evaluate.root_mean_square(errors), evaluate.root_mean_square(bound)
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
@@ -191,15 +183,12 @@ def _nees(truth: Truth, answers: Answers) -> float | None:
     if not len(axes):
         return None
     offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
-    found = float(np.mean(normalised_squares(offset[:, axes], covariance[:, axes[:, None], axes]))) / len(axes)
+    found = float(np.mean(evaluate.normalised_squares(offset[:, axes], covariance[:, axes[:, None], axes]))) / len(axes)
     return found if np.isfinite(found) else None
 
 
 def _delay(first: Integers, audible: Booleans, time: Floats) -> float | None:
-    """Median time [s] from the first cycle in which a landmark or wall is detectable to the first that has it mapped.
-
-    None if none is both.
-    """
+    """Median time [s] from the first cycle in which a landmark or wall is detectable to the first that maps it."""
     known = (first >= 0) & audible.any(axis=0)
     return _median(time[first[known]] - time[np.argmax(audible[:, known], axis=0)])
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.pipeline.specification.section import Count, Decibel
-from rislam_rt.studies.swept.spec import SweptSpec, VariantSection, check_names
+from rislam_rt.studies.swept.spec import SweptSpec, VariantSection
 
 TEST = 10_000
 """Seed of the first test room, every run of which is counted; rooms with smaller seeds are for development."""
@@ -15,7 +15,6 @@ class UnseenSpec(SweptSpec):
     """Study of estimators in many random rooms on which they were not developed."""
 
     kind: Literal["unseen"]
-    """Kind of the pipeline file."""
     repetitions: Literal[1] = 1
     """Each room is run once: other draws are other rooms."""
     first: Annotated[int, Field(ge=0, lt=2**31)] = 0
@@ -33,18 +32,12 @@ class UnseenSpec(SweptSpec):
     """File beside the pipeline's in which runs of test rooms are counted."""
 
     @property
-    def all_variants(self) -> list[VariantSection]:
-        """Variants of the SLAM run in every room."""
-        return self.variants
-
-    @property
     def is_test(self) -> bool:
         """Whether the rooms are test rooms."""
         return self.first >= TEST
 
     @model_validator(mode="after")
     def _one_purpose(self) -> "UnseenSpec":
-        check_names(self.variants)
         if self.first < TEST < self.first + self.rooms:
             raise ValueError(
                 f"rooms: {self.first} to {self.first + self.rooms - 1} lie on both sides of {TEST}; give rooms for "

@@ -3,24 +3,23 @@
 import csv
 import hashlib
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.errors import RislamError, StoreError
-from rislam_rt.pipeline.own_methods import own_digests
-from rislam_rt.pipeline.run import check_run, library_versions
+from rislam_rt.errors import StoreError
+from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.storage.files import csv_file, write_atomic
 from rislam_rt.studies.swept.cell import cell_spec
+from rislam_rt.studies.swept.sweep import SNR, checked_settings
 from rislam_rt.studies.unseen.cell import FUNCTION, scheme_here
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.sweeps import Axis, Sweep
 
-SNR = "run.radio.reference_snr_db"
 LEDGER = ("date", "first", "rooms", "snr_db", "variants", "code", "settings")
 """Columns of the ledger in which runs of test rooms are counted."""
 CODE_DIGITS = 16
@@ -48,31 +47,20 @@ def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
     base = {"run": dict(spec.run), "save": spec.save}
     local = {"variants": variants, "data": str(data.absolute())}
     keys = tuple(axis.key for axis in axes)
-    depends = _Depends(pipeline, local)
-    return Sweep(FUNCTION, tuple(axes), base, 1, spec.seed, keys, local, depends, spec.name)
+    return Sweep(FUNCTION, tuple(axes), base, 1, spec.seed, keys, local, _depends(pipeline, local), spec.name)
 
 
-class _Depends:
-    """Function that checks a cell's settings, and returns all that its result depends on.
+def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    """Function that checks a cell's settings, and returns all that its result depends on: settings, room, code."""
+    draw, versions, code = cache(draw_room), library_versions(), code_digest()
 
-    These are the settings with defaults filled in, the hash of the room, the versions and the hash of the code.
-    """
-
-    def __init__(self, pipeline: Path, local: Mapping[str, Any]) -> None:
-        self.pipeline, self.local = pipeline, local
-        self.room, self.versions, self.code = cache(draw_room), library_versions(), code_digest()
-
-    def __call__(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        spec, room = cell_spec({**settings, **self.local}, self.pipeline), self.room(int(settings["room"]))
+    def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
+        spec, room = cell_spec({**settings, **local}, pipeline), draw(int(settings["room"]))
         here = [scheme_here(name, room) for name in spec.schemes]
-        try:
-            check_run(room.scene, spec.model_copy(update={"schemes": here}))
-        except RislamError as error:
-            raise type(error)(f"{self.pipeline}: room {settings['room']}: {error}") from None
-        config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
-        own = own_digests([*spec.schemes, spec.channel])
-        told = {"config": config, "room_sha256": room.scene.digest, "versions": self.versions, "code": self.code}
-        return told | ({"own": own} if own else {})
+        found = checked_settings(room.scene, spec, here, f"{pipeline}: room {settings['room']}")
+        return {**found, "room_sha256": room.scene.digest, "versions": versions, "code": code}
+
+    return depends
 
 
 def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
@@ -106,10 +94,7 @@ def count_tests(spec: UnseenSpec, pipeline: Path) -> int:
 def unseen_record(spec: UnseenSpec) -> dict[str, Any]:
     """Record for JSON of what is needed to repeat a study in unseen rooms: settings, versions, hash of the code."""
     return {
-        "kind": spec.kind,
-        "name": spec.name,
-        "versions": library_versions(),
-        "code": code_digest(),
+        "kind": spec.kind, "name": spec.name, "versions": library_versions(), "code": code_digest(),
         "config": spec.model_dump(mode="json"),
         "settings": cell_spec({"run": spec.run, "variants": {}}).model_dump(mode="json"),
-    }
+    }  # fmt: skip

@@ -66,19 +66,10 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
     of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
     bound, relative = run_bounds(scene, paths, result, spec)
     return Truth(
-        scene.agent.position,
-        scene.agent.velocity,
-        scene.landmark_positions,
-        scene.ris is not None,
-        (audible[:, :, None] & of).any(axis=1),
-        *surfaces,
-        audible_planes(paths, audible, group),
-        paths.kind,
-        paths.landmark,
-        result.component_path,
-        bound,
-        relative,
-    )
+        scene.agent.position, scene.agent.velocity, scene.landmark_positions, scene.ris is not None,
+        (audible[:, :, None] & of).any(axis=1), *surfaces, audible_planes(paths, audible, group), paths.kind,
+        paths.landmark, result.component_path, bound, relative,
+    )  # fmt: skip
 
 
 def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:

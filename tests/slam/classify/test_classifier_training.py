@@ -10,7 +10,6 @@ from rislam_rt.model import PathKind
 from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.slam.classify import FEATURES, Network, blend, classify
 from rislam_rt.studies import ClassifierSpec, load_any
-from rislam_rt.studies.classifier.run import balance
 from rislam_rt.studies.classifier.score import (
     by_value,
     mean_over_rooms,
@@ -20,7 +19,7 @@ from rislam_rt.studies.classifier.score import (
     right_by_class,
     score,
 )
-from rislam_rt.studies.classifier.train import loss_and_slope, train_network
+from rislam_rt.studies.classifier.train import balance, loss_and_slope, train_network
 from rislam_rt.studies.classifier.training_examples import CLUTTER, OVER_RX, OVER_TX, Examples
 
 FILE = Path(__file__).parents[3] / "pipelines" / "train_classifier.toml"

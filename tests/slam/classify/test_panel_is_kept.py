@@ -13,9 +13,9 @@ from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.slam.classify import load_classifier
 from rislam_rt.studies import load_any
-from rislam_rt.studies.classifier.codes import AIMED
 from rislam_rt.studies.classifier.score import panel_dropped, right_by_class, rules
-from rislam_rt.studies.classifier.sets import DEPTH, first_cycles, gather_motion
+from rislam_rt.studies.classifier.sets import DEPTH, gather_motion
+from rislam_rt.studies.classifier.walks import AIMED
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "train_classifier.toml"
 
@@ -27,7 +27,7 @@ def looks(room):
     """
     spec, rng = load_any(PIPELINE, ["receiver.estimator=bound"]), np.random.default_rng([1, room])
     scene = draw_room(room).scene
-    motion = first_cycles(scene, spec.cycles)
+    motion = scene.agent[: spec.cycles]
     examples = gather_motion(scene, motion, DEPTH, build_radio(spec.radio), spec, room, AIMED, rng=rng)
     return examples, rules(load_classifier())["network"]
 

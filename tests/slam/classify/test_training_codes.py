@@ -10,8 +10,8 @@ from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.model import PathKind, RadioConfig, RisCode, Trajectory
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
-from rislam_rt.studies.classifier.codes import POLICIES, set_codes
 from rislam_rt.studies.classifier.training_examples import CLUTTER, OVER_RX, OVER_TX, gather_walk
+from rislam_rt.studies.classifier.walks import POLICIES, set_codes
 
 ROOM = Path(__file__).parents[3] / "scenes" / "paper_room"
 
