@@ -76,13 +76,9 @@ def build_occluders(scene: Scene) -> Occluders:
     center = np.array([(m.min(axis=(0, 1)) + m.max(axis=(0, 1))) / 2.0 for m in meshes]).reshape(-1, 3)
     reach = [np.linalg.norm(m - c, axis=-1).max() for m, c in zip(meshes, center, strict=True)]
     return Occluders(
-        tuple(names),
-        np.array(owners, dtype=np.int64),
-        np.cumsum([0] + [len(m) for m in meshes]),
-        np.concatenate([np.zeros((0, 3, 3)), *meshes]),
-        center,
-        np.array(reach, dtype=np.float64) + SEAM,
-    )
+        tuple(names), np.array(owners, dtype=np.int64), np.cumsum([0] + [len(m) for m in meshes]),
+        np.concatenate([np.zeros((0, 3, 3)), *meshes]), center, np.array(reach, dtype=np.float64) + SEAM,
+    )  # fmt: skip
 
 
 def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:

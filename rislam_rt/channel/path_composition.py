@@ -16,15 +16,9 @@ from rislam_rt.ris import leg_response, rephase, zero_code
 
 
 def compose_paths(
-    scene: Scene,
-    radio: RadioConfig,
-    walls: Walls,
-    depth: int,
-    direct: SpecularLegs,
-    tx_legs: Sequence[SpecularLegs],
-    rx_legs: Sequence[SpecularLegs],
-    source: str,
-) -> Paths:
+    scene: Scene, radio: RadioConfig, walls: Walls, depth: int, direct: SpecularLegs, tx_legs: Sequence[SpecularLegs],
+    rx_legs: Sequence[SpecularLegs], source: str,
+) -> Paths:  # fmt: skip
     """Compose specular legs into all paths of up to `depth` wall bounces, with gains; identities that no cycle has are
     left out.
 

@@ -23,20 +23,10 @@ _DEFAULT = DesignConfig()
 
 
 def design_code(
-    belief: SlamEstimate,
-    ris: DataSheet,
-    radio: RadioConfig,
-    *,
-    method: str,
-    rng: np.random.Generator,
-    samples: int = 4,
-    config: DesignConfig = _DEFAULT,
-    landmark_uncertainty: bool = False,
-    least_snr: float = 0.0,
-    gradient: GradientMode = "exact",
-    number: int = 0,
-    last: RisCode | None = None,
-) -> Design:
+    belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, method: str, rng: np.random.Generator,
+    samples: int = 4, config: DesignConfig = _DEFAULT, landmark_uncertainty: bool = False, least_snr: float = 0.0,
+    gradient: GradientMode = "exact", number: int = 0, last: RisCode | None = None,
+) -> Design:  # fmt: skip
     """Design the panel's phase code for the next cycle from the belief predicted to it, without the truth.
 
     Parameters

@@ -68,17 +68,10 @@ def _describe(
         bound = relaxation_bound(objective, best) if observable else 0.0
         gap_db = float(_db(best[0, 0]) - _db(np.abs(gain[0])))
     return Design(
-        method=name,
-        code=RisCode(index.reshape(problem.shape), problem.levels),
-        xi=xi.reshape(problem.shape),
-        crlb=value if observable else float("inf"),
-        gain_db=float(_db(np.abs(gain[0]))),
-        bound=bound,
-        gap_db=gap_db,
-        history=history if len(history) else np.array([value]),
-        seconds=seconds,
-        outcome=objective.outcome,
-    )
+        method=name, code=RisCode(index.reshape(problem.shape), problem.levels), xi=xi.reshape(problem.shape),
+        crlb=value if observable else float("inf"), gain_db=float(_db(np.abs(gain[0]))), bound=bound, gap_db=gap_db,
+        history=history if len(history) else np.array([value]), seconds=seconds, outcome=objective.outcome,
+    )  # fmt: skip
 
 
 def _db(magnitude: Floats) -> Floats:

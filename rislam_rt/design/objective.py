@@ -89,14 +89,9 @@ def build_objective(problem: DesignProblem) -> Objective:
     determinant = best[:, 0] * best[:, 2] - best[:, 1] ** 2
     regular = determinant > SINGULAR * (best[:, 0] + best[:, 2]) ** 2
     return Objective(
-        matrix,
-        np.ascontiguousarray(outer[:, :panel]),
-        fixed,
-        spread,
-        problem.least_power,
-        level_table(problem.levels),
+        matrix, np.ascontiguousarray(outer[:, :panel]), fixed, spread, problem.least_power, level_table(problem.levels),
         Outcome.OK if regular.all() else Outcome.UNOBSERVABLE,
-    )
+    )  # fmt: skip
 
 
 def detected_power(power: Floats, least: float) -> Floats:

@@ -187,15 +187,9 @@ class LandmarkModel:
 
 
 def build_landmark_model(
-    paths: Paths,
-    motion: Trajectory,
-    landmark: Floats,
-    wall_normal: Floats,
-    wall_offset: Floats,
-    radio: RadioConfig,
-    *,
+    paths: Paths, motion: Trajectory, landmark: Floats, wall_normal: Floats, wall_offset: Floats, radio: RadioConfig, *,
     walls: Unknown = "planes",
-) -> LandmarkModel:
+) -> LandmarkModel:  # fmt: skip
     """Build the linear model of a trajectory's paths: which coordinates of landmarks and walls are unknown, and
     derivatives.
 

@@ -35,14 +35,9 @@ NEGLIGIBLE = 1e-3
 
 
 def measure_bound(
-    received: Received,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    num_paths: int,
-    num_extra: int = 0,
-    *,
+    received: Received, radio: RadioConfig, config: ReceiverConfig, num_paths: int, num_extra: int = 0, *,
     rng: np.random.Generator,
-) -> tuple[Measurement, PathTruth]:
+) -> tuple[Measurement, PathTruth]:  # fmt: skip
     """Draw the multipath components of a cycle by the Cramér-Rao bound, with missed detections, merging and clutter.
 
     The errors have the variance that belongs to the true SNR; the standard deviations reported are those that the
@@ -64,14 +59,9 @@ def measure_bound(
     found, side = ReportedComponents._make(field[order] for field in found), side[order]
     told = panel_probability(ComponentSides(*found[1:], side), radio, config) if config.alternation else ()
     measurement = Measurement(
-        found.points[:, 0],
-        clip_to_unit_disc(blind_axes(found.points[:, 1:], radio)),
-        np.abs(found.gain),
-        found.deviation[:, 0],
-        capped_cosine_std(found.deviation[:, 1:], radio),
-        found.gain_std / np.sqrt(2.0),
-        *told,
-    )
+        found.points[:, 0], clip_to_unit_disc(blind_axes(found.points[:, 1:], radio)), np.abs(found.gain),
+        found.deviation[:, 0], capped_cosine_std(found.deviation[:, 1:], radio), found.gain_std / np.sqrt(2.0), *told,
+    )  # fmt: skip
     return measurement, PathTruth(found.path)
 
 

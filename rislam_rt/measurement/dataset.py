@@ -51,14 +51,9 @@ SCHEMA: dict[str, Entry] = {
 
 
 def signals_dataset(
-    paths: Paths,
-    trajectory: Trajectory,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    *,
-    rng: np.random.Generator,
+    paths: Paths, trajectory: Trajectory, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator,
     on_cycle: Callable[[], None] | None = None,
-) -> "xr.Dataset":
+) -> "xr.Dataset":  # fmt: skip
     """Data set of received signals: samples of every cycle, the components found in them with their tracks, and the
     truth.
 

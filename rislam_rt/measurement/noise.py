@@ -31,13 +31,9 @@ def with_reference_snr(radio: RadioConfig, snr_db: float) -> RadioConfig:
 
 
 def paper_snr_db(
-    paths: Paths,
-    radio: RadioConfig,
-    config: ReceiverConfig | None = None,
-    *,
-    heading: Floats | float = 0.0,
+    paths: Paths, radio: RadioConfig, config: ReceiverConfig | None = None, *, heading: Floats | float = 0.0,
     num_samples: int = 128,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """SNR (K,) [dB] of the received signal as the paper defines it, `||Y||^2 / (L U sigma_n^2)` without the noise in Y.
 
     It counts the leakage and the wall returns, and falls with the number of samples U that one sounding is spread over.

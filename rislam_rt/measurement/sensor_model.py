@@ -27,11 +27,6 @@ def build_sensor(radio: RadioConfig, config: ReceiverConfig) -> SensorModel:
         period = num_tones(radio, config) / radio.bandwidth
     resolution = "cell" if config.estimator == "bound" and config.resolution == "cell" else "joint"
     return SensorModel(
-        radio,
-        threshold=threshold,
-        false_alarms=rate,
-        window=(config.min_delay, config.max_delay),
-        period=period,
-        resolution=resolution if config.merge else "all",
-        alternation=config.alternation,
-    )
+        radio, threshold=threshold, false_alarms=rate, window=(config.min_delay, config.max_delay), period=period,
+        resolution=resolution if config.merge else "all", alternation=config.alternation,
+    )  # fmt: skip

@@ -56,14 +56,9 @@ class DetectedComponents(NamedTuple):
 
 
 def capture(
-    received: Received,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    front_end: FrontEnd | None = None,
-    leakage: complex = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> list[Capture]:
+    received: Received, radio: RadioConfig, config: ReceiverConfig, front_end: FrontEnd | None = None,
+    leakage: complex = 0.0, *, rng: np.random.Generator,
+) -> list[Capture]:  # fmt: skip
     """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of several
     codes.
 
@@ -122,15 +117,9 @@ def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
 
 
 def measure_waveform(
-    received: Received,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    previous: Measurement | None = None,
-    front_end: FrontEnd | None = None,
-    leakage: complex = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> tuple[Measurement, PathTruth]:
+    received: Received, radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None,
+    front_end: FrontEnd | None = None, leakage: complex = 0.0, *, rng: np.random.Generator,
+) -> tuple[Measurement, PathTruth]:  # fmt: skip
     """Simulate the received signal of a cycle and estimate its multipath components; also the paths that they most
     likely are."""
     captures = capture(received, radio, config, front_end, leakage, rng=rng)

@@ -7,17 +7,6 @@ from rislam_rt.ris.rephase import panel_gain, rephase
 from rislam_rt.ris.response import far_field_response, leg_response, zero_code
 
 __all__ = [
-    "PanelErrors",
-    "PanelTolerance",
-    "delay_spread",
-    "delay_spread_warnings",
-    "draw_panel",
-    "element_gain_area",
-    "element_pattern",
-    "far_field_response",
-    "flip_bits",
-    "leg_response",
-    "panel_gain",
-    "rephase",
-    "zero_code",
-]
+    "PanelErrors", "PanelTolerance", "delay_spread", "delay_spread_warnings", "draw_panel", "element_gain_area",
+    "element_pattern", "far_field_response", "flip_bits", "leg_response", "panel_gain", "rephase", "zero_code",
+]  # fmt: skip

@@ -7,11 +7,5 @@ from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.compare.poses import random_poses
 
 __all__ = [
-    "OneSidedPath",
-    "PathReport",
-    "Validation",
-    "compare_channels",
-    "compare_paths",
-    "random_poses",
-    "validate_rooms",
-]
+    "OneSidedPath", "PathReport", "Validation", "compare_channels", "compare_paths", "random_poses", "validate_rooms",
+]  # fmt: skip

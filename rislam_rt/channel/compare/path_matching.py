@@ -47,14 +47,9 @@ _RADIO = RadioConfig()
 
 
 def compare_paths(
-    traced: Paths,
-    analytic: Paths,
-    scene: Scene,
-    trajectory: Trajectory,
-    *,
-    radio: RadioConfig = _RADIO,
+    traced: Paths, analytic: Paths, scene: Scene, trajectory: Trajectory, *, radio: RadioConfig = _RADIO,
     shortest_segment: float = SHORTEST_SEGMENT,
-) -> PathReport:
+) -> PathReport:  # fmt: skip
     """Compare two path sets of one scene and trajectory, cycle by cycle and identity by identity.
 
     Gains are compared as they are: give both sides the same code. Every path that one side lacks is looked up in the
@@ -94,12 +89,9 @@ def compare_paths(
 
 
 def _scale(
-    analytic: Paths,
-    identity: list[Identity],
-    matched: tuple[Integers, Integers, Integers],
-    trajectory: Trajectory,
+    analytic: Paths, identity: list[Identity], matched: tuple[Integers, Integers, Integers], trajectory: Trajectory,
     precision: RoomPrecision,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Coherent scale (M,) of the gains of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched
     mirrors, antennas = with_perfect_mirrors(precision.scene), precision.radio.antennas

@@ -166,12 +166,9 @@ def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Float
     old_offset = beams.offset[row] - 2.0 * turned * offset[:, None]
     walls = np.concatenate([wall[:, None], beams.walls[row]], axis=1)
     return Beams(
-        beams.ball[row],
-        walls,
-        image,
-        np.concatenate([new[0], old_normal], axis=1),
+        beams.ball[row], walls, image, np.concatenate([new[0], old_normal], axis=1),
         np.concatenate([new[1], old_offset], axis=1),
-    )
+    )  # fmt: skip
 
 
 def _half_spaces(

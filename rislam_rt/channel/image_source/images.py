@@ -30,17 +30,9 @@ class ImageRays(NamedTuple):
 
 
 def find_legs(
-    search: SequenceSearch,
-    coatings: Coatings,
-    device: Floats,
-    far: Floats,
-    depth: int,
-    *,
-    host: int = -1,
-    front: Floats | None = None,
-    landmark: int = -1,
-    terminals: LegEnds | None = None,
-) -> SpecularLegs:
+    search: SequenceSearch, coatings: Coatings, device: Floats, far: Floats, depth: int, *, host: int = -1,
+    front: Floats | None = None, landmark: int = -1, terminals: LegEnds | None = None,
+) -> SpecularLegs:  # fmt: skip
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
     Parameters
@@ -107,15 +99,9 @@ def _plane_crossing(
 
 
 def _visible(
-    facets: WallFacets,
-    rays: ImageRays,
-    device: Floats,
-    far: Floats,
-    blockers: Integers,
-    host: int,
-    front: Floats | None,
-    landmark: int,
-) -> ImageRays:
+    facets: WallFacets, rays: ImageRays, device: Floats, far: Floats, blockers: Integers, host: int,
+    front: Floats | None, landmark: int,
+) -> ImageRays:  # fmt: skip
     """Legs that no wall or occluder hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
@@ -135,13 +121,9 @@ def _visible(
 
 
 def _legs(
-    facets: WallFacets,
-    coatings: Coatings,
-    found: list[ImageRays],
-    device: Floats,
-    depth: int,
+    facets: WallFacets, coatings: Coatings, found: list[ImageRays], device: Floats, depth: int,
     terminals: LegEnds | None,
-) -> SpecularLegs:
+) -> SpecularLegs:  # fmt: skip
     """Arrange legs by cycle and wall sequence (K, S), one column for each sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []

@@ -163,18 +163,10 @@ def _solve(
 
     tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
     paths = rt.PathSolver(deterministic=True)(
-        tracer_scene,
-        max_depth=config.depth,
-        max_num_paths_per_src=10 * config.samples,
-        samples_per_src=config.samples,
-        los=False,
-        specular_reflection=True,
-        diffuse_reflection=diffuse,
-        refraction=False,
-        diffraction=config.diffraction,
-        edge_diffraction=config.diffraction,
-        seed=config.seed,
-    )
+        tracer_scene, max_depth=config.depth, max_num_paths_per_src=10 * config.samples, samples_per_src=config.samples,
+        los=False, specular_reflection=True, diffuse_reflection=diffuse, refraction=False,
+        diffraction=config.diffraction, edge_diffraction=config.diffraction, seed=config.seed,
+    )  # fmt: skip
     tau = np.array(paths.tau, dtype=np.float64).reshape(-1)
     if tau.size == 0:
         return _nothing(config.depth)

@@ -30,13 +30,9 @@ then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
-    tracer_scene: TracerScene,
-    walls: Walls,
-    sequences: Integers,
-    ends: LegEndpoints,
-    geometry: PathGeometry,
+    tracer_scene: TracerScene, walls: Walls, sequences: Integers, ends: LegEndpoints, geometry: PathGeometry,
     antennas: Antennas,
-) -> Complexes:
+) -> Complexes:  # fmt: skip
     """Field coefficient (N,) of legs over wall sequences (N, D), from reflections and antenna patterns, without
     spreading loss and carrier phase.
 

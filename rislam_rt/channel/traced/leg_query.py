@@ -187,11 +187,7 @@ def _as_legs(
         return values
 
     return SpecularLegs(
-        walls=sequences[columns],
-        valid=dense(np.ones(len(device), dtype=np.bool_)),
-        length=dense(geometry.length),
-        at_device=dense(geometry.at_device),
-        at_far_end=dense(geometry.at_far_end),
-        coefficient=dense(found.coefficient),
-        vertices=dense(geometry.vertices),
-    )
+        walls=sequences[columns], valid=dense(np.ones(len(device), dtype=np.bool_)), length=dense(geometry.length),
+        at_device=dense(geometry.at_device), at_far_end=dense(geometry.at_far_end),
+        coefficient=dense(found.coefficient), vertices=dense(geometry.vertices),
+    )  # fmt: skip

@@ -38,13 +38,9 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         self._reflection = mi.Float(reflection)
 
     def sample(
-        self,
-        ctx: mi.BSDFContext,
-        si: mi.SurfaceInteraction3f,
-        sample1: mi.Float,
-        sample2: mi.Point2f,
+        self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, sample1: mi.Float, sample2: mi.Point2f,
         active: bool | mi.Bool = True,
-    ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:
+    ) -> tuple[mi.BSDFSample3f, mi.Spectrum]:  # fmt: skip
         """Reflected ray at a material of constant R: always the specular direction."""
         count = dr.width(si.wi)
         result = mi.BSDFSample3f()

@@ -68,11 +68,9 @@ def slab_material(name: str, material: Material, scattering: float) -> rt.RadioM
 def _slab(material: Material, scattering: float) -> dict[str, Any]:
     """Keyword arguments of Sionna's `RadioMaterial` for a slab."""
     return {
-        "thickness": material.thickness,
-        "relative_permittivity": material.permittivity,
-        "conductivity": material.conductivity,
-        "scattering_coefficient": scattering,
-    }
+        "thickness": material.thickness, "relative_permittivity": material.permittivity,
+        "conductivity": material.conductivity, "scattering_coefficient": scattering,
+    }  # fmt: skip
 
 
 def rough_material(material: Material, number: int, scattering: float) -> rt.RadioMaterialBase:

@@ -66,13 +66,9 @@ class Narrowing(Protocol):
 
 
 def possible_sequences(
-    sides: Integers,
-    device: Integers,
-    far: Integers,
-    depth: int,
-    barred: Booleans | None = None,
+    sides: Integers, device: Integers, far: Integers, depth: int, barred: Booleans | None = None,
     narrowing: Callable[[], Narrowing] | None = None,
-) -> tuple[Integers, bool]:
+) -> tuple[Integers, bool]:  # fmt: skip
     """Wall sequences (S, depth) of up to `depth` bounces, from device to far end, padded with `NO_WALL`.
 
     Also whether these are all that sides allow (else they have been narrowed).

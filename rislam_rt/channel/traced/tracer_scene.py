@@ -151,15 +151,10 @@ def _part(objects: list[rt.SceneObject]) -> mi.Scene:
 
 
 def _numbered(
-    scene: rt.Scene,
-    origin: Floats,
-    walls: Walls,
-    ids: Integers,
-    members: list[Integers],
-    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
-    views: dict[int, mi.Scene],
+    scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, members: list[Integers],
+    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers], views: dict[int, mi.Scene],
     occluders: dict[int, mi.Scene],
-) -> TracerScene:
+) -> TracerScene:  # fmt: skip
     """Assemble the tracer's scene: number the triangles of all shapes (M,) by wall, and find each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
@@ -173,20 +168,9 @@ def _numbered(
     by_size = np.lexsort((-area, walls.wall_of_triangle))
     largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
     return TracerScene(
-        scene,
-        walls,
-        origin,
-        shape_of[largest],
-        primitive_of[largest],
-        walls.triangles[largest, 0] - origin,
-        ids[order],
-        first,
-        walls.wall_of_triangle[rows],
-        *materials,
-        _wall_boxes(walls, origin),
-        views,
-        occluders,
-    )
+        scene, walls, origin, shape_of[largest], primitive_of[largest], walls.triangles[largest, 0] - origin,
+        ids[order], first, walls.wall_of_triangle[rows], *materials, _wall_boxes(walls, origin), views, occluders,
+    )  # fmt: skip
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
@@ -197,12 +181,9 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
     margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
     offset = mi.Float((walls.offset - walls.normal @ origin).astype(np.float32))
     return WallBoxes(
-        mi.Vector3f(as_points(walls.normal)),
-        offset,
-        as_points(0.5 * (low + high)),
-        mi.Vector3f(as_points(0.5 * (high - low))),
-        margin,
-    )
+        mi.Vector3f(as_points(walls.normal)), offset, as_points(0.5 * (low + high)),
+        mi.Vector3f(as_points(0.5 * (high - low))), margin,
+    )  # fmt: skip
 
 
 def as_points(points: Floats) -> mi.Point3f:

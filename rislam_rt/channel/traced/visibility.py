@@ -45,13 +45,9 @@ class SingleRays:
 
 
 def visible_rows(
-    tracer_scene: TracerScene,
-    sequences: Integers,
-    far: Floats,
-    device: Floats,
-    rows: CandidateIndices,
+    tracer_scene: TracerScene, sequences: Integers, far: Floats, device: Floats, rows: CandidateIndices,
     spared: int = NO_OCCLUDER,
-) -> tuple[CandidateIndices, Floats]:
+) -> tuple[CandidateIndices, Floats]:  # fmt: skip
     """Candidates for legs that the tracer finds visible, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
@@ -95,24 +91,15 @@ def _clear_of_occluder(
 
 
 def _trace(
-    tracer_scene: TracerScene,
-    candidates: Integers,
-    far: mi.Point3f,
-    device: mi.Point3f,
-    rows: CandidateIndices,
-    method: ImageMethod,
-    spared: int,
-) -> PathsBuffer:
+    tracer_scene: TracerScene, candidates: Integers, far: mi.Point3f, device: mi.Point3f, rows: CandidateIndices,
+    method: ImageMethod, spared: int,
+) -> PathsBuffer:  # fmt: skip
     """Run the tracer's image method on candidate wall sequences (N, D), in the room without the occluder `spared`."""
     with _short_segments():
         return method(
-            scene=SingleRays(tracer_scene.views[spared]),
-            paths=fill_buffer(tracer_scene, candidates, rows),
-            diffraction=False,
-            diffraction_lit_region=False,
-            src_positions=far,
-            tgt_positions=device,
-        )
+            scene=SingleRays(tracer_scene.views[spared]), paths=fill_buffer(tracer_scene, candidates, rows),
+            diffraction=False, diffraction_lit_region=False, src_positions=far, tgt_positions=device,
+        )  # fmt: skip
 
 
 def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:

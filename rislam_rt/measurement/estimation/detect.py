@@ -66,13 +66,9 @@ def _delay_spectrum(grid: MatchedFilterGrid, beams: Complexes) -> Complexes:
 
 
 def pick_peaks(
-    sounding: Sounding,
-    grid: MatchedFilterGrid,
-    residual: Complexes,
-    threshold: float,
-    window: tuple[float, float],
+    sounding: Sounding, grid: MatchedFilterGrid, residual: Complexes, threshold: float, window: tuple[float, float],
     most: int,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Detect paths (P, 3) as peaks of the matched filter on a residual, of a measured SNR above a linear threshold.
 
     The strongest first; each is interpolated and subtracted before the next is looked for.

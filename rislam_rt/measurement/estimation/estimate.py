@@ -61,14 +61,9 @@ class Estimate(NamedTuple):
 
 
 def estimate_paths(
-    sounding: Sounding,
-    grid: MatchedFilterGrid,
-    samples: Complexes,
-    threshold: float,
-    window: tuple[float, float],
-    most: int,
-    known: Floats = NOTHING,
-) -> Estimate:
+    sounding: Sounding, grid: MatchedFilterGrid, samples: Complexes, threshold: float, window: tuple[float, float],
+    most: int, known: Floats = NOTHING,
+) -> Estimate:  # fmt: skip
     """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, and repeat.
 
     Parameters

@@ -150,14 +150,9 @@ def contribution(fit: LeastSquaresFit, rows: Integers | Booleans, samples: Compl
 
 
 def refine(
-    sounding: Sounding,
-    fit: LeastSquaresFit,
-    samples: Complexes,
-    *,
-    steps: int,
-    tolerance: float = SEARCH_TOLERANCE,
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, *, steps: int, tolerance: float = SEARCH_TOLERANCE,
     enough: float = 0.0,
-) -> LeastSquaresFit:
+) -> LeastSquaresFit:  # fmt: skip
     """Refine path parameters by up to `steps` damped Gauss-Newton steps.
 
     They end when one promises less than `tolerance` of noise energy from every path; with `enough`, also when the cost
@@ -195,14 +190,9 @@ def refine(
 
 
 def refine_some(
-    sounding: Sounding,
-    fit: LeastSquaresFit,
-    samples: Complexes,
-    rows: Integers,
-    *,
-    steps: int,
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, rows: Integers, *, steps: int,
     tolerance: float = SEARCH_TOLERANCE,
-) -> LeastSquaresFit:
+) -> LeastSquaresFit:  # fmt: skip
     """Refine the parameters of some paths by Gauss-Newton steps, the other paths held."""
     begun, local = residual_fit(sounding, fit, rows, samples)
     some = refine(sounding, begun, local, steps=steps, tolerance=tolerance)

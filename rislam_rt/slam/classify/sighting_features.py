@@ -22,27 +22,10 @@ from rislam_rt.slam.classify.image_misfit import image_misfit
 from rislam_rt.slam.classify.stillness import stillness
 
 FEATURES = (
-    "strength",
-    "fading",
-    "snr",
-    "length",
-    "elevation",
-    "arrival_std",
-    "turn",
-    "turn_std",
-    "turn_along",
-    "turn_along_std",
-    "approach",
-    "approach_std",
-    "misfit_static",
-    "misfit_moving",
-    "echo_misfit",
-    "echo_strength",
-    "image_misfit",
-    "image_strength",
-    "mirror",
-    "age",
-)
+    "strength", "fading", "snr", "length", "elevation", "arrival_std", "turn", "turn_std", "turn_along",
+    "turn_along_std", "approach", "approach_std", "misfit_static", "misfit_moving", "echo_misfit", "echo_strength",
+    "image_misfit", "image_strength", "mirror", "age",
+)  # fmt: skip
 """Names of the columns of `track_features`, in their order."""
 STD_SCALE = 1.5
 """By how much true errors exceed the reported standard deviations: unresolved neighbours pull at a component."""
@@ -166,17 +149,10 @@ def fit_motion(sightings: Sightings) -> MotionFit:
     approach = _fit_approach(seen[..., 0], weight[..., 0], -towards, bulge)
     count = 3.0 * held.sum(axis=1)
     return MotionFit(
-        turn.value[:, 0],
-        turn.std[:, 0],
-        turn.value[:, 1],
-        turn.std[:, 1],
-        approach.value[:, 0],
-        approach.std[:, 0],
-        (turn.static + approach.static) / count,
-        (turn.moving + approach.moving) / count,
-        height,
+        turn.value[:, 0], turn.std[:, 0], turn.value[:, 1], turn.std[:, 1], approach.value[:, 0], approach.std[:, 0],
+        (turn.static + approach.static) / count, (turn.moving + approach.moving) / count, height,
         1.0 / np.sqrt(0.5 * np.sum(weight[..., 1:], axis=(1, 2))),
-    )
+    )  # fmt: skip
 
 
 class _Fitted(NamedTuple):

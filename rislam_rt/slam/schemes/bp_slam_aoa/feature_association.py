@@ -59,12 +59,9 @@ class View(NamedTuple):
 
 
 def expect_scan(
-    features: GaussianFeatures,
-    predicted: PredictedReturns,
-    scan: ComponentScan,
-    sensor: SensorModel,
+    features: GaussianFeatures, predicted: PredictedReturns, scan: ComponentScan, sensor: SensorModel,
     config: BpSlamAoaConfig,
-) -> View:
+) -> View:  # fmt: skip
     """Predicted returns of features' Gaussians for association: detection probabilities, pulls of neighbours, pairs."""
     variance = features.strength_variance + config.fading**2
     loud = predicted.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]

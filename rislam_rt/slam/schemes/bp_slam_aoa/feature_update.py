@@ -27,13 +27,9 @@ MOST_SCATTER = 9.0
 
 
 def absorb(
-    features: GaussianFeatures,
-    view: View,
-    course: AgentTrajectory,
-    scan: ComponentScan,
-    found: Association,
+    features: GaussianFeatures, view: View, course: AgentTrajectory, scan: ComponentScan, found: Association,
     fresh: Floats,
-) -> tuple[GaussianFeatures, AgentTrajectory]:
+) -> tuple[GaussianFeatures, AgentTrajectory]:  # fmt: skip
     """Update features' Gaussian sums and the agent's trajectory by the components, one by one, the surest first."""
     ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))

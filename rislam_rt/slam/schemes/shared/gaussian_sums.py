@@ -106,11 +106,9 @@ def carry(sums: Sums, step: Step, wander: Floats) -> Sums:
     covariance[:, 0, 0] += np.einsum("kia,ab,kib->k", lost, step.residual, lost)[sums.owner]
     covariance[sums.kind == DRIFT] += np.diag(wander**2)
     return sums._replace(
-        slope=sums.slope @ step.transfer,
-        base_slope=sums.base_slope @ step.transfer,
-        walk_slope=sums.walk_slope @ step.transfer,
-        covariance=covariance,
-    )
+        slope=sums.slope @ step.transfer, base_slope=sums.base_slope @ step.transfer,
+        walk_slope=sums.walk_slope @ step.transfer, covariance=covariance,
+    )  # fmt: skip
 
 
 def axes_of(walk: Floats) -> tuple[Floats, Floats]:

@@ -80,14 +80,10 @@ def absorb(
     slope = sums.slope - gain[:, :, None] * sight.by_course[:, None]
     change = course.mean - ref
     moved = sums._replace(
-        base=sums.base + sums.base_slope @ change,
-        walk=sums.walk + sums.walk_slope @ change,
-        existence=existence,
-        mean=sums.mean + gain * pulls[0][:, None] + slope @ change,
-        slope=slope,
-        covariance=sums.covariance - gain[:, :, None] * inner[:, None],
-        share=share,
-    )
+        base=sums.base + sums.base_slope @ change, walk=sums.walk + sums.walk_slope @ change, existence=existence,
+        mean=sums.mean + gain * pulls[0][:, None] + slope @ change, slope=slope,
+        covariance=sums.covariance - gain[:, :, None] * inner[:, None], share=share,
+    )  # fmt: skip
     return moved, course
 
 
