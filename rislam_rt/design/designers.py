@@ -11,9 +11,8 @@ from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.relaxation import best_magnitudes, relaxation_bound
 from rislam_rt.design.result import Design, DesignConfig, Designer
-from rislam_rt.design.single_path import continuous_phases, nearest_code
+from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
 from rislam_rt.model import RisCode
@@ -100,3 +99,17 @@ def blind_design(method: str, code: RisCode) -> Design:
     """Wrap a search code as a `Design` of outcome `NO_PATHS`, while nothing is known of the panel."""
     infinite = float("inf")
     return Design(method, code, code.xi, infinite, -infinite, 0.0, 0.0, np.array([infinite]), 0.0, Outcome.NO_PATHS)
+
+
+def best_magnitudes(problem: DesignProblem) -> Floats:
+    """Largest gain magnitude (B, P) that each panel path can reach by a code of its own, exact over the levels."""
+    samples, panel = problem.response.shape[:2]
+    return exact_code(problem.response.reshape(samples, panel, -1), problem.levels)[1]
+
+
+def relaxation_bound(objective: Objective, best: Floats) -> float:
+    """Lower bound [m^2] of the expected CRLB over all codes, from the panel paths' own best gains (B, P).
+
+    The information of these gains exceeds that of every code (as matrices), and the trace of the inverse falls with it.
+    """
+    return float(objective.value(best.reshape(-1).astype(np.complex128)))

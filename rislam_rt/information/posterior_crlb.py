@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
 from rislam_rt.information.landmark_model import LinearMeasurements
-from rislam_rt.information.motion_prior import MotionPrior
+from rislam_rt.information.priors import MotionPrior
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,8 +1,8 @@
-"""The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`: all of |f| < B/2 at equal power, nothing outside."""
+"""The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`, equal power over |f| < B/2, and the tones that sample its band."""
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Complexes, Floats, phasor
 
 
 def effective_bandwidth(bandwidth: float) -> float:
@@ -62,3 +62,14 @@ def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivativ
     Samples at any rate of at least B carry its whole energy: `sum s^2 / rate = E`.
     """
     return np.sqrt(bandwidth / energy) * autocorrelation(time, bandwidth, energy, derivative=derivative)
+
+
+def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
+    """Baseband frequencies (M,) [Hz] of a multicarrier sounding's tones, evenly spaced over the band, centred on 0."""
+    return (np.arange(num_subcarriers) - (num_subcarriers - 1) / 2.0) * bandwidth / num_subcarriers
+
+
+def delay_response(tau: Floats, frequencies: Floats) -> Complexes:
+    """Phase factors `exp(-j 2 pi f tau)` (..., M) of tones at baseband frequencies (M,) [Hz] after delays (...,)
+    [s]."""
+    return phasor(-2.0 * np.pi * np.asarray(tau)[..., None] * frequencies)
