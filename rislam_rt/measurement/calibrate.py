@@ -18,8 +18,8 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import estimate_paths
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, tone_response
 from rislam_rt.measurement.estimation.refine import fit_amplitudes
-from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding, tone_response
 from rislam_rt.measurement.hardware import Correction, image_spectrum
 from rislam_rt.measurement.signal import num_tones
 from rislam_rt.model import Body, RadioConfig

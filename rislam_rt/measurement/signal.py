@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, phasor
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement.config import MOST_TONES, ReceiverConfig
-from rislam_rt.measurement.estimation.sounding import tone_response
+from rislam_rt.measurement.estimation.path_signals import tone_response
 from rislam_rt.measurement.received import Received
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies

@@ -11,7 +11,7 @@ from rislam_rt.measurement.components import capped_cosine_std, clip_to_unit_dis
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
-from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding
 from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.traced.path_buffer import as_indices
+from rislam_rt.channel.traced.tracer_scene import as_indices
 
 if TYPE_CHECKING:
     from rislam_rt.channel.traced.tracer_scene import TracerScene

@@ -15,8 +15,8 @@ from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
-from rislam_rt.geometry.angles import unit
-from rislam_rt.model import RadioConfig, Scene, Trajectory
+from rislam_rt.geometry.angles import rotation_z, unit
+from rislam_rt.model import PathKind, Paths, RadioConfig, Scene, Trajectory
 
 
 class DiffuseKind(IntEnum):
@@ -128,7 +128,7 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
     """Sionna scene of the room with scattering walls; corners of one material are joined, so that edges diffract."""
     import sionna.rt as rt
 
-    from rislam_rt.channel.traced.scattering_materials import rough_material
+    from rislam_rt.channel.traced.radio_materials import rough_material
     from rislam_rt.channel.traced.tracer_scene import build_mesh
 
     tracer_scene = rt.load_scene()
@@ -187,3 +187,63 @@ def _nothing(depth: int) -> SolvedPaths:
     """An empty set of diffuse paths."""
     none, points = np.zeros(0), np.zeros((0, 3))
     return SolvedPaths(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))
+
+
+CELLS = 2.0
+"""Summing cells to a resolution cell, along delay and along each direction cosine."""
+
+
+def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> Paths:
+    """Sum scattered and diffracted paths within half a resolution cell into one path each, cycle by cycle.
+
+    These paths have no identity: a column means nothing from one cycle to the next.
+
+    Gains add up, carrier phases included; delay and directions are the mean by power. The kind is `VT`, for want of
+    another: they came over walls alone.
+    """
+    groups, cycle = _cells(extras, trajectory, radio)
+    count, cycles = len(cycle), len(trajectory)
+    power = np.abs(extras.gain) ** 2
+    total = np.maximum(np.bincount(groups, power, count), np.finfo(np.float64).tiny)
+    gain = np.bincount(groups, extras.gain.real, count) + 1j * np.bincount(groups, extras.gain.imag, count)
+
+    def mean(values: Floats) -> Floats:
+        return np.bincount(groups, power * values, count) / total
+
+    first = np.searchsorted(cycle, np.arange(cycles))
+    column = np.arange(count) - first[cycle]
+    width = int(column.max(initial=-1)) + 1
+
+    def dense(values: np.ndarray) -> np.ndarray:
+        table = np.zeros((cycles, width, *values.shape[1:]), dtype=values.dtype)
+        table[cycle, column] = values
+        return table
+
+    return Paths(
+        kind=np.full(width, PathKind.VT),
+        landmark=np.full(width, -1),
+        tx_walls=np.full((width, 1), -1),
+        rx_walls=np.full((width, 1), -1),
+        valid=dense(np.ones(count, dtype=np.bool_)),
+        tau=dense(mean(extras.tau)),
+        departure=dense(unit(np.stack([mean(axis) for axis in extras.departure.T], axis=-1))),
+        arrival=dense(unit(np.stack([mean(axis) for axis in extras.arrival.T], axis=-1))),
+        gain=dense(gain),
+        vertices=dense(np.stack([mean(axis) for axis in extras.vertices[:, 0].T], axis=-1)[:, None]),
+        num_vertices=np.ones(width, dtype=np.int64),
+        walls=(),
+        landmarks=(),
+        source=extras.source,
+    )
+
+
+def _cells(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> tuple[Integers, Integers]:
+    """Number (N,) of the delay and angle cell into which each diffuse path falls, and each cell's cycle (C,),
+    ascending."""
+    array = radio.array
+    body = np.einsum("ni,nij->nj", extras.arrival, rotation_z(trajectory.heading[extras.cycle]))
+    widths = CELLS * np.array([radio.bandwidth, array.rows * array.spacing, array.cols * array.spacing])
+    place = np.column_stack([extras.tau, body[:, :2]]) * widths
+    keys = np.column_stack([extras.cycle, np.floor(place).astype(np.int64), body[:, 2] >= 0.0])
+    cells, groups = np.unique(keys, axis=0, return_inverse=True)
+    return groups.ravel(), cells[:, 0]

@@ -17,8 +17,8 @@ from sionna.rt.utils import spectrum_to_matrix_4f
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.traced.leg_query import LegEndpoints
-from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
+from rislam_rt.channel.traced.radio_materials import ConstantReflection
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene
 from rislam_rt.channel.walls import Walls

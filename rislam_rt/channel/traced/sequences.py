@@ -1,12 +1,12 @@
-"""Wall sequences that the tracer tries: all that the positions of walls and ends leave possible.
+"""Wall sequences that the tracer tries, all that the positions of walls and ends leave possible, and their indices.
 
 A reflection needs both its neighbours (a wall, or an end of the leg) on the same side of its plane. What that rules
 out is not asked; everything else is, for every position, so no path depends on where rays happen to be shot. Where
 that would be too many, cones from both ends (`cones.py`) rule out more, and nothing that exists.
 """
 
-from collections.abc import Callable, Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -153,3 +153,33 @@ def _blocks(count: int, width: int) -> Iterator[slice]:
     step = max(1, _BLOCK // max(width, 1))
     for start in range(0, count, step):
         yield slice(start, min(start + step, count))
+
+
+class CandidateIndices(NamedTuple):
+    """N candidates or legs, as indices into tables of far ends, devices and sequences, (N,) each."""
+
+    far: Integers
+    device: Integers
+    sequence: Integers
+
+    def only(self, keep: Integers | slice) -> "CandidateIndices":
+        """Select candidates by row."""
+        return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
+
+
+def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
+    """Yield candidates regrouped into blocks of `size` rows, the last one shorter."""
+    waiting: list[CandidateIndices] = []
+    for part in parts:
+        waiting.append(part)
+        while (count := sum(len(rows.far) for rows in waiting)) >= size:
+            together = join_indices(waiting)
+            yield together.only(slice(0, size))
+            waiting = [together.only(slice(size, count))]
+    if waiting:
+        yield join_indices(waiting)
+
+
+def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
+    """Concatenate candidates of several parts."""
+    return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -10,14 +10,12 @@ import sionna.rt as rt
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
-from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_material
+from rislam_rt.channel.traced.radio_materials import specular_material
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import inside_any
-from rislam_rt.model import Material
 
 NO_OCCLUDER = -1
 """Key of `TracerScene.views` for the room with all its occluders."""
@@ -121,7 +119,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: 
     scene = rt.load_scene()
     scene.frequency = carrier
     materials = list(dict.fromkeys(walls.material))
-    radio_materials = tuple(_material(material, m) for m, material in enumerate(materials))
+    radio_materials = tuple(specular_material(material, m) for m, material in enumerate(materials))
     material_of_wall = np.array([materials.index(m) for m in walls.material], dtype=np.int64)
     members = [np.flatnonzero(material_of_wall[walls.wall_of_triangle] == m) for m in range(len(materials))]
     objects = [
@@ -191,6 +189,11 @@ def as_points(points: Floats) -> mi.Point3f:
     return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
+def as_indices(values: Integers) -> mi.UInt:
+    """Convert numbers (N,) to unsigned integers of the tracer's backend."""
+    return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
+
+
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
     """Mitsuba mesh of separate triangles (T, 3, 3) [m], in their order."""
     mesh = mi.Mesh(
@@ -202,19 +205,3 @@ def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
     params["faces"] = mi.UInt(np.arange(3 * len(triangles), dtype=np.uint32))
     params.update()
     return mesh
-
-
-def _material(material: Material, number: int) -> rt.RadioMaterialBase:
-    """Sionna radio material of a specular wall: constant R, constant TE and TM, or a slab by permittivity or ITU."""
-    if material.reflection is not None:
-        return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
-    if material.reflection_te is not None:
-        return PolarisedReflection(f"polarised-{number}", material, material.scattering)
-    if material.permittivity is not None:
-        return slab_material(f"slab-{number}", material, material.scattering)
-    try:
-        return rt.ITURadioMaterial(
-            f"itu-{number}", material.itu, material.thickness, scattering_coefficient=material.scattering
-        )
-    except ValueError as error:
-        raise SceneError(f"material.itu: '{material.itu}' received; {error}") from None

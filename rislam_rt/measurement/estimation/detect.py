@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers, phasor
-from rislam_rt.measurement.estimation.sounding import Sounding
+from rislam_rt.measurement.estimation.path_signals import Sounding
 
 OVERSAMPLING = 2
 """Grid points per resolution cell of the delay."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, into_range, pick_peaks
+from rislam_rt.measurement.estimation.path_signals import Sounding
 from rislam_rt.measurement.estimation.refine import (
     Accuracy,
     LeastSquaresFit,
@@ -26,7 +27,6 @@ from rislam_rt.measurement.estimation.refine import (
     subset_fit,
     without_idle,
 )
-from rislam_rt.measurement.estimation.sounding import Sounding
 
 BATCH = 16
 """Largest number of paths that are added between two refinements."""

@@ -11,10 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.measurement.estimation.inner_products import InnerProducts, PathSignals, inner_of, waves_at
+from rislam_rt.measurement.estimation.path_signals import (
+    InnerProducts,
+    PathSignals,
+    Sounding,
+    correlate_waves,
+    inner_of,
+    wave_signals,
+    waves_at,
+)
 from rislam_rt.measurement.estimation.positive_definite import RIDGE, inverse, solve, whitened
-from rislam_rt.measurement.estimation.sounding import Sounding
-from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 
 PRIOR = np.array([0.0, 2.0, 2.0])
 """Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an

@@ -1,7 +1,7 @@
 """The cloud of one landmark's particles for all agent particles: M points about a centre, shared through indices.
 
 Points are stored as offsets from a centre in float64, in single precision (numpy) or as numbers of 21 bits (Dr.Jit,
-`quantisation.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in
+`drjit_engine.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in
 block `block[i]` and its weights in row `row[i]`. When agent particles are resampled only the indices are: nothing is
 copied until weights change, and points are written anew only when landmark particles are resampled themselves.
 """

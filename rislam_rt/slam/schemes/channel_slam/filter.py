@@ -18,7 +18,6 @@ from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
 from rislam_rt.slam.schemes.shared.gaussian_sums import (
     PredictedRanges,
@@ -33,7 +32,7 @@ from rislam_rt.slam.schemes.shared.gaussian_sums import (
     range_moments,
 )
 from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Scan
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, Scan
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.sum_correction import absorb
 from rislam_rt.slam.start_prior import StartPrior

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
-from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic, length_of
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 
 POINT, PLANE, DRIFT = 0, 1, 2
 """Kinds of a feature's Gaussian: a static point, a wall (the image of the Tx moves), or a wandering point, as a path

@@ -13,7 +13,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.gaussian_sums import PredictedRanges, Sums, spread_of
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
-from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.ranges import Odds, Scan
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
