@@ -43,8 +43,7 @@ class Occluders:
         return self.triangles[self.first[shade] : self.first[shade + 1]]
 
     def hides(self, start: Floats, end: Floats, spared: int = -1) -> Booleans:
-        """Which segments from `start` to `end` (N, 3) [m] an occluder hides; that of the landmark `spared` does not
-        count."""
+        """Which segments from `start` to `end` (N, 3) [m] an occluder hides, but for `spared`'s own."""
         hidden = np.zeros(len(start), dtype=np.bool_)
         for shade in np.flatnonzero(self.landmark != spared):
             near = _distance_to_segments(self.center[shade], start, end) <= self.radius[shade]
@@ -111,8 +110,7 @@ def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _outline(triangles: Floats, direction: Floats) -> Floats:
-    """Silhouette edges (E, 2, 3) [m] of triangles (T, 3, 3) seen along a direction: between front and back faces, and
-    edges of one triangle alone."""
+    """Silhouette edges (E, 2, 3) [m] of triangles (T, 3, 3) seen along a direction, and edges of one triangle alone."""
     normal, _ = triangle_planes(triangles)
     ahead = np.repeat(normal @ direction > 0.0, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)

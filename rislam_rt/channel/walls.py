@@ -93,8 +93,7 @@ def _names(reflector: str, count: int) -> list[str]:
 
 
 def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """Number of the wall behind a panel, -1 without one: the nearest plane of its host reflector, `reflector` (W,)
-    being each wall's."""
+    """Number of the wall behind a panel, -1 without: its host reflector's nearest plane; `reflector` (W,) of walls."""
     names = [r.name for r in scene.reflectors]
     if panel.host not in names:
         return -1

@@ -75,8 +75,7 @@ def problem_from_belief(
     belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
     least_snr: float = 0.0, gradient: GradientMode = "exact",
 ) -> DesignProblem | None:  # fmt: skip
-    """Design problem on a belief: element responses and gradients of the paths predicted from its map; None without a
-    panel in the map.
+    """Design problem on a belief: responses and gradients of the paths that its map predicts; None without a panel.
 
     A point landmark gives one path; an image gives two, with its wall on the Rx leg and on the Tx leg. Paths of the
     panel and its images depend on the code, the others do not. The wall between the panel and its image mirrors the
@@ -107,8 +106,7 @@ def problem_from_belief(
 
 
 class _PredictedPaths(NamedTuple):
-    """Q paths predicted from a map: rows of the scattering point, and of the points that Tx and Rx see (it or its
-    image)."""
+    """Q paths predicted from a map: rows of the scattering point, and of the points (or images) that Tx, Rx see."""
 
     source: Integers
     tx_point: Integers
@@ -155,8 +153,7 @@ def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mo
 
 
 def _ratio(landmarks: MapEstimate, paths: _PredictedPaths) -> Floats:
-    """Amplitude ratio (Q,) of the wall reflection on each predicted path, from the image's strength; 1 without a
-    wall."""
+    """Amplitude ratio (Q,) of the wall reflection on each predicted path, by the image's strength; 1 without wall."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
     return np.where(image != paths.source, landmarks.strength[image], 1.0)
 
@@ -193,8 +190,7 @@ def _responses_of(
 def _point_gains(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, radio: RadioConfig
 ) -> Complexes:
-    """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, from their strengths (root of the
-    cross-section)."""
+    """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, of strength the root of the cross-section."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)

@@ -52,8 +52,7 @@ def _describe(
     name: str, problem: DesignProblem, objective: Objective, found: Integers | Floats, history: Floats,
     seconds: float, certify: bool,
 ) -> Design:  # fmt: skip
-    """Value the code or phases that a search found, and compare with the direct path's optimum and the relaxation
-    bound."""
+    """Value the code or phases found, and compare with the direct path's optimum and the relaxation bound."""
     step = 2.0 * np.pi / problem.levels
     discrete = np.issubdtype(found.dtype, np.integer)
     xi = np.asarray(found * step if discrete else found, dtype=np.float64)

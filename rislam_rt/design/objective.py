@@ -70,8 +70,7 @@ SINGULAR = 1e-12
 
 
 def build_objective(problem: DesignProblem) -> Objective:
-    """Precompute the objective of a design problem; the outcome tells whether any code makes the position
-    observable."""
+    """Precompute the objective of a design problem; the outcome tells whether a code makes the position observable."""
     samples, panel = problem.response.shape[:2]
     matrix = np.ascontiguousarray(problem.response.reshape(samples * panel, -1).T)
     x, y = problem.gradient[..., 0], problem.gradient[..., 1]

@@ -106,8 +106,7 @@ def _chains(mean: Complexes, direct: Complexes) -> Complexes:
 
 
 def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
-    """Samples (L, M) that an ideal array would receive of the strong paths estimated in calibrated samples, without
-    ghosts."""
+    """Samples (L, M) that an ideal array would receive of the strong paths in calibrated samples, without ghosts."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
     kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
@@ -117,8 +116,7 @@ def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: fl
 
 
 def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
-    """Which paths (P,) calibration uses: those not so much weaker than a path of about their delay that they may be its
-    ghost."""
+    """Which paths (P,) calibration uses: none so much weaker than one of about its delay that it may be its ghost."""
     near = np.abs(delay[:, None] - delay) < GHOST_CELLS
     return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
 
@@ -135,8 +133,7 @@ def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
-    """Array matrix (L, L) of coupling and chain gains, by regularised least squares from ideal to received samples (T,
-    L, M).
+    """Array matrix (L, L) of coupling and chain gains: regularised least squares from ideal to received (T, L, M).
 
     The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
     misfit.
@@ -148,8 +145,7 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
 
 
 def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
-    """Leakage residue (L, M) that stays the same over the cycles of unexplained samples (T, L, M), and the variance of
-    the rest."""
+    """Leakage residue (L, M), the constant part of unexplained samples (T, L, M), and the variance of the rest."""
     mean = rest.mean(axis=0)
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))

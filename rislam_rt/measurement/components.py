@@ -96,8 +96,7 @@ def single(received: Received) -> NoiselessComponents:
 
 
 def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
-    """Errors of components by the bound of a lone path, each as if no other were near; `draws` (N, 5) are standard
-    normal."""
+    """Errors of components by the bound of a lone path, as if no other were near; `draws` (N, 5) standard normal."""
     tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
     deviation = np.column_stack([tau, cosines])
     gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))
@@ -123,8 +122,7 @@ def clip_to_unit_disc(cosines: Floats) -> Floats:
 
 
 def capped_cosine_std(deviation: Floats, radio: RadioConfig) -> Floats:
-    """Standard deviations (N, 2) of direction cosines, at most `DISC_STD`, which they are along an axis without
-    aperture."""
+    """Standard deviations (N, 2) of direction cosines, at most `DISC_STD`, as along an axis without aperture."""
     blind = np.array([radio.array.rows, radio.array.cols]) < 2
     return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))
 

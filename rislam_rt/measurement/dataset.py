@@ -54,8 +54,7 @@ def signals_dataset(
     paths: Paths, trajectory: Trajectory, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator,
     on_cycle: Callable[[], None] | None = None,
 ) -> "xr.Dataset":  # fmt: skip
-    """Data set of received signals: samples of every cycle, the components found in them with their tracks, and the
-    truth.
+    """Data set of received signals: samples of every cycle, the tracked components found in them, and the truth.
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """

@@ -46,8 +46,7 @@ def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -
 
 
 def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:
-    """Intrinsic volumes mu_0 .. mu_3 of the region searched for components: ellipse of cosines times interval of
-    delays."""
+    """Intrinsic volumes mu_0 .. mu_3 of the region searched: ellipse of cosines times interval of delays."""
     length = 2.0 * np.pi * np.sqrt(radio.effective_bandwidth_squared) * window
     positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
     minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
@@ -84,8 +83,7 @@ def _threshold_of_rate(rate: float, radio: RadioConfig, window: float) -> float:
 
 
 def draw_false_alarms(sensor: SensorModel, *, rng: np.random.Generator) -> ReportedComponents:
-    """Draw false alarms: a Poisson number, uniform over delay window and disc of cosines, amplitudes of noise above the
-    threshold."""
+    """Draw false alarms: a Poisson number, uniform over window and disc, amplitudes of noise above the threshold."""
     radio, count = sensor.radio, rng.poisson(sensor.false_alarms)
     tau = rng.uniform(*sensor.window, count)
     radius, azimuth = np.sqrt(rng.uniform(size=count)), rng.uniform(-np.pi, np.pi, count)

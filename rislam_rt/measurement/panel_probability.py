@@ -48,8 +48,7 @@ class ComponentSides(NamedTuple):
 def panel_probability(
     found: ComponentSides, radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Floats, Integers | None]:
-    """Probability (N,) that each component, if a path made it, came over a panel, and number (N,) of the likeliest
-    panel.
+    """Probability (N,) that each component, if a path made it, came over a panel, and the likeliest panel (N,).
 
     Where there is one panel the second is None.
     """
@@ -71,8 +70,7 @@ def panel_probability(
 
 
 def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
-    """Amplitude ratios (`SHIFTS`,) at which a moving path leaks from the capture `of` into the capture `into`, by
-    Doppler shift.
+    """Amplitude ratios (`SHIFTS`,) at which moving paths leak from capture `of` into capture `into`, by Doppler shift.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
@@ -82,8 +80,7 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
 
 
 def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
-    """Odds (N,) of each component for being the leak of a source from another capture, against a path of its own
-    capture."""
+    """Odds (N,) of each component for being the leak of another capture's source, against a path of its own."""
     array = radio.array
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     gap = found.points[:, None] - sources.points

@@ -83,14 +83,12 @@ class Clutter(NamedTuple):
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:
-    """Complex gain of the direct path from Tx to Rx (leakage) in a cycle, before cancellation; 0 where it is
-    hidden."""
+    """Complex gain of the direct path from Tx to Rx (leakage) in a cycle before cancellation; 0 where hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
 
 
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
-    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, whose wave spreads from the
-    Tx.
+    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, which spread from the Tx.
 
     The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
     """

@@ -59,8 +59,7 @@ def capture(
     received: Received, radio: RadioConfig, config: ReceiverConfig, front_end: FrontEnd | None = None,
     leakage: complex = 0.0, *, rng: np.random.Generator,
 ) -> list[Capture]:  # fmt: skip
-    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of several
-    codes.
+    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of codes.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
@@ -104,8 +103,7 @@ def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
 def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
 ) -> DetectedComponents:
-    """Estimate the multipath components in the captures of one cycle, starting from those of the previous cycle, if
-    given."""
+    """Estimate the multipath components in a cycle's captures, starting from those of the previous cycle, if given."""
     return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
 
 
@@ -120,16 +118,14 @@ def measure_waveform(
     received: Received, radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None,
     front_end: FrontEnd | None = None, leakage: complex = 0.0, *, rng: np.random.Generator,
 ) -> tuple[Measurement, PathTruth]:  # fmt: skip
-    """Simulate the received signal of a cycle and estimate its multipath components; also the paths that they most
-    likely are."""
+    """Simulate a cycle's received signal and estimate its multipath components, and the paths they likeliest are."""
     captures = capture(received, radio, config, front_end, leakage, rng=rng)
     found = find_components(captures, radio, config, previous)
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the true path that each estimated component most likely is, of those in its capture; -1 for
-    none."""
+    """Column (N,) of the true path that each estimated component most likely is, of its capture's; -1 for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -220,8 +216,7 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """Number (P,) of the component of each estimated path: an unresolved one joins its nearest neighbour within a
-    cell."""
+    """Number (P,) of each estimated path's component: unresolved ones join their nearest neighbour within a cell."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

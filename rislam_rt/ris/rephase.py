@@ -12,8 +12,7 @@ from rislam_rt.model.ris import RisCode
 
 
 class Block(NamedTuple):
-    """Block of panel paths (I J,) that join each of the Tx legs (I,) with each of the Rx legs (J,), first Tx leg
-    first."""
+    """Block of panel paths (I J,) that join each of the Tx legs (I,) with each of the Rx legs (J,), Tx legs first."""
 
     tx: Integers
     rx: Integers

@@ -29,8 +29,7 @@ def element_gain_area(spec: RisSpec, wavelength: float) -> float:
 
 
 def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float) -> Complexes:
-    """Response (..., N, M) of every panel element to one leg: eq. `single` without its phase shift is the product of
-    two.
+    """Response (..., N, M) of every panel element to one leg: two make eq. `single` without its phase shift.
 
     Parameters
     ----------
@@ -51,8 +50,7 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
 
 
 def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) -> tuple[Floats, Floats]:
-    """Amplitudes (..., N, M) of a panel's element responses to one leg, for a coefficient of 1, and distances [m] of
-    the elements."""
+    """Amplitudes (..., N, M) of a panel's responses to one leg of coefficient 1, and elements' distances [m]."""
     ray, offsets = np.asarray(device - center), spec.offsets()
     along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
     distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
@@ -63,8 +61,7 @@ def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) 
 def far_field_response(
     spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float
 ) -> Complexes:
-    """Response (..., N, M) of every panel element to one leg in the far field (Appendix A): plane waves, amplitude of
-    the centre.
+    """Response (..., N, M) of panel elements to a leg in the far field (Appendix A): plane waves, centre's amplitude.
 
     Valid for distances above `2 D^2 / lambda`, D the panel's diagonal.
     """
@@ -102,8 +99,7 @@ def delay_spread(spec: RisSpec, center: Floats, tx: Floats, rx: Floats) -> Float
 
 
 def delay_spread_warnings(spec: RisSpec, center: Floats, tx: Floats, rx: Floats, bandwidth: float) -> tuple[str, ...]:
-    """Warning if delays over a panel spread by more than 1 / B, so that a path over it has no single delay; else
-    none."""
+    """Warning if delays over a panel spread by more than 1 / B: a path over it has no single delay; else none."""
     spread = float(np.max(delay_spread(spec, center, tx, rx), initial=0.0))
     if spread * bandwidth <= 1.0:
         return ()

@@ -11,8 +11,7 @@ def effective_bandwidth(bandwidth: float) -> float:
 
 
 def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
-    """Autocorrelation `R_s(tau) = int s(t) s(t - tau) dt` of the flat-band pulse (Appendix B), or its 1st or 2nd
-    derivative.
+    """Autocorrelation `int s(t) s(t - tau) dt` of the flat-band pulse (Appendix B), or its 1st or 2nd derivative.
 
     Parameters
     ----------
@@ -70,6 +69,5 @@ def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
 
 
 def delay_response(tau: Floats, frequencies: Floats) -> Complexes:
-    """Phase factors `exp(-j 2 pi f tau)` (..., M) of tones at baseband frequencies (M,) [Hz] after delays (...,)
-    [s]."""
+    """Phase factors `exp(-j 2 pi f tau)` (..., M) of tones at frequencies (M,) [Hz] after delays (...,) [s]."""
     return phasor(-2.0 * np.pi * np.asarray(tau)[..., None] * frequencies)

@@ -57,8 +57,7 @@ class ErrorLimits(NamedTuple):
 
 
 class PathLegs(NamedTuple):
-    """Lengths, segments and walls of the two legs (M, 2) of matched paths; without a landmark the second leg is
-    zero."""
+    """Lengths, segments and walls of the two legs (M, 2) of matched paths; the second is zero without a landmark."""
 
     length: Floats
     """[m]."""
@@ -76,8 +75,7 @@ class PathLegs(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomPrecision:
-    """Numerical precision of paths in one room, from which their error limits follow: rounding and flatness of
-    walls."""
+    """Numerical precision of paths in one room, which sets their error limits: rounding and flatness of walls."""
 
     scene: Scene
     radio: RadioConfig
@@ -108,8 +106,7 @@ class RoomPrecision:
     def limits(
         self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, scale: Floats
     ) -> ErrorLimits:
-        """Error limits of the paths (cycle[i], path[i]) of the image-source channel; `scale` (M,) is their coherent
-        scale."""
+        """Error limits of the image-source channel's paths (cycle[i], path[i]), of coherent scale `scale` (M,)."""
         shape = _shape(paths, cycle, path, trajectory, build_walls(self.scene).names)
         reach = self.extent + shape.length
         shift = (2.0 + STEPS * shape.bounces) * self.roundoff * reach * (shape.length > 0.0)
@@ -139,8 +136,7 @@ class RoomPrecision:
         return error
 
     def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
-        """Gain's error limit (M,) from the antennas' patterns: a half-wave dipole's is a small difference over a
-        sine."""
+        """Gain's error limit (M,) from antenna patterns: a half-wave dipole's is a small difference over a sine."""
         error, antennas = np.zeros(len(path)), self.radio.antennas
         for pattern, ray in ((antennas.tx, paths.departure), (antennas.rx, paths.arrival)):
             if pattern == "hw_dipole":
@@ -253,8 +249,7 @@ def _bend(segments: Floats, beside: Floats) -> Floats:
 
 
 def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """Flatness of walls (W,) [m], the largest distance of corners from the wall's plane, and altitude (W,) [m] of the
-    largest triangle."""
+    """Largest distance (W,) [m] of corners from each wall's plane, and altitude (W,) [m] of its largest triangle."""
     corners, owner = walls.triangles, walls.wall_of_triangle
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))

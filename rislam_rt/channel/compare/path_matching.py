@@ -162,8 +162,7 @@ def is_single(source: str) -> bool:
 
 
 def _level_difference(a: Floats, b: Floats) -> Floats:
-    """Absolute level difference |20 lg(a / b)| [dB] of the gains of matched paths, 0 where both are 0 (a panel seen
-    edge-on)."""
+    """Absolute level difference |20 lg(a / b)| [dB] of matched paths' gains, 0 where both are 0 (panel edge-on)."""
     floor = np.finfo(np.float64).tiny
     return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))
 

@@ -31,8 +31,7 @@ ROUNDINGS = 8.0
 
 
 class Explanation(NamedTuple):
-    """Explanation of a missing path: reason (empty if none was found), what was computed, the length [m] it rests
-    on."""
+    """Explanation of a missing path: reason (empty if none was found), what was computed, length [m] it rests on."""
 
     reason: str
     text: str

@@ -34,8 +34,7 @@ class WallClusters(NamedTuple):
     """(C, 3) [m] half the sizes of those boxes."""
 
     def reached(self, normal: Floats, offset: Floats) -> tuple[Integers, Integers]:
-        """Pairs (beam, wall), as two index arrays, where a wall's bounding rectangle reaches into each half-space
-        (N, P, 3), (N, P) of a beam."""
+        """Pairs (beam, wall) where a wall's bounding rectangle reaches into all half-spaces (N, P, 3) of a beam."""
         beams, planes = offset.shape
         if beams == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -128,8 +127,7 @@ class Beams(NamedTuple):
 
 
 class FoundSequences(NamedTuple):
-    """Wall sequences (N, d) that beam tracing leaves possible, with the numbers (N,) of the device's and the far end's
-    bounding ball."""
+    """Wall sequences (N, d) that beam tracing leaves possible, with device's and far end's bounding ball (N,)."""
 
     device: Integers
     far: Integers
@@ -139,8 +137,7 @@ class FoundSequences(NamedTuple):
 def search_beams(
     clusters: WallClusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
 ) -> Iterator[FoundSequences]:
-    """Yield, in blocks, the wall sequences of 1 to `depth` bounces that beam tracing leaves possible between devices
-    and far ends.
+    """Yield, in blocks, wall sequences of 1 to `depth` bounces that beams leave possible from devices to far ends.
 
     Parameters
     ----------
@@ -188,8 +185,7 @@ def _blocks(count: int, width: int) -> Iterator[slice]:
 def _facing(
     rectangles: Rectangles, beams: Beams, row: Integers, wall: Integers, radius: Floats
 ) -> tuple[Integers, Integers]:
-    """Keep the pairs (beam, next wall) with part of the beam's last wall on that side of the next wall's plane where
-    the mirror image is: the ray comes from there."""
+    """Keep the pairs (beam, next wall) where part of the beam's last wall is on the image's side of the next wall."""
     last = beams.walls[row, 0]
     keep = wall != last
     row, wall, last = row[keep], wall[keep], last[keep]

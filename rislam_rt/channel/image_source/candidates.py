@@ -56,8 +56,7 @@ def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
 def candidate_rows(
     search: SequenceSearch, device: Floats, far: Floats, depth: int, host: int
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Yield candidates for specular legs, cycles (N,) and wall sequences (N, d) from device to far end, in blocks of
-    one d each.
+    """Yield candidates for specular legs, cycles (N,) and wall sequences (N, d), in blocks of one d each.
 
     Parameters
     ----------

@@ -77,8 +77,7 @@ class WallFacets:
         return inside
 
     def _on_few(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3), each in the plane of its wall (N,) of at most `_SIMPLE` triangles, lie on one of
-        these."""
+        """Whether points (N, 3) in the planes of walls (N,) of at most `_SIMPLE` triangles lie on one of these."""
         inside = np.zeros(len(points), dtype=np.bool_)
         for number in range(_SIMPLE):
             rows = np.flatnonzero(~inside & (self.first[wall] + number < self.first[wall + 1]))
@@ -88,8 +87,7 @@ class WallFacets:
         return inside
 
     def reflects(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3), each in the plane of its wall (N,), lie on that wall and on none that covers it: where
-        it reflects."""
+        """Whether points (N, 3) in the planes of walls (N,) lie on their wall, and on none that covers it."""
         own = self.contains(points, wall)
         for lower in np.unique(wall[own]) if any(map(len, self.over)) else []:
             for upper in self.over[lower]:
@@ -112,8 +110,7 @@ class WallFacets:
         return inside
 
     def possible_blockers(self, points: Floats) -> Integers:
-        """Numbers of the walls that can occlude a leg between points (N, 3): wall corners or points lie on both sides
-        of their plane."""
+        """Walls that can occlude a leg between points (N, 3): corners or points lie on both sides of their plane."""
         distance = self.distance(points)
         low, high = np.minimum(self.extent[0], distance.min(axis=0)), np.maximum(self.extent[1], distance.max(axis=0))
         return np.flatnonzero((low < -SURFACE_TOLERANCE) & (high > SURFACE_TOLERANCE))

@@ -30,8 +30,7 @@ def relative_permittivity(name: str, carrier: float) -> complex:
 
 
 def slab_permittivity(material: Material, carrier: float) -> complex:
-    """Complex relative permittivity of a wall's material at the carrier [Hz], by ITU-R P.2040 or as given; 1 for a
-    constant R.
+    """Complex relative permittivity of a material at the carrier [Hz], by ITU-R P.2040 or as given; 1 for constant R.
 
     Raises
     ------
@@ -171,7 +170,6 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
-    """Reflected part `coefficient (onto . field) out` of a field (N, 3): its component along `onto`, turned to
-    `out`."""
+    """Reflected part `coefficient (onto . field) out` of a field (N, 3): its part along `onto`, turned to `out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

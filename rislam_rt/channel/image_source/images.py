@@ -16,8 +16,7 @@ from rislam_rt.geometry.planes import mirror, mirror_direction
 
 
 class ImageRays(NamedTuple):
-    """N specular legs, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and far end's image (N, 3)
-    [m]."""
+    """N specular legs, one row each: cycle (N,), walls (N, d), bounces (N, d, 3) and far end's image (N, 3) [m]."""
 
     cycle: Integers
     walls: Integers
@@ -89,8 +88,7 @@ def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device
 def _plane_crossing(
     start: Floats, end: Floats, normal: Floats, offset: Floats, tolerance: tuple[float, float]
 ) -> tuple[Booleans, Floats]:
-    """Which segments (N, 3) cross their wall's plane, both ends farther off it than the tolerances [m], and the points
-    (n, 3) where they do."""
+    """Which segments (N, 3) cross their planes, ends farther off than the tolerances [m], and where (n, 3)."""
     a = np.einsum("ni,ni->n", start, normal) - offset
     b = np.einsum("ni,ni->n", end, normal) - offset
     crosses = (a * b < 0.0) & (np.abs(a) > tolerance[0]) & (np.abs(b) > tolerance[1])

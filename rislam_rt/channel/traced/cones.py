@@ -37,8 +37,7 @@ class Cones(NamedTuple):
     """Each device ball with its far ball."""
 
     def lead_on(self, walls: Integers) -> Booleans:
-        """Which wall sequences (N, d) a far end leaves possible: their first wall reaches into the cones over the
-        others."""
+        """Which wall sequences (N, d) a far end leaves possible: the first wall reaches into the others' cones."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
         target, size = _wall_ball(self.tracer_scene, columns[0])
@@ -47,8 +46,7 @@ class Cones(NamedTuple):
         return keep
 
     def reach(self, walls: Integers) -> Booleans:
-        """Which wall sequences (N, d) both ends leave possible: a device ball reaches into the cones of its far
-        ball."""
+        """Which wall sequences (N, d) both ends leave possible: a device ball reaches into its far ball's cones."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
         for device, ball in self.device:
@@ -77,8 +75,7 @@ class Cones(NamedTuple):
 
 
 def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Cones:
-    """Group devices (N, 3) [m] and their far ends (N, 3), or the single one (1, 3), into the balls that cones start
-    from."""
+    """Group devices (N, 3) [m] and far ends (N, 3), or the single one (1, 3), into the balls that cones start from."""
     device, far = device - tracer_scene.origin, far - tracer_scene.origin
     cell = (
         NEAR * 2.0 * (tracer_scene.wall_boxes.margin * 1e3 - 1.0)

@@ -24,8 +24,7 @@ BLOCK = 4_000_000
 def cull_candidates(
     tracer_scene: TracerScene, sequences: Integers, device: Floats, far: Floats
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Yield, in blocks, the candidate pairs (device, wall sequence) that survive culling, of all devices (N, 3) [m] and
-    sequences (S, D).
+    """Yield, in blocks, the pairs of devices (N, 3) [m] and wall sequences (S, D) that survive culling.
 
     Far ends (N, 3) go with their devices, a single one (1, 3) with all.
     """

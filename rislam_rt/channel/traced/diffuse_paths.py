@@ -157,8 +157,7 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
 def _solve(
     tracer_scene: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
 ) -> SolvedPaths:
-    """Scattered and diffracted paths that Sionna finds between a Tx and an Rx position (3,) [m] relative to
-    `origin`."""
+    """Scattered and diffracted paths that Sionna finds from a Tx to an Rx position (3,) [m], both from `origin`."""
     import sionna.rt as rt
 
     tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
@@ -238,8 +237,7 @@ def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -
 
 
 def _cells(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> tuple[Integers, Integers]:
-    """Number (N,) of the delay and angle cell into which each diffuse path falls, and each cell's cycle (C,),
-    ascending."""
+    """Number (N,) of the cell of delay and angle of each diffuse path, and each cell's cycle (C,), ascending."""
     array = radio.array
     body = np.einsum("ni,nij->nj", extras.arrival, rotation_z(trajectory.heading[extras.cycle]))
     widths = CELLS * np.array([radio.bandwidth, array.rows * array.spacing, array.cols * array.spacing])

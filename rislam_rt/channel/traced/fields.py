@@ -112,8 +112,7 @@ def _azimuth(direction: Floats) -> Floats:
 
 
 def _turn(basis: tuple[Floats, Floats], across: Floats) -> Floats:
-    """Matrices (N, 2, 2) that turn fields: components along theta_hat and phi_hat to those along s = `across` (N, 3)
-    and k x s."""
+    """Matrices (N, 2, 2) that turn fields along theta_hat and phi_hat to those along s = `across` (N, 3) and k x s."""
     c, s = (np.vecdot(vector, across) for vector in basis)
     return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
 

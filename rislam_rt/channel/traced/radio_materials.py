@@ -29,8 +29,7 @@ def kept_components(reflection: mi.Float, incident: mi.Vector3f, reflected: mi.V
 
 
 class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
-    """Sionna radio material of a wall with coefficient R in (0, 1] at every angle and polarisation; nothing passes or
-    scatters.
+    """Sionna radio material of a wall of one R in (0, 1] for all angles and polarisations; nothing passes or scatters.
 
     The Jones matrix is R times the identity between the (theta, phi) bases of the incident and the reflected ray: a
     bounce keeps the vertical and the horizontal part of the field and scales both.
@@ -108,8 +107,7 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
 
 
 class PolarisedReflection(rt.RadioMaterial):  # type: ignore[misc]
-    """Sionna radio material of a wall with one constant coefficient across the plane of incidence (TE), another in it
-    (TM).
+    """Sionna radio material of a wall with a constant coefficient across the plane of incidence, another in it.
 
     Edges diffract like those of a body whose |R| at normal incidence is the mean of both.
     """

@@ -77,8 +77,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Rows of the visible legs whose segments up to the last bounce miss the occluding mesh of the scatterer at their
-    end."""
+    """Rows of visible legs whose segments to the last bounce miss the occluding mesh of the scatterer at their end."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
@@ -133,8 +132,7 @@ def _short_segments() -> Iterator[None]:
 
 
 def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices) -> PathsBuffer:
-    """Fill Sionna's path buffer with candidates, from far ends (sources) to devices (targets) over wall sequences (N,
-    D), in reverse.
+    """Fill Sionna's path buffer with candidates, from far ends to devices over wall sequences (N, D), in reverse.
 
     Its vertices are any point of each wall's plane, which the image method needs, from the tracer scene's origin.
     """

@@ -126,8 +126,7 @@ def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, c
 def drop(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> LeastSquaresFit:
-    """Drop paths of a fit that left the delay window or the unit disc, or without which the cost grows by less than the
-    threshold."""
+    """Drop paths of a fit that left the window or the unit disc, or that lower the cost by less than the threshold."""
     keep = np.all(np.abs(fit.parameters - into_range(fit.parameters, window)) <= SLACK, axis=-1)
     if not keep.all():
         fit = subset_fit(sounding, fit, keep, samples)
@@ -160,8 +159,7 @@ def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshol
 def _neighbours_instead(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
 ) -> Floats | None:
-    """Parameters (P - 1, 3) of a fit without one path, its neighbours refined; None if the cost is not below
-    `enough`."""
+    """Parameters (P - 1, 3) of a fit without one path, neighbours refined; None if the cost is not below `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
     whole, local = residual_fit(sounding, fit, near, samples)
     others = near != row

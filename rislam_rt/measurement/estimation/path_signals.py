@@ -76,8 +76,7 @@ class PathSignals(NamedTuple):
         return (self.row[:, None] * self.col).reshape(len(self.row) * len(self.col), -1)
 
     def correlate(self, sounding: Sounding, samples: Complexes) -> Complexes:
-        """Correlate signals and their derivatives d by the three parameters with samples (L, M): `a^H y`, `d^H y` (4,
-        P)."""
+        """Correlate signals and their derivatives d by the parameters with samples (L, M): `a^H y`, `d^H y` (4, P)."""
         count = len(samples)
         beams = np.concatenate([samples, samples * sounding.frequency]) @ self.delay.conj()
         antennas = self.antennas.conj()

@@ -89,8 +89,7 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
 
 
 def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: float) -> LeastSquaresFit:
-    """Least-squares fit of amplitudes from the correlations (4, P) of signals and derivatives with samples of this
-    energy."""
+    """Least-squares amplitudes from the correlations (4, P) of signals and derivatives with samples of this energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
     amplitude = _times(covariance, matched)
@@ -213,8 +212,7 @@ def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Intege
 
 
 def accuracy(fit: LeastSquaresFit) -> Accuracy:
-    """Standard deviations of a fit's parameters and amplitudes by their joint bound; enormous where paths cannot be
-    resolved."""
+    """Standard deviations of a fit's parameters and amplitudes by their joint bound; enormous where not resolved."""
     information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
     deviations = np.sqrt((whitened(information, np.eye(len(information))) ** 2).sum(axis=0)).reshape(3, -1).T
     return Accuracy(deviations, np.sqrt(amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)))
@@ -241,8 +239,7 @@ def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes
 
 
 def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
-    """Which paths (P,) to keep when those are dropped, one by one, without which the cost grows by less than the
-    threshold.
+    """Which paths (P,) to keep when those are dropped, one by one, that lower the cost by less than the threshold.
 
     The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
     """

@@ -58,8 +58,7 @@ def whiten(weight: Floats, values: Floats) -> Whitened:
 
 
 def standardise(weight: Floats, values: Floats) -> Floats:
-    """Agent particles (N, K) corrected to weighted mean zero and, where N allows, unit covariance, by least
-    movement."""
+    """Agent particles (N, K) moved least to weighted mean zero and, where N allows, unit covariance."""
     values = values - weight @ values
     if values.shape[1] == 0 or 1.0 / np.sum(weight**2) < ROOM * values.shape[1]:
         return values

@@ -185,8 +185,7 @@ class DrJitEngine:
         return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
-        """Ancestors (N * size,) by systematic resampling: survivors mark their first child, a running maximum fills
-        in."""
+        """Ancestors (N * size,) by systematic resampling: survivors mark first children, a running maximum fills in."""
         dr, count, old = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, old)
         packets = old // PACKET
