@@ -81,11 +81,9 @@ def build_occluders(scene: Scene) -> Occluders:
 
 
 def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
-    """Which segments (N, 3) pass through any of an occluder's triangles (T, 3, 3).
-
-    Side of a line against the three edges by Pluecker coordinates: the products of an edge that two triangles share
-    differ in sign alone.
-    """
+    """Which segments (N, 3) pass through any of an occluder's triangles (T, 3, 3)."""
+    # Side of a line against the three edges by Pluecker coordinates: the products of an edge that two triangles share
+    # differ in sign alone.
     normal, offset = triangle_planes(triangles)
     a, b = start @ normal.T - offset, end @ normal.T - offset
     direction, moment = end - start, np.cross(start, end)

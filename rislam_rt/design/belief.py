@@ -114,10 +114,8 @@ class _PredictedPaths(NamedTuple):
 
 
 def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_PredictedPaths, _PredictedPaths]:
-    """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others.
-
-    Images of images are too weak to matter.
-    """
+    """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others."""
+    # Images of images are too weak to matter.
     rows = np.arange(len(landmarks.parent))
     points = rows[landmarks.parent < 0]
     points = np.concatenate([held, points[~np.isin(points, held)]])
@@ -135,11 +133,9 @@ def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Predicte
 
 
 def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
-    """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position.
-
-    The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
-    image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
-    """
+    """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position."""
+    # The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
+    # image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
     if mode == "exact":
         return path_gradient(tx, rx, points[paths.tx_point], points[paths.rx_point])
     last = unit(rx - points[paths.rx_point])

@@ -133,11 +133,9 @@ def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
-    """Array matrix (L, L) of coupling and chain gains: regularised least squares from ideal to received (T, L, M).
-
-    The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
-    misfit.
-    """
+    """Array matrix (L, L) of coupling and chain gains: regularised least squares from ideal to received (T, L, M)."""
+    # The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
+    # misfit.
     prior = spread / stray**2
     left = np.einsum("tlm,tkm->lk", plain, drawn.conj()) + prior * np.diag(np.diag(matrix))
     right = np.einsum("tlm,tkm->lk", drawn, drawn.conj()) + prior * np.eye(len(matrix))
@@ -158,9 +156,7 @@ def _inverse(matrix: Complexes) -> Complexes:
 
 
 def _image(rest: Complexes, heard: Complexes) -> Complexes:
-    """Complex amplitude (L,) of the mixers' image of the band, from unexplained and received samples (T, L, M).
-
-    At rest an image is the same as a chain's gain.
-    """
+    """Complex amplitude (L,) of the mixers' image of the band, from unexplained and received samples (T, L, M)."""
+    # At rest an image is the same as a chain's gain.
     rest, other = (part - part.mean(axis=0) for part in (rest, image_spectrum(heard)))
     return np.asarray(np.einsum("tlm,tlm->l", rest, other.conj()) / np.sum(np.abs(other) ** 2, axis=(0, 2)))

@@ -88,10 +88,8 @@ def direct_gain(paths: Paths, cycle: int) -> complex:
 
 
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
-    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, which spread from the Tx.
-
-    The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
-    """
+    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, which spread from the Tx."""
+    # The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
     length = np.zeros(len(path))
     landmark = np.flatnonzero(paths.landmark[path] >= 0)
     columns = np.flatnonzero(paths.valid[cycle] & (paths.num_vertices > 0))

@@ -109,11 +109,9 @@ def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
 
 
 def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats, elements: Floats) -> Complexes:
-    """Received signal (L, M) as a sum of spherical waves, each element at its own distance from the wave's source.
-
-    No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the part
-    at the array's centre and the carrier is in the gain.
-    """
+    """Received signal (L, M) as a sum of spherical waves, each element at its own distance from the wave's source."""
+    # No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the
+    # part at the array's centre and the carrier is in the gain.
     source = received.direction * (received.wave_radius / radio.wavelength)[:, None]
     excess = np.linalg.norm(source - elements[:, None], axis=-1) - np.linalg.norm(source, axis=-1)
     response = np.zeros((len(elements), len(frequencies)), dtype=np.complex128)

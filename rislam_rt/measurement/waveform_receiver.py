@@ -193,10 +193,8 @@ def _searched(
 
 def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
     """Components after merging estimated paths that cannot be resolved: parameters (N, 3), gains (N,), their standard
-    deviations (N, 3), (N,).
-
-    Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
-    """
+    deviations (N, 3), (N,)."""
+    # Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
     parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
     label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
     member = (label == np.unique(label)[:, None]).astype(np.float64)

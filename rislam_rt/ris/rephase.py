@@ -58,10 +58,8 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
 
 
 def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
-    """Sort panel paths into blocks of Tx legs that all join the same Rx legs.
-
-    With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
-    """
+    """Sort panel paths into blocks of Tx legs that all join the same Rx legs."""
+    # With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
     path_of = {(int(tx_leg[p]), int(rx_leg[p])): int(p) for p in np.flatnonzero(tx_leg >= 0)}
     partners: dict[int, list[int]] = {}
     for i, j in sorted(path_of):

@@ -240,10 +240,8 @@ def _ratio(a: Floats, b: Floats) -> Floats:
 
 
 def _bend(segments: Floats, beside: Floats) -> Floats:
-    """Error (M,) [m] of a polyline's length when its corners move by `beside` (M,) [m] across its segments (M, V).
-
-    A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
-    """
+    """Error (M,) [m] of a polyline's length when its corners move by `beside` (M,) [m] across its segments (M, V)."""
+    # A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     across = np.where(segments > 0.0, beside[:, None], 0.0)
     return np.minimum(_ratio(2.0 * across**2, segments), 2.0 * across).sum(axis=1)
 

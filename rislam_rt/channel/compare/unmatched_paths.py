@@ -163,12 +163,11 @@ class DifferenceExplainer:
         return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
-        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along the segments of a leg.
-
-        The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
-        largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of what
-        its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came about by.
-        """
+        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along the segments of a leg."""
+        # The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
+        # largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of
+        # what its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came
+        # about by.
         size = [1.0 + np.abs(p - self.center).max(axis=-1) for p in (points, images)]
         rounding = ROUNDINGS * FLOAT32_ROUNDING
         shift, off = np.zeros(len(images)), rounding * float(size[0][0])
@@ -215,11 +214,10 @@ class DifferenceExplainer:
         return found
 
     def _free(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions that no wall or occluder stands across segment `number` of a leg.
-
-        Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the host
-        wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to tell.
-        """
+        """Conditions that no wall or occluder stands across segment `number` of a leg."""
+        # Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the
+        # host wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to
+        # tell.
         start, end, reach = leg.points[number], leg.points[number + 1], float(leg.shift[number])
         a, b = self.facets.distance(np.stack([start, end]))
         least = np.minimum(np.abs(a), np.abs(b))
@@ -257,10 +255,8 @@ class DifferenceExplainer:
 
     def _inside(self, point: Floats, ray: Floats, wall: int) -> float:
         """Distance [m] of a `ray` (3,) through a point (3,) of a wall's plane from the wall's outline, negative
-        outside.
-
-        It is measured across the ray, as are a ray's errors.
-        """
+        outside."""
+        # It is measured across the ray, as are a ray's errors.
         inside = bool(self.facets.contains(point[None], np.array([wall]))[0])
         along = unit(ray)
         edges = self.edges[self.wall_of_edge == wall] - point

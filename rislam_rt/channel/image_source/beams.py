@@ -201,10 +201,8 @@ def _facing(
 
 
 def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Floats) -> Beams:
-    """Mirror beams in a wall each (N,), and narrow them to that wall's bounding rectangle.
-
-    A ball that reaches through the plane has beams on both sides.
-    """
+    """Mirror beams in a wall each (N,), and narrow them to that wall's bounding rectangle."""
+    # A ball that reaches through the plane has beams on both sides.
     normal, offset = rectangles.normal[wall], rectangles.offset[wall]
     side = np.einsum("ni,ni->n", beams.image, normal) - offset
     ball = radius[beams.ball]
@@ -227,12 +225,10 @@ def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Float
 def _half_spaces(
     rectangles: Rectangles, wall: Integers, front: Floats, image: Floats, height: Floats, radius: Floats
 ) -> tuple[Floats, Floats]:
-    """Half-spaces that bound beams: normals (N, 5, 3), offsets (N, 5): wall's plane, its rectangle's four edges.
-
-    Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
-    beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height)
-    in the frame (q, front), that plane leans by atan2(m, height) + asin(radius / distance) from q towards the front.
-    """
+    """Half-spaces that bound beams: normals (N, 5, 3), offsets (N, 5): wall's plane, its rectangle's four edges."""
+    # Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
+    # beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height) in the
+    # frame (q, front), that plane leans by atan2(m, height) + asin(radius / distance) from q towards the front.
     inward = np.stack([s * d[wall] for d in rectangles.directions for s in (1.0, -1.0)], axis=1)
     edge = rectangles.center[wall][:, None] - np.stack(
         [s * h[wall] for h in rectangles.halves for s in (1.0, -1.0)], axis=1

@@ -121,11 +121,9 @@ class Coatings:
     def _reflect(
         self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers
     ) -> Complexes:
-        """Field vectors (N, 3) after a Fresnel bounce on walls (N,).
-
-        A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant
-        coefficient keeps the vertical and the horizontal component and scales both.
-        """
+        """Field vectors (N, 3) after a Fresnel bounce on walls (N,)."""
+        # A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant
+        # coefficient keeps the vertical and the horizontal component and scales both.
         cos_theta = np.abs(np.sum(incident * normal, axis=-1))
         te, tm = slab_coefficients(cos_theta, self.permittivity[wall], self.thickness[wall], self.carrier)
         te = np.where(np.isnan(self.te[wall]), te, self.te[wall])

@@ -88,10 +88,8 @@ class TracedChannel:
         return rephase(paths, code)
 
     def _trace(self, queries: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
-        """Trace the specular legs of several queries; also whether all possible wall sequences were tried.
-
-        Queries that leave the same occluder out are solved together, block by block.
-        """
+        """Trace the specular legs of several queries; also whether all possible wall sequences were tried."""
+        # Queries that leave the same occluder out are solved together, block by block.
         legs: dict[int, SpecularLegs] = {}
         complete = True
         for spared in dict.fromkeys(query.spared for query in queries):

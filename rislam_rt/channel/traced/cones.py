@@ -117,12 +117,11 @@ def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
 
 
 def _meets(target: Any, axis: Any, size: Any, source: Any, half: Any) -> Any:
-    """Whether rays from a ball about 0 of radius `source` through one at `axis` of radius `half` can meet a third.
-
-    A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the ball
-    of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size - source
-    and b = source + half: a quadratic inequality, its discriminant written without a difference of large numbers.
-    """
+    """Whether rays from a ball about 0 of radius `source` through one at `axis` of radius `half` can meet a third."""
+    # A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the
+    # ball of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size -
+    # source and b = source + half: a quadratic inequality, its discriminant written without a difference of large
+    # numbers.
     a, b = size - source, source + half
     square = dr.squared_norm(axis) - b * b
     room = dr.squared_norm(a * axis + b * target) - dr.squared_norm(dr.cross(target, axis))

@@ -47,11 +47,9 @@ def cull_candidates(
 
 
 def _near_walls(tracer_scene: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
-    """Whether each candidate survives culling: its mirror path over `walls` bounces on or near every one of them.
-
-    The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a bounce
-    are that near the plane the bounce may be anywhere along, and stays.
-    """
+    """Whether each candidate survives culling: its mirror path over `walls` bounces on or near every one of them."""
+    # The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a
+    # bounce are that near the plane the bounce may be anywhere along, and stays.
     wall_boxes, margin = tracer_scene.wall_boxes, tracer_scene.wall_boxes.margin
     real = [wall != _NO_WALL for wall in walls]
     normal = [dr.gather(mi.Vector3f, wall_boxes.normal, wall, here) for wall, here in zip(walls, real, strict=True)]

@@ -58,10 +58,8 @@ def leg_coefficients(
 
 def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -> Complexes:
     """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of a reflection between the (theta, phi) bases of rays (N, 3)
-    before and after.
-
-    A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
-    """
+    before and after."""
+    # A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
     if isinstance(material, ConstantReflection):
         return incidence_jones(material, np.ones(1))
     along = np.vecdot(incident, normal)

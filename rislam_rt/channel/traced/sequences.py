@@ -138,10 +138,8 @@ def turned_round(sequences: Integers) -> Integers:
 
 
 def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> Iterator[tuple[Integers, Integers]]:
-    """Put every possible wall in front of wall sequences (S, d), block by block.
-
-    `onward` (S,) are the side bits of their first wall on which the ray goes on; the longer ones come with theirs.
-    """
+    """Put every possible wall in front of wall sequences (S, d), block by block."""
+    # `onward` (S,) are the side bits of their first wall on which the ray goes on; the longer ones come with theirs.
     for rows in _blocks(len(level), len(sides)):
         first = level[rows, 0]
         row, wall = np.nonzero(((sides[first] & onward[rows, None]) > 0) & (sides[:, first].T > 0))

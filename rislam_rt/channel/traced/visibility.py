@@ -101,11 +101,9 @@ def _trace(
 
 
 def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
-    """Rows of the candidates that the tracer found visible with every bounce on the wall asked for.
-
-    The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
-    lie on each other the ray meets any of them, and the one on top reflects.
-    """
+    """Rows of the candidates that the tracer found visible with every bounce on the wall asked for."""
+    # The image method also accepts a hit on another wall in the same plane; that is another path's business. Where
+    # walls lie on each other the ray meets any of them, and the one on top reflects.
     valid = np.array(traced.valid, dtype=np.bool_)
     wanted = turned_round(sequences)
     depth = wanted.shape[1]

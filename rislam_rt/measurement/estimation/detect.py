@@ -99,10 +99,8 @@ def pick_peaks(
 def _climb(
     grid: MatchedFilterGrid, start: Floats, residual: Complexes, window: tuple[float, float]
 ) -> tuple[Floats, complex, Complexes, Complexes]:
-    """Interpolate a peak of the matched filter from its grid point (3,), by Newton steps along each parameter.
-
-    Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
-    """
+    """Interpolate a peak of the matched filter from its grid point (3,), by Newton steps along each parameter."""
+    # Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
     point = start
     for _ in range(CLIMB_STEPS):
         moves = _newton_moves(_moments(grid, _signals(grid, point), residual), grid)
