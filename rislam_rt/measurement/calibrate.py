@@ -18,7 +18,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import estimate_paths
-from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, tone_response
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import fit_amplitudes
 from rislam_rt.measurement.hardware import Correction, image_spectrum
 from rislam_rt.measurement.signal import num_tones
@@ -64,8 +64,9 @@ def calibrate(
         Whether the gain changes from cycle to cycle; it is then measured on the direct path.
     """
     known = _known(body, radio, config)
-    antennas, tones = _antennas(known.sounding, known.direct[None]), _tones(known.sounding, known.direct[None])
-    direct = antennas @ tones.T / np.sqrt(known.sounding.num_samples)
+    direct = waves_at(known.sounding, known.direct[None]).sum(np.ones(1, dtype=np.complex128)) / np.sqrt(
+        known.sounding.num_samples
+    )
     heard = np.array(samples)
     loudness = 0.0
     if swinging:
@@ -77,7 +78,7 @@ def calibrate(
     image = np.zeros(len(residue), dtype=np.complex128)
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
-        plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, _inverse(matrix)
+        plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, np.linalg.inv(matrix)
         drawn = np.array([_ideal_samples(inverse @ one, known, faintest) for one in plain])
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
@@ -86,7 +87,7 @@ def calibrate(
         rest = heard - image[:, None] * image_spectrum(heard) - model
         residue, spread = _constant_residue(rest)
     left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
-    return Correction(_inverse(matrix), residue, image, direct, loudness, left)
+    return Correction(np.asarray(np.linalg.inv(matrix)), residue, image, direct, loudness, left)
 
 
 def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> CalibrationReference:
@@ -111,25 +112,13 @@ def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: fl
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
     kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
     fit = fit_amplitudes(known.sounding, kept, scaled)
-    arrival = _antennas(known.sounding, kept) * fit.amplitude * np.sqrt(known.noise)
-    return np.asarray(arrival @ _tones(known.sounding, kept).T)
+    return fit.waves.sum(fit.amplitude * np.sqrt(known.noise))
 
 
 def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
     """Which paths (P,) calibration uses: none so much weaker than one of about its delay that it may be its ghost."""
     near = np.abs(delay[:, None] - delay) < GHOST_CELLS
     return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
-
-
-def _antennas(sounding: Sounding, parameters: Floats) -> Complexes:
-    """Antenna vectors (L, P) of paths (P, 3) for an ideal array."""
-    x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
-    return np.asarray(np.exp(2j * np.pi * (x * parameters[:, 1] + y * parameters[:, 2])))
-
-
-def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
-    """Responses (M, P) of the sounding's tones to paths (P, 3)."""
-    return tone_response(sounding.frequency, parameters[:, 0])
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
@@ -148,11 +137,6 @@ def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))
     return mean * max(1.0 - spread / len(rest) / power, 0.0), spread
-
-
-def _inverse(matrix: Complexes) -> Complexes:
-    """Inverse (L, L) of the array's matrix."""
-    return np.asarray(np.linalg.inv(matrix))
 
 
 def _image(rest: Complexes, heard: Complexes) -> Complexes:

@@ -125,7 +125,8 @@ def build_front_end(
     loud = 10.0 ** (config.gain_std_db * rng.standard_normal(count) / 20.0)
     chain = loud * np.exp(1j * np.radians(config.phase_std_deg) * rng.standard_normal(count))
     turn = rng.uniform(-np.pi, np.pi)
-    residue = config.leakage_residue * _circular((count, num_tones(radio, receiver)), rng)
+    nothing = np.zeros((count, num_tones(radio, receiver)), dtype=np.complex128)
+    residue = config.leakage_residue * add_noise(nothing, 1.0, rng=rng)
     image = config.iq_image * np.exp(1j * rng.uniform(-np.pi, np.pi, count))
     coupled = np.eye(count) + config.coupling * np.exp(1j * turn) * _neighbours(array.positions(1.0), array.spacing)
     return FrontEnd(config, offset, chain[:, None] * coupled, residue, image)
@@ -240,9 +241,3 @@ def _clipped(level: float) -> float:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))
     return float(2.0 * ((1.0 + level**2) * tail - level * np.exp(-0.5 * level**2) / np.sqrt(2.0 * np.pi)))
-
-
-def _circular(shape: tuple[int, ...], rng: np.random.Generator) -> Complexes:
-    """Draw circular complex normal numbers of unit variance."""
-    parts = rng.standard_normal((2, *shape)) / np.sqrt(2.0)
-    return parts[0] + 1j * parts[1]

@@ -104,11 +104,7 @@ def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
 ) -> DetectedComponents:
     """Estimate the multipath components in a cycle's captures, starting from those of the previous cycle, if given."""
-    return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
-
-
-def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
-    """Join the components of several captures, in the order of their delays."""
+    parts = [_find(one, radio, config, _known(one, radio, previous)) for one in captures]
     joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
     return DetectedComponents._make(field[order] for field in joined)

@@ -1,6 +1,7 @@
 """The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`, equal power over |f| < B/2, and the tones that sample its band."""
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Complexes, Floats, phasor
 
@@ -32,27 +33,10 @@ def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, deriv
     if derivative == 0:
         return energy * np.sinc(x / np.pi)
     if derivative == 1:
-        return -energy * scale * _bessel(1, x)
+        return -energy * scale * scipy.special.spherical_jn(1, x)
     if derivative == 2:
-        return energy * scale**2 * (2.0 * _bessel(2, x) - np.sinc(x / np.pi)) / 3.0
+        return energy * scale**2 * (2.0 * scipy.special.spherical_jn(2, x) - np.sinc(x / np.pi)) / 3.0
     raise ValueError(f"derivative: {derivative} received; give 0, 1 or 2")
-
-
-def _bessel(order: int, x: Floats) -> Floats:
-    """Spherical Bessel functions j1 and j2 (...,): closed form, and the power series below 1, where that cancels."""
-    near = np.abs(x) < 1.0
-    far = np.where(near, 1.0, x)
-    first = (np.sin(far) / far - np.cos(far)) / far
-    closed = first if order == 1 else 3.0 * first / far - np.sin(far) / far
-    half_square = 0.5 * np.where(near, x, 0.0) ** 2
-    series = np.ones_like(half_square)
-    for k in range(_SERIES_TERMS, 0, -1):
-        series = 1.0 - series * half_square / (k * (2 * order + 2 * k + 1))
-    return np.where(near, series * x**order / (3.0 if order == 1 else 15.0), closed)
-
-
-_SERIES_TERMS = 9
-"""Number of terms of the Bessel functions' power series: the next one is below 1e-16 of the first for |x| < 1."""
 
 
 def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:

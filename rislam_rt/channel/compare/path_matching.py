@@ -75,12 +75,15 @@ def compare_paths(
     in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
     certifier = DifferenceExplainer.of(scene, trajectory, depth, shortest_segment)
-    one_sided = [
-        _certify(certifier, columns.identity[path], int(cycle), bool(in_traced[cycle, path]))
-        for cycle, path in np.argwhere(in_traced != in_analytic)
-    ]
+    one_sided = []
+    for cycle, path in np.argwhere(in_traced != in_analytic):
+        identity, side = columns.identity[path], "traced" if in_traced[cycle, path] else "analytic"
+        proof = certifier.explain(identity, int(cycle), side)
+        one_sided.append(OneSidedPath(int(cycle), certifier.label(identity), side, *proof))
     cycle, path = np.nonzero(in_traced & in_analytic)
-    precision = RoomPrecision.of(scene, radio, single=is_single(traced.source))
+    precision = RoomPrecision.of(
+        scene, radio, single=traced.source.startswith("traced") and "refined" not in traced.source
+    )
     scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
     limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
     labels = tuple(certifier.label(identity) for identity in columns.identity)
@@ -127,13 +130,6 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     return valid
 
 
-def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSidedPath:
-    """Explain a path that only one channel has in a cycle, as a record for the report."""
-    side = "traced" if is_traced else "analytic"
-    proof = certifier.explain(identity, cycle, side)
-    return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
-
-
 def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[OneSidedPath]) -> PathReport:
     """Assemble the report of a comparison: errors of the matched paths, traced against analytic."""
     at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
@@ -146,7 +142,7 @@ def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[On
         kind=analytic.kind[at_analytic[1]],
         length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
         gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
-        gain_error=_relative(np.abs(np.abs(gain_t) - np.abs(gain_a)), matched.scale),
+        gain_error=np.abs(np.abs(gain_t) - np.abs(gain_a)) / np.maximum(matched.scale, np.finfo(np.float64).tiny),
         phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
         aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
         aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
@@ -156,17 +152,7 @@ def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[On
     )
 
 
-def is_single(source: str) -> bool:
-    """Whether `Paths.source` says that the paths hold the tracer's own float32 numbers."""
-    return source.startswith("traced") and "refined" not in source
-
-
 def _level_difference(a: Floats, b: Floats) -> Floats:
     """Absolute level difference |20 lg(a / b)| [dB] of matched paths' gains, 0 where both are 0 (panel edge-on)."""
     floor = np.finfo(np.float64).tiny
     return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))
-
-
-def _relative(error: Floats, scale: Floats) -> Floats:
-    """Gain errors (M,) of matched paths relative to their coherent scale (M,), 0 where both are 0."""
-    return error / np.maximum(scale, np.finfo(np.float64).tiny)

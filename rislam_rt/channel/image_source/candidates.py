@@ -119,7 +119,8 @@ def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, 
     before = far_side[level[:, 0]]
     for bounces in range(1, depth + 1):
         ends_here = (device_side[level[:, 0]] & before) > 0
-        yield from _in_blocks(level[ends_here], len(device))
+        complete = level[ends_here]
+        yield from (complete[rows] for rows in row_blocks(len(complete), 16 * len(device)))
         if bounces < depth:
             level, before = _extended(level, before, sides)
 
@@ -139,9 +140,3 @@ def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integ
         np.concatenate([g[k] for g, k in zip(grown, kept, strict=True)] or [np.zeros((0, level.shape[1] + 1), int)]),
         np.concatenate([s[k] for s, k in zip(seen_from, kept, strict=True)] or [np.zeros(0, int)]),
     )
-
-
-def _in_blocks(sequences: Integers, cycles: int) -> Iterator[Integers]:
-    """Yield wall sequences in blocks, small enough for arrays over all cycles."""
-    for rows in row_blocks(len(sequences), 16 * cycles):
-        yield sequences[rows]

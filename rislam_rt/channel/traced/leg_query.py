@@ -110,13 +110,12 @@ class QueryBatch(NamedTuple):
         sizes = [len(query.device) for query in self.queries]
         far = np.concatenate([query.far for query in self.queries])
         heading = np.concatenate([query.heading for query in self.queries])
-        from_rx, to_rx = (np.repeat(np.array(flag, dtype=np.bool_), sizes) for flag in self._flags())
+        from_rx, to_rx = (
+            np.repeat(np.array(flag, dtype=np.bool_), sizes)
+            for flag in zip(*((query.from_rx, query.to_rx) for query in self.queries), strict=True)
+        )
         device = rows.device
         return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
-
-    def _flags(self) -> tuple[list[bool], list[bool]]:
-        """Which queries start at the Rx, and which end there."""
-        return [query.from_rx for query in self.queries], [query.to_rx for query in self.queries]
 
     def legs(self, found: FoundLegs) -> list[SpecularLegs]:
         """Split the legs that the tracer found by query."""

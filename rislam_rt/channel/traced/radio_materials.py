@@ -73,10 +73,6 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         """Register R of the material with Mitsuba's differentiable parameters."""
         callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
 
-    def to_string(self) -> str:
-        """Description of a wall's material of constant R in words."""
-        return f"ConstantReflection R={self._reflection[0]:.3f}"
-
     def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:
         """Jones matrix of a reflection at a wall of constant R, as a real 4 x 4 matrix in Sionna's bases."""
         return kept_components(self._reflection, si.to_world(si.wi), wo)

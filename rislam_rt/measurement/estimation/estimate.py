@@ -90,7 +90,10 @@ def estimate_paths(
         grown = fit_amplitudes(sounding, np.concatenate([fit.parameters, fresh]), samples)
         # From nothing, every round moves all paths; where most were known, only those that a new one touches.
         local = _touched(grown, len(fresh), samples.size) if len(known) else np.ones(len(grown.parameters), dtype=bool)
-        grown = _refine_some(sounding, grown, samples, local)
+        if local.all():
+            grown = refine(sounding, grown, samples, steps=SEARCH_STEPS)
+        else:
+            grown = refine_some(sounding, grown, samples, np.flatnonzero(local), steps=SEARCH_STEPS)
         grown = drop(sounding, grown, samples, threshold, window)
         if grown.cost >= fit.cost - threshold:
             break
@@ -114,13 +117,6 @@ def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
     touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
     touched[-fresh:] = True
     return touched
-
-
-def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, chosen: Booleans) -> LeastSquaresFit:
-    """Refine the chosen paths (P,) of a fit for the next search round, the others held."""
-    if chosen.all():
-        return refine(sounding, fit, samples, steps=SEARCH_STEPS)
-    return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
 
 
 def drop(

@@ -180,10 +180,13 @@ def refine(
             if not restless.any():
                 return fit
             if len(restless) > FEW:
-                rows = _along(sounding, fit, restless)
+                overlap = np.abs(fit.inner.signal[:, restless]) > OVERLAP * sounding.num_samples
+                rows = np.flatnonzero(overlap.any(axis=1))
                 if len(rows) < WORTHWHILE * len(restless):
                     return refine_some(sounding, fit, samples, rows, steps=left, tolerance=tolerance)
-            trial = fit_amplitudes(sounding, fit.parameters + _limited(step), samples)
+            trial = fit_amplitudes(
+                sounding, fit.parameters + np.clip(step.reshape(3, -1).T, -LARGEST_STEP, LARGEST_STEP), samples
+            )
             if trial.cost < fit.cost:
                 gained = fit.cost - trial.cost
                 fit, damping = trial, max(0.1 * damping, LEAST_DAMPING)
@@ -204,11 +207,6 @@ def refine_some(
     parameters = fit.parameters.copy()
     parameters[rows] = some.parameters
     return fit_amplitudes(sounding, parameters, samples)
-
-
-def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Integers:
-    """Rows of the paths whose signals overlap with those of chosen ones (P,), these included."""
-    return np.flatnonzero((np.abs(fit.inner.signal[:, chosen]) > OVERLAP * sounding.num_samples).any(axis=1))
 
 
 def accuracy(fit: LeastSquaresFit) -> Accuracy:
@@ -270,8 +268,3 @@ def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Comp
     information = shared.reshape(3 * count, 3 * count)
     information.flat[:: 3 * count + 1] += np.repeat(PRIOR, count)
     return information
-
-
-def _limited(step: Floats) -> Floats:
-    """Clip a Gauss-Newton step (3P,) to `LARGEST_STEP` for each path (P, 3)."""
-    return np.clip(step.reshape(3, -1).T, -LARGEST_STEP, LARGEST_STEP)

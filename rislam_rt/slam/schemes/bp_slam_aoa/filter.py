@@ -23,7 +23,7 @@ from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
     predict_returns,
     spread_over,
 )
-from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance
 from rislam_rt.slam.schemes.shared.gaussian_sums import join, prune
 from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of, position_errors
@@ -194,7 +194,9 @@ def _predict(
                 or (level > 0 and state.cycle % LIVELY_STRIDE == 0)
             )
             course, carried = advance(state.course, dt, levels[level], keep)
-            moved = state._replace(course=course, features=_survive(state.features, carried, config))
+            features = carry(state.features, carried, config.drift_std)
+            features = features._replace(existence=config.survival_probability * features.existence)
+            moved = state._replace(course=course, features=features)
         predicted = predict_returns(moved.features, moved.course, ends, free)
         return moved, expect_scan(moved.features, predicted, scan, state.sensor, config)
 
@@ -212,12 +214,6 @@ def _predict(
         moved, view = ahead(best)
     unseen = config.birth_mean + (1.0 - config.birth_mean) * UNSEEN * state.fresh if dt > 0.0 else state.fresh
     return moved._replace(motion_mode=motion_mode / motion_mode.sum(), fresh=unseen), view, ends
-
-
-def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig) -> GaussianFeatures:
-    """BP-SLAM's features given the trajectory after a time step, each less probable by the chance that it has gone."""
-    moved = carry(features, carried, config.drift_std)
-    return moved._replace(existence=config.survival_probability * moved.existence)
 
 
 def _claimed(
