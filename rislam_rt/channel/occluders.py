@@ -10,10 +10,8 @@ from rislam_rt.model import Scene
 
 ALONE = -2
 """Landmark number of an occluder that belongs to no scatterer (-1 stands for a leg without landmark)."""
-
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
-
 _BLOCK = 1_000_000
 """Segment-triangle pairs tested at once: bounds the memory."""
 

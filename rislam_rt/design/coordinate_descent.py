@@ -9,7 +9,6 @@ from rislam_rt.design.single_path import exact_code
 
 LARGE = 100
 """Number of elements above which changes are first ranked by the objective's slope instead of their exact values."""
-
 _WORTHWHILE = 1e-7
 """Relative improvement of the objective below which descent stops; rounding is 1e-15, one element of 4096 gives
 1e-4."""

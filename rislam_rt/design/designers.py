@@ -19,7 +19,6 @@ from rislam_rt.model import RisCode
 
 _Search = Callable[[DesignProblem, Objective, np.random.Generator, DesignConfig], tuple[Integers | Floats, Floats]]
 """Search for a code: returns levels, or for continuous methods phases [rad], (N M,), and the objective's history."""
-
 _NO_HISTORY = np.zeros(0)
 _DEFAULT = DesignConfig()
 

@@ -140,13 +140,8 @@ class LandmarkModel:
             parts += [self._wall_rows(cycle, int(path)) for path in bounced]
             order = np.concatenate([joined, bounced])
         agent, unknown = (np.concatenate(both) for both in zip(*parts, strict=True))
-        information = np.concatenate(
-            [
-                range_information(snr[order], self.radio)[:, None],
-                cosine_information(snr[order] / self.radio.array.num_antennas, self.radio),
-            ],
-            axis=1,
-        )
+        cosines = cosine_information(snr[order] / self.radio.array.num_antennas, self.radio)
+        information = np.column_stack([range_information(snr[order], self.radio), cosines])
         count = 3 if angles else 1
         return LinearMeasurements(
             agent[:, :count].reshape(-1, 3),

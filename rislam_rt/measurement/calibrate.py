@@ -64,9 +64,8 @@ def calibrate(
         Whether the gain changes from cycle to cycle; it is then measured on the direct path.
     """
     known = _known(body, radio, config)
-    direct = waves_at(known.sounding, known.direct[None]).sum(np.ones(1, dtype=np.complex128)) / np.sqrt(
-        known.sounding.num_samples
-    )
+    unit = np.full(1, 1.0 / np.sqrt(known.sounding.num_samples), dtype=np.complex128)
+    direct = waves_at(known.sounding, known.direct[None]).sum(unit)
     heard = np.array(samples)
     loudness = 0.0
     if swinging:

@@ -39,7 +39,7 @@ class ComponentErrors(NamedTuple):
 
 
 class ReportedComponents(NamedTuple):
-    """N multipath components of one capture as the receiver reports them, false ones included."""
+    """N multipath components as the receiver reports them, false ones included."""
 
     path: Integers
     """(N,) column of the strongest path, -1 for a false one."""
@@ -51,6 +51,8 @@ class ReportedComponents(NamedTuple):
     """(N,) complex gain."""
     gain_std: Floats
     """(N,) standard deviation of the complex gain."""
+    capture: Integers
+    """(N,) 0 for the sum of alternated codes, 1 + q for the difference of panel q."""
 
 
 def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 NO_COMPONENT = -9
 """Fill value of integer variables of a signals data set where a cycle has fewer components than another."""
-
 SCHEMA: dict[str, Entry] = {
     "samples": (("time", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
     "noise_variance": (("time", "capture"), "J", "variance of the noise in a tone, converters included"),

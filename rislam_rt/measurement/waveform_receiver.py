@@ -7,16 +7,16 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.components import capped_cosine_std, clip_to_unit_disc
+from rislam_rt.measurement.components import ReportedComponents, capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding
-from rislam_rt.measurement.false_alarms import detection_threshold
 from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
-from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
+from rislam_rt.measurement.panel_probability import panel_probability
 from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.sensor_model import detection_threshold
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot_motion import codes_in_turn, split_by_code
 from rislam_rt.measurement.true_identity import identify
@@ -136,7 +136,8 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
         points, deviation = (
             np.column_stack(pair) for pair in ((found.tau, found.cosines), (found.tau_std, found.cosines_std))
         )
-        seen = ComponentSides(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
+        nobody, spread = np.full(len(found.tau), -1), np.sqrt(2.0) * found.amplitude_std
+        seen = ReportedComponents(nobody, points, deviation, found.gain, spread, found.capture)
         told = panel_probability(seen, radio, config)
     return Measurement(
         found.tau, found.cosines, np.abs(found.gain), found.tau_std, found.cosines_std, found.amplitude_std, *told

@@ -29,14 +29,11 @@ from rislam_rt.model import Material, Paths, RadioConfig, Scene, Trajectory
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """Unit roundoff of float32 and float64."""
-
 STEPS = 8.0
 """Number of roundings of a coordinate at a bounce: the image (distance from the plane, product, difference), the ray
 towards it (difference, normalisation) and its hit (distance, product, sum)."""
-
 FIELD_STEPS = 4.0
 """Number of roundings of a field at a bounce or an antenna: coefficient, its real and its imaginary part, product."""
-
 SLAB_STEPS = 8.0
 """Number of roundings in a slab's reflection coefficient, each worth u of it and of the phase across the slab."""
 
@@ -252,11 +249,7 @@ def _flatness(walls: Walls) -> tuple[Floats, Floats]:
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))
     np.maximum.at(flatness, owner, height.max(axis=1, initial=0.0))
-    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
-    order = np.lexsort((-area, owner))
-    largest = order[np.unique(owner[order], return_index=True)[1]]
-    return flatness, 2.0 * area[largest] / edges[largest].max(axis=1, initial=np.finfo(np.float64).tiny)
+    return flatness, walls.largest_triangles()[1]
 
 
 @cache

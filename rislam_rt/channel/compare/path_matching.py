@@ -1,13 +1,12 @@
 """Matching of the paths of two channels by identity: kind, landmark and wall names on either leg, never by delay."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.comparison_report import OneSidedPath, PathReport
-from rislam_rt.channel.compare.error_limits import ErrorLimits, RoomPrecision, coherent_scale, with_perfect_mirrors
+from rislam_rt.channel.compare.error_limits import RoomPrecision, coherent_scale, with_perfect_mirrors
 from rislam_rt.channel.compare.unmatched_paths import SHORTEST_SEGMENT, DifferenceExplainer, Identity
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
@@ -15,33 +14,6 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import angle_between
 from rislam_rt.model import Antennas, Paths, RadioConfig, Scene, Trajectory
-
-
-class IdentityColumns(NamedTuple):
-    """Path identities of two channels with their columns in either, -1 where a channel does not have them."""
-
-    identity: list[Identity]
-    traced: Integers
-    analytic: Integers
-
-
-class Matched(NamedTuple):
-    """M paths that both channels have, with columns, scale and error limits."""
-
-    labels: tuple[str, ...]
-    """(I,) identities in words."""
-    cycle: Integers
-    """(M,) cycle of each path."""
-    path: Integers
-    """(M,) number of its identity in `labels`."""
-    traced: Integers
-    """(M,) column in the traced paths."""
-    analytic: Integers
-    """(M,) column in the image-source paths."""
-    scale: Floats
-    """(M,) coherent scale of the gain."""
-    limits: ErrorLimits
-
 
 _RADIO = RadioConfig()
 
@@ -71,24 +43,38 @@ def compare_paths(
         ("trajectory", trajectory, Trajectory),
     ):
         expect(name, value, kind)
-    columns = _align(traced, analytic)
-    in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
+    identities, traced_column, analytic_column = _align(traced, analytic)
+    in_traced, in_analytic = _valid(traced, traced_column), _valid(analytic, analytic_column)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
     certifier = DifferenceExplainer.of(scene, trajectory, depth, shortest_segment)
     one_sided = []
     for cycle, path in np.argwhere(in_traced != in_analytic):
-        identity, side = columns.identity[path], "traced" if in_traced[cycle, path] else "analytic"
+        identity, side = identities[path], "traced" if in_traced[cycle, path] else "analytic"
         proof = certifier.explain(identity, int(cycle), side)
         one_sided.append(OneSidedPath(int(cycle), certifier.label(identity), side, *proof))
     cycle, path = np.nonzero(in_traced & in_analytic)
     precision = RoomPrecision.of(
         scene, radio, single=traced.source.startswith("traced") and "refined" not in traced.source
     )
-    scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
-    limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
-    labels = tuple(certifier.label(identity) for identity in columns.identity)
-    here = Matched(labels, cycle, path, columns.traced[path], columns.analytic[path], scale, limits)
-    return _report(traced, analytic, here, one_sided)
+    at_traced, at_analytic = (cycle, traced_column[path]), (cycle, analytic_column[path])
+    scale = _scale(analytic, identities, (*at_analytic, path), trajectory, precision)
+    gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
+    return PathReport(
+        cycles=traced.num_cycles,
+        labels=tuple(certifier.label(identity) for identity in identities),
+        path=path,
+        cycle=cycle,
+        kind=analytic.kind[at_analytic[1]],
+        length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
+        gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
+        gain_error=np.abs(np.abs(gain_t) - np.abs(gain_a)) / np.maximum(scale, np.finfo(np.float64).tiny),
+        phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
+        aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
+        aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
+        limits=precision.limits(analytic, *at_analytic, trajectory, scale),
+        one_sided=tuple(one_sided),
+        searched={"traced": traced.source, "analytic": analytic.source},
+    )
 
 
 def _scale(
@@ -107,12 +93,12 @@ def _scale(
     return peak_amplitude(antennas) * coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
-def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
+def _align(traced: Paths, analytic: Paths) -> tuple[list[Identity], Integers, Integers]:
     """Union of the path identities of two channels, with their columns in either."""
     sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
     identity = sorted(sides[0].keys() | sides[1].keys())
     here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
-    return IdentityColumns(identity, here[0], here[1])
+    return identity, here[0], here[1]
 
 
 def named_identity(paths: Paths, path: int) -> Identity:
@@ -128,28 +114,6 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     valid = np.zeros((paths.num_cycles, len(column)), dtype=np.bool_)
     valid[:, column >= 0] = paths.valid[:, column[column >= 0]]
     return valid
-
-
-def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[OneSidedPath]) -> PathReport:
-    """Assemble the report of a comparison: errors of the matched paths, traced against analytic."""
-    at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
-    gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
-    return PathReport(
-        cycles=traced.num_cycles,
-        labels=matched.labels,
-        path=matched.path,
-        cycle=matched.cycle,
-        kind=analytic.kind[at_analytic[1]],
-        length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
-        gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
-        gain_error=np.abs(np.abs(gain_t) - np.abs(gain_a)) / np.maximum(matched.scale, np.finfo(np.float64).tiny),
-        phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
-        aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
-        aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
-        limits=matched.limits,
-        one_sided=tuple(one_sided),
-        searched={"traced": traced.source, "analytic": analytic.source},
-    )
 
 
 def _level_difference(a: Floats, b: Floats) -> Floats:

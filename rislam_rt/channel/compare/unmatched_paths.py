@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.occluders import ALONE
-from rislam_rt.channel.walls import build_walls
+from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.plane_segmentation import FLOAT32_ROUNDING
@@ -19,13 +19,10 @@ from rislam_rt.model import PathKind, Scene, Trajectory
 
 Identity = tuple[int, str, tuple[str, ...], tuple[str, ...]]
 """Identity of a path by names: kind, landmark, Tx walls, Rx walls."""
-
 SHORTEST_SEGMENT = 10.07e-3
 """[m] Sionna RT drops a path with a segment below 1 cm; in float32 the limit bites up to this length."""
-
 HIDDEN = ("occluded", "close surfaces")
 """Reasons of failure by something in the way, rather than by a missing reflection."""
-
 ROUNDINGS = 8.0
 """Number of float32 roundings between the coordinates and a mirror image or a hit."""
 
@@ -99,7 +96,7 @@ class DifferenceExplainer:
         owner = np.repeat(np.arange(len(walls)), [len(o) for o in outlines])
         edges = np.concatenate([np.zeros((0, 2, 3)), *outlines])
         center = scene.bounds.mean(axis=0)
-        tilt = _tilts(facets, center)
+        tilt = _tilts(walls, center)
         return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
@@ -265,12 +262,8 @@ class DifferenceExplainer:
         return distance if inside else -distance
 
 
-def _tilts(facets: WallFacets, center: Floats) -> Floats:
+def _tilts(walls: Walls, center: Floats) -> Floats:
     """Largest turn (W,) [rad] of the normal of each wall's largest triangle by float32 rounding of its corners."""
-    corners = facets.corners - center
-    sides = np.roll(corners, -1, axis=1) - corners
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1)
-    altitude = area / np.linalg.norm(sides, axis=-1).max(axis=1)
-    largest = [int(a + np.argmax(area[a:b])) for a, b in zip(facets.first, facets.first[1:], strict=False)]
-    rounding = 2.0 * FLOAT32_ROUNDING * np.abs(corners[largest]).max(axis=(1, 2), initial=0.0)
-    return rounding / np.maximum(altitude[largest], np.finfo(np.float64).tiny)
+    largest, altitude = walls.largest_triangles()
+    extent = np.abs(walls.triangles[largest] - center).max(axis=(1, 2), initial=0.0)
+    return 2.0 * FLOAT32_ROUNDING * extent / np.maximum(altitude, np.finfo(np.float64).tiny)

@@ -19,13 +19,10 @@ from rislam_rt.channel.image_source.facets import WallFacets, row_blocks
 
 FEW = 2000
 """Number of wall sequences up to which `auto` tries all of them; beyond it beam tracing is faster."""
-
 NEAR = 0.03
 """Radius within which positions share their beams, as a share of the room's diagonal."""
-
 _ROWS = 200_000
 """Candidates in a block."""
-
 SEARCHES = ("auto", "exhaustive", "beams")
 """Values of `ImageSourceChannel.search`."""
 

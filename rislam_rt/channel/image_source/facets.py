@@ -13,13 +13,10 @@ from rislam_rt.geometry.triangles import edge_planes
 
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
-
 _SIMPLE = 4
 """Largest number of triangles of walls that are tested all together; walls of more are tested one by one."""
-
 _BLOCK = 2_000_000
 """Numbers in the largest temporary array."""
-
 FRONT, BACK = 1, 2
 """Side bits: in front of a wall (where its normal points), behind it."""
 

@@ -46,25 +46,16 @@ def find_legs(
         Antennas at both ends; None for isotropic and vertical ones.
     """
     facets = search.facets
-    found = {0: [_direct_rays(device, far)]}
+    nothing = np.zeros((len(device), 0), dtype=np.int64)
+    straight = np.zeros((len(device), 0, 3))
+    found = {0: [ImageRays(np.arange(len(device)), nothing, straight, np.broadcast_to(far, device.shape))]}
     for cycle, walls in candidate_rows(search, device, far, depth, host):
         rays = _reflected_rays(facets, cycle, walls, device, far)
         found.setdefault(walls.shape[1], []).append(rays)
     blockers = facets.possible_blockers(np.concatenate([device, far]))
-    visible = [_visible(facets, _joined(p), device, far, blockers, host, front, landmark) for p in found.values()]
+    joined = (ImageRays._make(np.concatenate(part) for part in zip(*parts, strict=True)) for parts in found.values())
+    visible = [_visible(facets, rays, device, far, blockers, host, front, landmark) for rays in joined]
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, depth, terminals)
-
-
-def _joined(parts: list[ImageRays]) -> ImageRays:
-    """Concatenate blocks of legs that have the same number of bounces."""
-    return ImageRays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def _direct_rays(device: Floats, far: Floats) -> ImageRays:
-    """Straight legs without a bounce, one a cycle, before any visibility test."""
-    cycles = len(device)
-    nothing = np.zeros((cycles, 0), dtype=np.int64)
-    return ImageRays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
 def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> ImageRays:

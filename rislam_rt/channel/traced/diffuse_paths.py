@@ -4,9 +4,9 @@ Such paths have no identity that lasts from cycle to cycle and no wall sequence 
 `Paths`: one flat list over the cycles holds them. They are what Sionna's `PathSolver` finds, position by position.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -88,17 +88,6 @@ class DiffusePaths:
         return len(self.cycle)
 
 
-class SolvedPaths(NamedTuple):
-    """Scattered and diffracted paths at one position of the agent: `DiffusePaths` without the cycle."""
-
-    kind: Integers
-    tau: Floats
-    departure: Floats
-    arrival: Floats
-    gain: Complexes
-    vertices: Floats
-
-
 def trace_diffuse_paths(
     scene: Scene, radio: RadioConfig, trajectory: Trajectory, config: DiffuseConfig
 ) -> DiffusePaths:
@@ -109,19 +98,21 @@ def trace_diffuse_paths(
     SetupError
         The machine lacks something that the tracer needs.
     """
-    solved = [_nothing(config.depth)]
-    cycles = [np.zeros(0, dtype=np.int64)]
+    none, whole, points = np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    nothing = none.astype(np.complex128)
+    solved = [DiffusePaths(whole, whole, none, points, points, nothing, np.zeros((0, config.depth, 3)))]
     own = any(reflector.material.scattering > 0.0 for reflector in scene.reflectors)
     if config.scattering > 0.0 or config.diffraction or own:
         start_tracer()
         origin = room_center(scene)
         tracer_scene = _scattering_scene(scene, radio.carrier, origin, config.scattering)
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
-            solved.append(_solve(tracer_scene, tx, rx, origin, config, config.scattering > 0.0 or own))
-            cycles.append(np.full(len(solved[-1].kind), cycle))
-    columns = SolvedPaths(*(np.concatenate(column) for column in zip(*solved, strict=True)))
-    antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * columns.tau)
-    return DiffusePaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
+            solved += _solve(tracer_scene, cycle, tx, rx, origin, config, config.scattering > 0.0 or own)
+    names = ("cycle", "kind", "tau", "departure", "arrival", "gain", "vertices")
+    columns: list[Any] = [np.concatenate([getattr(one, name) for one in solved]) for name in names]
+    found = DiffusePaths(*columns)
+    antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * found.tau)
+    return replace(found, gain=found.gain * antennas)
 
 
 def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
@@ -137,14 +128,12 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
         num_rows=1, num_cols=1, pattern="iso", polarization="V"
     )
     walls, absorber = build_walls(scene), rt.AbsorberRadioMaterial("shade")
+    shades = {f"shade-{one.name}": one.shade for one in scene.scatterers if one.shade is not None}
+    shades |= {f"shade-alone-{index}": shade for index, shade in enumerate(scene.occluders)}
     objects = []
-    for scatterer in scene.scatterers:
-        if scatterer.shade is not None:
-            mesh = build_mesh(f"shade-{scatterer.name}", scatterer.shade.triangles - origin)
-            objects.append(rt.SceneObject(mesh, f"shade-{scatterer.name}", radio_material=absorber))
-    for index, shade in enumerate(scene.occluders):
-        mesh = build_mesh(f"shade-alone-{index}", shade.triangles - origin)
-        objects.append(rt.SceneObject(mesh, f"shade-alone-{index}", radio_material=absorber))
+    for name, shade in shades.items():
+        mesh = build_mesh(name, shade.triangles - origin)
+        objects.append(rt.SceneObject(mesh, name, radio_material=absorber))
     for number, material in enumerate(dict.fromkeys(walls.material)):
         wanted = np.array([m == material for m in walls.material])[walls.wall_of_triangle]
         mesh = build_mesh(f"walls-{number}", walls.triangles[wanted] - origin)
@@ -155,9 +144,9 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
 
 
 def _solve(
-    tracer_scene: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
-) -> SolvedPaths:
-    """Scattered and diffracted paths that Sionna finds from a Tx to an Rx position (3,) [m], both from `origin`."""
+    tracer_scene: Any, cycle: int, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
+) -> list[DiffusePaths]:
+    """Scattered and diffracted paths that Sionna finds in a cycle, if any; Tx and Rx (3,) [m] are from `origin`."""
     import sionna.rt as rt
 
     tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
@@ -168,7 +157,7 @@ def _solve(
     )  # fmt: skip
     tau = np.array(paths.tau, dtype=np.float64).reshape(-1)
     if tau.size == 0:
-        return _nothing(config.depth)
+        return []
     events = np.array(paths.interactions, dtype=np.int64).reshape(config.depth, -1)
     diffracted = (events == rt.InteractionType.DIFFRACTION).any(axis=0)
     keep = np.flatnonzero((tau >= 0.0) & (diffracted | (events == rt.InteractionType.DIFFUSE).any(axis=0)))
@@ -179,13 +168,8 @@ def _solve(
     gain = np.empty(len(tau), dtype=np.complex128)
     gain.real, gain.imag = (np.array(part).ravel() for part in paths.a)
     kind = np.where(diffracted, DiffuseKind.DIFFRACTED, DiffuseKind.DIFFUSE)
-    return SolvedPaths(kind[keep], tau[keep], unit(first - origin - tx), unit(last - origin - rx), gain[keep], vertices)
-
-
-def _nothing(depth: int) -> SolvedPaths:
-    """An empty set of diffuse paths."""
-    none, points = np.zeros(0), np.zeros((0, 3))
-    return SolvedPaths(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))
+    away, back = unit(first - origin - tx), unit(last - origin - rx)
+    return [DiffusePaths(np.full(len(keep), cycle), kind[keep], tau[keep], away, back, gain[keep], vertices)]
 
 
 CELLS = 2.0

@@ -110,10 +110,8 @@ class QueryBatch(NamedTuple):
         sizes = [len(query.device) for query in self.queries]
         far = np.concatenate([query.far for query in self.queries])
         heading = np.concatenate([query.heading for query in self.queries])
-        from_rx, to_rx = (
-            np.repeat(np.array(flag, dtype=np.bool_), sizes)
-            for flag in zip(*((query.from_rx, query.to_rx) for query in self.queries), strict=True)
-        )
+        from_rx = np.repeat([query.from_rx for query in self.queries], sizes)
+        to_rx = np.repeat([query.to_rx for query in self.queries], sizes)
         device = rows.device
         return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
 

@@ -17,19 +17,14 @@ from rislam_rt.errors import ConfigError
 
 FRONT, BACK = 1, 2
 """Sides of a plane, as bits: a wall may have parts on both."""
-
 NO_WALL = -1
 """Padding of wall sequences."""
-
 MANY = 100_000
 """Number of wall sequences of one bounce count up to which all are tried at every position, without cones."""
-
 MOST_LOOKS = 2_000_000_000
 """Largest number of wall sequences of one bounce count that may be tested: some minutes."""
-
 MOST_SEQUENCES = 10_000_000
 """Largest number of wall sequences that may be left for tracing."""
-
 _BLOCK = 4_000_000
 """Largest number of entries of a temporary table."""
 

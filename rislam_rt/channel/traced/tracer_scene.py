@@ -161,10 +161,7 @@ def _numbered(
     place = np.argsort(rows)
     shape_of = np.repeat(ids[order], sizes)[place]
     primitive_of = (np.arange(len(rows)) - np.repeat(first, sizes))[place]
-    edge = walls.triangles[:, 1:] - walls.triangles[:, :1]
-    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1)
-    by_size = np.lexsort((-area, walls.wall_of_triangle))
-    largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
+    largest, _ = walls.largest_triangles()
     return TracerScene(
         scene, walls, origin, shape_of[largest], primitive_of[largest], walls.triangles[largest, 0] - origin,
         ids[order], first, walls.wall_of_triangle[rows], *materials, _wall_boxes(walls, origin), views, occluders,

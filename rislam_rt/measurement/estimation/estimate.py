@@ -69,7 +69,7 @@ def estimate_paths(
     Parameters
     ----------
     threshold
-        On the measured SNR `L M |alpha|^2` of a path, linear; see `false_alarms` for the rate that it stands for.
+        On the measured SNR `L M |alpha|^2` of a path, linear; see `sensor_model` for the rate that it stands for.
     window
         First and last delay, in resolution cells.
     most

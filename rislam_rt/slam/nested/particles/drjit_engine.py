@@ -38,7 +38,6 @@ LOW = 2**11 - 1
 """Mask of the 11 bits of a word that x and y leave to z."""
 FINEST = 1e-12
 """Least quantisation step [m]."""
-
 Words = npt.NDArray[np.uint32]
 """Arrays of 32-bit words."""
 

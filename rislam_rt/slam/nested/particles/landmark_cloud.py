@@ -22,7 +22,6 @@ LEAST_STD = 1e-4
 """Least standard deviation [m] of a cloud that is resampled: a collapsed one must not stay so."""
 LARGEST_WIDTH = 0.9
 """Largest kernel width of resampling, in standard deviations."""
-
 SECOND = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 """Index (3, 3) of the second moments xx, xy, ... among sums in the order xx, yy, zz, xy, xz, yz."""
 

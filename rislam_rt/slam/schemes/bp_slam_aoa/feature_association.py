@@ -20,12 +20,8 @@ from rislam_rt.slam.schemes.shared.loopy_association import Association, associa
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""
-
-
 SLACK = 0.1
 """Distance [m] of the agent from where it was expected up to which a pair is still weighed."""
-
-
 HERMITE = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
 """Gauss-Hermite nodes and weights of a standard normal."""
 

@@ -16,7 +16,6 @@ from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 POINT, PLANE, DRIFT = 0, 1, 2
 """Kinds of a feature's Gaussian: a static point, a wall (the image of the Tx moves), or a wandering point, as a path
 over a wall and a scatterer seems to be."""
-
 NUDGE = 1e-5
 """Step of central differences [m, m/s]."""
 LEAST_SPEED = 1e-3
@@ -25,8 +24,6 @@ LEAST_ACROSS = 1e-4
 """Smallest squared sine of a feature's angle, for cosines that a Gaussian has beyond one."""
 UPRIGHT, UPRIGHT_STD = (0.0, 0.5 * np.pi, np.pi), 0.02
 """Turns [rad] of upright walls and the ceiling about a level direction of motion, and their deviation [rad]."""
-
-
 STRONG_KINDS = np.array([0.2, 0.5, 0.3])
 """Probabilities of point, wall and wanderer for a path as strong as a wall return; a corner of two walls returns like a
 point."""

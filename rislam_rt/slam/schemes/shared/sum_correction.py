@@ -17,8 +17,6 @@ from rislam_rt.slam.schemes.shared.ranges import Odds, Scan
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
-
-
 ROUNDS, TOLERANCE = 30, 1e-3
 """Largest number of rounds of loopy association, and the change of messages at which it ends: finer than the sums."""
 
