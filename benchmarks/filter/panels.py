@@ -20,7 +20,7 @@ from rislam_rt.pipeline.scores.summary import landmark_track, summarise
 from rislam_rt.report.conclusions import panel_found_at
 from rislam_rt.report.map_from_above import draw_above
 from rislam_rt.ris import leg_response
-from rislam_rt.ris.element import element_gain_area, element_pattern
+from rislam_rt.ris.response import element_gain_area, element_pattern
 from rislam_rt.shipped import find_pipeline, find_room
 
 HEAD = (

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from rislam_rt.measurement import bound
+from rislam_rt.measurement import bound_receiver
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.scene import load_scene
 
@@ -60,13 +60,13 @@ def main() -> None:
 @contextmanager
 def taken_for_granted(wanted: bool) -> Iterator[None]:
     """What is found in the difference is reported as the panel's for certain, as if nothing moved."""
-    asked = bound.panel_probability
+    asked = bound_receiver.panel_probability
     if wanted:
-        bound.panel_probability = lambda found, *_: (np.where(found.capture > 0, 1.0 - 1e-6, 1e-6), None)
+        bound_receiver.panel_probability = lambda found, *_: (np.where(found.capture > 0, 1.0 - 1e-6, 1e-6), None)
     try:
         yield
     finally:
-        bound.panel_probability = asked
+        bound_receiver.panel_probability = asked
 
 
 if __name__ == "__main__":

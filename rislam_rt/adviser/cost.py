@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.sequences import wall_sequences
+from rislam_rt.channel.image_source.candidates import wall_sequences
 from rislam_rt.model import RadioConfig, Scene
 
 DEPTHS = (1, 2, 3)

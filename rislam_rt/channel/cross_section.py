@@ -52,8 +52,7 @@ def sphere_rcs(radius: float, wavelength: float, angle: Floats) -> tuple[Floats,
 
 
 def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes]:
-    """Mie amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, at cosines (...,) of the scattering
-    angle.
+    """Mie amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, at cosines (...,) of scattering.
 
     Raises
     ------

@@ -10,10 +10,8 @@ from rislam_rt.model import Scene
 
 ALONE = -2
 """Landmark number of an occluder that belongs to no scatterer (-1 stands for a leg without landmark)."""
-
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
-
 _BLOCK = 1_000_000
 """Segment-triangle pairs tested at once: bounds the memory."""
 
@@ -43,8 +41,7 @@ class Occluders:
         return self.triangles[self.first[shade] : self.first[shade + 1]]
 
     def hides(self, start: Floats, end: Floats, spared: int = -1) -> Booleans:
-        """Which segments from `start` to `end` (N, 3) [m] an occluder hides; that of the landmark `spared` does not
-        count."""
+        """Which segments from `start` to `end` (N, 3) [m] an occluder hides, but for `spared`'s own."""
         hidden = np.zeros(len(start), dtype=np.bool_)
         for shade in np.flatnonzero(self.landmark != spared):
             near = _distance_to_segments(self.center[shade], start, end) <= self.radius[shade]
@@ -76,21 +73,15 @@ def build_occluders(scene: Scene) -> Occluders:
     center = np.array([(m.min(axis=(0, 1)) + m.max(axis=(0, 1))) / 2.0 for m in meshes]).reshape(-1, 3)
     reach = [np.linalg.norm(m - c, axis=-1).max() for m, c in zip(meshes, center, strict=True)]
     return Occluders(
-        tuple(names),
-        np.array(owners, dtype=np.int64),
-        np.cumsum([0] + [len(m) for m in meshes]),
-        np.concatenate([np.zeros((0, 3, 3)), *meshes]),
-        center,
-        np.array(reach, dtype=np.float64) + SEAM,
-    )
+        tuple(names), np.array(owners, dtype=np.int64), np.cumsum([0] + [len(m) for m in meshes]),
+        np.concatenate([np.zeros((0, 3, 3)), *meshes]), center, np.array(reach, dtype=np.float64) + SEAM,
+    )  # fmt: skip
 
 
 def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
-    """Which segments (N, 3) pass through any of an occluder's triangles (T, 3, 3).
-
-    Side of a line against the three edges by Pluecker coordinates: the products of an edge that two triangles share
-    differ in sign alone.
-    """
+    """Which segments (N, 3) pass through any of an occluder's triangles (T, 3, 3)."""
+    # Side of a line against the three edges by Pluecker coordinates: the products of an edge that two triangles share
+    # differ in sign alone.
     normal, offset = triangle_planes(triangles)
     a, b = start @ normal.T - offset, end @ normal.T - offset
     direction, moment = end - start, np.cross(start, end)
@@ -115,8 +106,7 @@ def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _outline(triangles: Floats, direction: Floats) -> Floats:
-    """Silhouette edges (E, 2, 3) [m] of triangles (T, 3, 3) seen along a direction: between front and back faces, and
-    edges of one triangle alone."""
+    """Silhouette edges (E, 2, 3) [m] of triangles (T, 3, 3) seen along a direction, and edges of one triangle alone."""
     normal, _ = triangle_planes(triangles)
     ahead = np.repeat(normal @ direction > 0.0, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)

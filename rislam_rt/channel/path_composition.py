@@ -16,17 +16,10 @@ from rislam_rt.ris import leg_response, rephase, zero_code
 
 
 def compose_paths(
-    scene: Scene,
-    radio: RadioConfig,
-    walls: Walls,
-    depth: int,
-    direct: SpecularLegs,
-    tx_legs: Sequence[SpecularLegs],
-    rx_legs: Sequence[SpecularLegs],
-    source: str,
-) -> Paths:
-    """Compose specular legs into all paths of up to `depth` wall bounces, with gains; identities that no cycle has are
-    left out.
+    scene: Scene, radio: RadioConfig, walls: Walls, depth: int, direct: SpecularLegs, tx_legs: Sequence[SpecularLegs],
+    rx_legs: Sequence[SpecularLegs], source: str,
+) -> Paths:  # fmt: skip
+    """Compose specular legs into all paths of up to `depth` wall bounces, with gains, that some cycle has.
 
     Parameters
     ----------
@@ -109,8 +102,7 @@ def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[
 def _join_block(
     tx: SpecularLegs, rx: SpecularLegs, point: Floats, landmark: int, is_ris: bool, depth: int
 ) -> dict[str, Any]:
-    """Fields of `Paths` over one landmark: every Tx leg with every Rx leg, up to `depth` bounces together; for a
-    scatterer or panel the gain is still 0."""
+    """Fields of `Paths` over one landmark: every Tx leg with every Rx leg, up to `depth` bounces together; gain 0."""
     i, j = np.nonzero(tx.num_bounces[:, None] + rx.num_bounces[None, :] <= depth)
     ever = np.logical_or.reduce(tx.valid)[i] & np.logical_or.reduce(rx.valid)[j]
     i, j = i[ever], j[ever]
@@ -136,8 +128,7 @@ def _join_block(
 def _panel_responses(
     scene: Scene, radio: RadioConfig, number: int, tx: SpecularLegs, rx: SpecularLegs
 ) -> tuple[Complexes, Complexes]:
-    """Responses (K, I, N, M) and (K, J, N, M) of a panel's elements to its Tx legs and its Rx legs, from the devices'
-    mirror images."""
+    """Responses (K, I, N, M), (K, J, N, M) of a panel's elements to its Tx and Rx legs, by mirrored devices."""
     assert scene.ris is not None
     spec, center = scene.panels[number].spec, scene.panels[number].center
     responses = []
@@ -171,8 +162,7 @@ def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
 
 
 def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
-    """Vertices (K, P, count, 3) [m] of paths over a landmark, in the order of travel: Tx bounces, landmark, Rx
-    bounces."""
+    """Vertices (K, P, count, 3) [m] of paths over a landmark in order of travel: Tx bounces, landmark, Rx bounces."""
     vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
     for path, (a, b) in enumerate(zip(i, j, strict=True)):
         first, last = int(tx.num_bounces[a]), int(rx.num_bounces[b])

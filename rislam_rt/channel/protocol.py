@@ -6,8 +6,7 @@ from rislam_rt.model import Paths, RadioConfig, RisCode, Scene, Trajectory
 
 
 class Channel(Protocol):
-    """Protocol for all propagation paths of a room: `TracedChannel` and `ImageSourceChannel` are drop-in for each
-    other."""
+    """Protocol for all paths of a room: `TracedChannel` and `ImageSourceChannel` are drop-in for each other."""
 
     @property
     def scene(self) -> Scene:

@@ -45,6 +45,15 @@ class Walls:
         """Which walls (W,) share a wall's plane by lying on each other, itself among them; none for -1."""
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
 
+    def largest_triangles(self) -> tuple[Integers, Floats]:
+        """Number (W,) of each wall's largest triangle, and the altitude (W,) [m] of that on its longest side."""
+        edges = self.triangles[:, 1:] - self.triangles[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
+        order = np.lexsort((-area, self.wall_of_triangle))
+        largest = order[np.unique(self.wall_of_triangle[order], return_index=True)[1]]
+        sides = np.roll(self.triangles[largest], -1, axis=1) - self.triangles[largest]
+        return largest, area[largest] / np.linalg.norm(sides, axis=-1).max(axis=1, initial=np.finfo(np.float64).tiny)
+
     def surface(self, wall: int) -> tuple[Floats, Floats]:
         """Centroid (3,) [m] of a wall, and the share (t,) of each of its triangles in its area."""
         triangles = self.triangles[self.wall_of_triangle == wall]
@@ -93,8 +102,7 @@ def _names(reflector: str, count: int) -> list[str]:
 
 
 def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """Number of the wall behind a panel, -1 without one: the nearest plane of its host reflector, `reflector` (W,)
-    being each wall's."""
+    """Number of the wall behind a panel, -1 without: its host reflector's nearest plane; `reflector` (W,) of walls."""
     names = [r.name for r in scene.reflectors]
     if panel.host not in names:
         return -1

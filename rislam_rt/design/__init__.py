@@ -10,23 +10,7 @@ from rislam_rt.design.result import Design, DesignConfig
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 
 __all__ = [
-    "DESIGNERS",
-    "Design",
-    "DesignConfig",
-    "DesignProblem",
-    "GainCurves",
-    "Objective",
-    "build_objective",
-    "continuous_phases",
-    "design_code",
-    "designer",
-    "direct_only",
-    "exact_code",
-    "focus_codes",
-    "gain_curves",
-    "nearest_code",
-    "panel_columns",
-    "problem_from_arrays",
-    "problem_from_belief",
-    "problem_from_paths",
-]
+    "DESIGNERS", "Design", "DesignConfig", "DesignProblem", "GainCurves", "Objective", "build_objective",
+    "continuous_phases", "design_code", "designer", "direct_only", "exact_code", "focus_codes", "gain_curves",
+    "nearest_code", "panel_columns", "problem_from_arrays", "problem_from_belief", "problem_from_paths",
+]  # fmt: skip

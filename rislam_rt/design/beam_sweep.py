@@ -31,8 +31,7 @@ SETTLED = 8
 def search_code(
     belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, number: int, last: RisCode | None, panel: int = 0
 ) -> RisCode:
-    """Panel code for searching a panel that the map lacks: aimed at the belief's panel candidate, or the sweep's next
-    beam.
+    """Panel code for a panel that the map lacks: aimed at the belief's panel candidate, or the sweep's next beam.
 
     While the candidate has few measurements the code is `last`, under which it was seen.
 
@@ -56,8 +55,7 @@ def search_code(
 
 @lru_cache(maxsize=16)
 def sweep_codes(ris: RisSpec, wavelength: float) -> Integers:
-    """Phase levels (B, N, M) of the beams of two sweeps over all directions, the second between the beams of the
-    first."""
+    """Phase levels (B, N, M) of the beams of two sweeps over all directions, the second between the first's."""
     along_up, along_right = (
         beam_phases(count, spacing, wavelength)
         for count, spacing in ((ris.rows, ris.spacing[1]), (ris.cols, ris.spacing[0]))

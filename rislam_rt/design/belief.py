@@ -23,20 +23,10 @@ _DEFAULT = DesignConfig()
 
 
 def design_code(
-    belief: SlamEstimate,
-    ris: DataSheet,
-    radio: RadioConfig,
-    *,
-    method: str,
-    rng: np.random.Generator,
-    samples: int = 4,
-    config: DesignConfig = _DEFAULT,
-    landmark_uncertainty: bool = False,
-    least_snr: float = 0.0,
-    gradient: GradientMode = "exact",
-    number: int = 0,
-    last: RisCode | None = None,
-) -> Design:
+    belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, method: str, rng: np.random.Generator,
+    samples: int = 4, config: DesignConfig = _DEFAULT, landmark_uncertainty: bool = False, least_snr: float = 0.0,
+    gradient: GradientMode = "exact", number: int = 0, last: RisCode | None = None,
+) -> Design:  # fmt: skip
     """Design the panel's phase code for the next cycle from the belief predicted to it, without the truth.
 
     Parameters
@@ -85,8 +75,7 @@ def problem_from_belief(
     belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, samples: int = 4, landmark_uncertainty: bool = False,
     least_snr: float = 0.0, gradient: GradientMode = "exact",
 ) -> DesignProblem | None:  # fmt: skip
-    """Design problem on a belief: element responses and gradients of the paths predicted from its map; None without a
-    panel in the map.
+    """Design problem on a belief: responses and gradients of the paths that its map predicts; None without a panel.
 
     A point landmark gives one path; an image gives two, with its wall on the Rx leg and on the Tx leg. Paths of the
     panel and its images depend on the code, the others do not. The wall between the panel and its image mirrors the
@@ -117,8 +106,7 @@ def problem_from_belief(
 
 
 class _PredictedPaths(NamedTuple):
-    """Q paths predicted from a map: rows of the scattering point, and of the points that Tx and Rx see (it or its
-    image)."""
+    """Q paths predicted from a map: rows of the scattering point, and of the points (or images) that Tx, Rx see."""
 
     source: Integers
     tx_point: Integers
@@ -126,10 +114,8 @@ class _PredictedPaths(NamedTuple):
 
 
 def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_PredictedPaths, _PredictedPaths]:
-    """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others.
-
-    Images of images are too weak to matter.
-    """
+    """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others."""
+    # Images of images are too weak to matter.
     rows = np.arange(len(landmarks.parent))
     points = rows[landmarks.parent < 0]
     points = np.concatenate([held, points[~np.isin(points, held)]])
@@ -147,11 +133,9 @@ def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Predicte
 
 
 def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
-    """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position.
-
-    The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
-    image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
-    """
+    """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position."""
+    # The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
+    # image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
     if mode == "exact":
         return path_gradient(tx, rx, points[paths.tx_point], points[paths.rx_point])
     last = unit(rx - points[paths.rx_point])
@@ -165,8 +149,7 @@ def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mo
 
 
 def _ratio(landmarks: MapEstimate, paths: _PredictedPaths) -> Floats:
-    """Amplitude ratio (Q,) of the wall reflection on each predicted path, from the image's strength; 1 without a
-    wall."""
+    """Amplitude ratio (Q,) of the wall reflection on each predicted path, by the image's strength; 1 without wall."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
     return np.where(image != paths.source, landmarks.strength[image], 1.0)
 
@@ -203,8 +186,7 @@ def _responses_of(
 def _point_gains(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, radio: RadioConfig
 ) -> Complexes:
-    """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, from their strengths (root of the
-    cross-section)."""
+    """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, of strength the root of the cross-section."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)

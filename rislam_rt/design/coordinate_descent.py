@@ -9,15 +9,13 @@ from rislam_rt.design.single_path import exact_code
 
 LARGE = 100
 """Number of elements above which changes are first ranked by the objective's slope instead of their exact values."""
-
 _WORTHWHILE = 1e-7
 """Relative improvement of the objective below which descent stops; rounding is 1e-15, one element of 4096 gives
 1e-4."""
 
 
 def coordinate_descent(objective: Objective, index: Integers, levels: int, max_steps: int) -> tuple[Integers, Floats]:
-    """Improve a code (N M,) until no change of a single element lowers the expected CRLB; also the objective after each
-    step.
+    """Improve a code (N M,) until no change of one element lowers the expected CRLB; and the objective by step.
 
     Each step values every change of one element, ranks the elements by what their best change gains, and applies the
     first m of them for the m = 1, 2, 4, ... that turns out best: never worse than the best single change.
@@ -45,8 +43,7 @@ def coordinate_descent(objective: Objective, index: Integers, levels: int, max_s
 
 
 def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements whose best level change lowers the objective, best first, and that change less one for all elements;
-    exact values."""
+    """Elements whose best level change lowers the objective, best first, and that change less one for all."""
     shift = objective.table[1:] - 1.0
     value = objective.value(gain + (weight[:, None] * objective.matrix) * shift[:, None, None])
     change = np.argmin(value, axis=0)
@@ -56,8 +53,7 @@ def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements whose best level change lowers the objective to first order in the powers, best first, and that change
-    less one."""
+    """As `_rank_by_value`, but to first order in the powers."""
     size = 1e-6
     slope = (objective.value(gain * (1.0 + 0.5 * size * np.eye(len(gain)))) - now) / size
     shift = objective.table[1:] - 1.0

@@ -11,16 +11,14 @@ from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
 from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.relaxation import best_magnitudes, relaxation_bound
 from rislam_rt.design.result import Design, DesignConfig, Designer
-from rislam_rt.design.single_path import continuous_phases, nearest_code
+from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
 from rislam_rt.model import RisCode
 
 _Search = Callable[[DesignProblem, Objective, np.random.Generator, DesignConfig], tuple[Integers | Floats, Floats]]
 """Search for a code: returns levels, or for continuous methods phases [rad], (N M,), and the objective's history."""
-
 _NO_HISTORY = np.zeros(0)
 _DEFAULT = DesignConfig()
 
@@ -53,8 +51,7 @@ def _describe(
     name: str, problem: DesignProblem, objective: Objective, found: Integers | Floats, history: Floats,
     seconds: float, certify: bool,
 ) -> Design:  # fmt: skip
-    """Value the code or phases that a search found, and compare with the direct path's optimum and the relaxation
-    bound."""
+    """Value the code or phases found, and compare with the direct path's optimum and the relaxation bound."""
     step = 2.0 * np.pi / problem.levels
     discrete = np.issubdtype(found.dtype, np.integer)
     xi = np.asarray(found * step if discrete else found, dtype=np.float64)
@@ -68,17 +65,10 @@ def _describe(
         bound = relaxation_bound(objective, best) if observable else 0.0
         gap_db = float(_db(best[0, 0]) - _db(np.abs(gain[0])))
     return Design(
-        method=name,
-        code=RisCode(index.reshape(problem.shape), problem.levels),
-        xi=xi.reshape(problem.shape),
-        crlb=value if observable else float("inf"),
-        gain_db=float(_db(np.abs(gain[0]))),
-        bound=bound,
-        gap_db=gap_db,
-        history=history if len(history) else np.array([value]),
-        seconds=seconds,
-        outcome=objective.outcome,
-    )
+        method=name, code=RisCode(index.reshape(problem.shape), problem.levels), xi=xi.reshape(problem.shape),
+        crlb=value if observable else float("inf"), gain_db=float(_db(np.abs(gain[0]))), bound=bound, gap_db=gap_db,
+        history=history if len(history) else np.array([value]), seconds=seconds, outcome=objective.outcome,
+    )  # fmt: skip
 
 
 def _db(magnitude: Floats) -> Floats:
@@ -107,3 +97,17 @@ def blind_design(method: str, code: RisCode) -> Design:
     """Wrap a search code as a `Design` of outcome `NO_PATHS`, while nothing is known of the panel."""
     infinite = float("inf")
     return Design(method, code, code.xi, infinite, -infinite, 0.0, 0.0, np.array([infinite]), 0.0, Outcome.NO_PATHS)
+
+
+def best_magnitudes(problem: DesignProblem) -> Floats:
+    """Largest gain magnitude (B, P) that each panel path can reach by a code of its own, exact over the levels."""
+    samples, panel = problem.response.shape[:2]
+    return exact_code(problem.response.reshape(samples, panel, -1), problem.levels)[1]
+
+
+def relaxation_bound(objective: Objective, best: Floats) -> float:
+    """Lower bound [m^2] of the expected CRLB over all codes, from the panel paths' own best gains (B, P).
+
+    The information of these gains exceeds that of every code (as matrices), and the trace of the inverse falls with it.
+    """
+    return float(objective.value(best.reshape(-1).astype(np.complex128)))

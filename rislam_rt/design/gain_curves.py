@@ -40,15 +40,9 @@ _SINGLE = DesignConfig(certify=False)
 
 
 def gain_curves(
-    problems: Sequence[DesignProblem],
-    *,
-    rng: np.random.Generator,
-    method: str = "genetic",
-    seeds: int = 10,
-    draws: int = 1000,
-    coverage: float = 0.9,
-    config: DesignConfig = _SINGLE,
-) -> GainCurves:
+    problems: Sequence[DesignProblem], *, rng: np.random.Generator, method: str = "genetic", seeds: int = 10,
+    draws: int = 1000, coverage: float = 0.9, config: DesignConfig = _SINGLE,
+) -> GainCurves:  # fmt: skip
     """Gain curves of the direct panel path under designed, random and optimal codes, as in Fig. 4(a).
 
     Parameters

@@ -18,8 +18,7 @@ def panel_columns(paths: Paths, cycle: int) -> Integers:
 
 
 def focus_codes(paths: Paths, levels: int) -> RisCode:
-    """Codes (K, N, M) that focus every panel on its direct path, one a cycle, from true paths; level 0 where it is
-    hidden.
+    """Codes (K, N, M) that focus every panel on its direct path, one a cycle, from true paths; level 0 where hidden.
 
     Raises
     ------

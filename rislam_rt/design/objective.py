@@ -70,8 +70,7 @@ SINGULAR = 1e-12
 
 
 def build_objective(problem: DesignProblem) -> Objective:
-    """Precompute the objective of a design problem; the outcome tells whether any code makes the position
-    observable."""
+    """Precompute the objective of a design problem; the outcome tells whether a code makes the position observable."""
     samples, panel = problem.response.shape[:2]
     matrix = np.ascontiguousarray(problem.response.reshape(samples * panel, -1).T)
     x, y = problem.gradient[..., 0], problem.gradient[..., 1]
@@ -89,14 +88,10 @@ def build_objective(problem: DesignProblem) -> Objective:
     determinant = best[:, 0] * best[:, 2] - best[:, 1] ** 2
     regular = determinant > SINGULAR * (best[:, 0] + best[:, 2]) ** 2
     return Objective(
-        matrix,
-        np.ascontiguousarray(outer[:, :panel]),
-        fixed,
-        spread,
-        problem.least_power,
-        level_table(problem.levels),
+        matrix, np.ascontiguousarray(outer[:, :panel]), fixed, spread, problem.least_power,
+        np.exp(-2j * np.pi / problem.levels * np.arange(problem.levels)),
         Outcome.OK if regular.all() else Outcome.UNOBSERVABLE,
-    )
+    )  # fmt: skip
 
 
 def detected_power(power: Floats, least: float) -> Floats:
@@ -106,8 +101,3 @@ def detected_power(power: Floats, least: float) -> Floats:
     ratio = (power / least) ** 2
     ratio = ratio * ratio
     return power * (ratio / (1.0 + ratio))
-
-
-def level_table(levels: int) -> Complexes:
-    """Element weights exp(-j xi) (H,) of the phase levels 0..H-1."""
-    return np.exp(-2j * np.pi / levels * np.arange(levels))

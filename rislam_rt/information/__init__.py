@@ -1,7 +1,6 @@
 """Floor 4: Fisher information of delays, gains and angles, position bounds, and bounds over a trajectory."""
 
 from rislam_rt.information.accuracy import amplitude_std, cosine_information, measurement_std
-from rislam_rt.information.bound_outcome import Outcome
 from rislam_rt.information.delay_gain import (
     delay_gain_information,
     delay_information,
@@ -9,7 +8,6 @@ from rislam_rt.information.delay_gain import (
     map_to_position,
     steering,
 )
-from rislam_rt.information.gradient import GradientMode, vertex_gradient
 from rislam_rt.information.heard_paths import heard_paths
 from rislam_rt.information.landmark_model import (
     LandmarkModel,
@@ -18,37 +16,22 @@ from rislam_rt.information.landmark_model import (
     build_landmark_model,
     fewer_rows,
 )
-from rislam_rt.information.motion_prior import MotionPrior
-from rislam_rt.information.position import position_bound, position_information, range_information
+from rislam_rt.information.position import (
+    GradientMode,
+    Outcome,
+    position_bound,
+    position_information,
+    range_information,
+    vertex_gradient,
+)
 from rislam_rt.information.posterior_crlb import posterior_bound
-from rislam_rt.information.prior import assumed_std, prior_from_covariance
+from rislam_rt.information.priors import MotionPrior, assumed_std, prior_from_covariance
 from rislam_rt.information.resolution import certainty_share, resolved_probability
 
 __all__ = [
-    "GradientMode",
-    "LandmarkModel",
-    "LinearMeasurements",
-    "MotionPrior",
-    "Outcome",
-    "WallSpread",
-    "amplitude_std",
-    "assumed_std",
-    "build_landmark_model",
-    "certainty_share",
-    "cosine_information",
-    "delay_gain_information",
-    "delay_information",
-    "eliminate_gains",
-    "fewer_rows",
-    "heard_paths",
-    "map_to_position",
-    "measurement_std",
-    "position_bound",
-    "position_information",
-    "posterior_bound",
-    "prior_from_covariance",
-    "range_information",
-    "resolved_probability",
-    "steering",
-    "vertex_gradient",
-]
+    "GradientMode", "LandmarkModel", "LinearMeasurements", "MotionPrior", "Outcome", "WallSpread", "amplitude_std",
+    "assumed_std", "build_landmark_model", "certainty_share", "cosine_information", "delay_gain_information",
+    "delay_information", "eliminate_gains", "fewer_rows", "heard_paths", "map_to_position", "measurement_std",
+    "position_bound", "position_information", "posterior_bound", "prior_from_covariance", "range_information",
+    "resolved_probability", "steering", "vertex_gradient",
+]  # fmt: skip

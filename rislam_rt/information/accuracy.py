@@ -21,8 +21,7 @@ class MeasurementStd(NamedTuple):
 
 
 def measurement_std(snr_integrated: Floats, radio: RadioConfig) -> MeasurementStd:
-    """Cramér-Rao bounds of delay and cosines of resolved paths at integrated SNRs (...,) (`L E |alpha|^2 / N0`,
-    linear).
+    """Cramér-Rao bounds of delay and cosines of resolved paths at integrated SNRs (...,), `L E |alpha|^2 / N0`.
 
     `var tau = 1 / (8 pi^2 zeta^2 SNR)`; `cosine_information` for the angles. Infinite where the SNR is 0 and for a
     cosine along which the array has no extent.

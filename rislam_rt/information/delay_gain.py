@@ -12,7 +12,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.information.bound_outcome import Outcome
+from rislam_rt.information.position import Outcome
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import autocorrelation
 
@@ -84,8 +84,7 @@ def delay_gain_information(
 
 
 def eliminate_gains(information: Floats, num_paths: int) -> EquivalentDelayInformation:
-    """Equivalent Fisher information on delays (and cosines) from J(chi), the complex gains eliminated by Schur
-    complement."""
+    """Equivalent Fisher information on delays (and cosines) from J(chi), gains eliminated by Schur complement."""
     kept = information.shape[-1] - 2 * num_paths
     nuisance = information[..., kept:, kept:]
     scale = np.sqrt(np.diagonal(nuisance, axis1=-2, axis2=-1))
@@ -107,8 +106,7 @@ def delay_information(
 
 
 def map_to_position(delays: Floats, gradient: Floats) -> Floats:
-    """Fisher information (..., D, D) [1/m^2] on the position from that on delays (..., P, P) [1/s^2]: `T J T^T` of
-    Appendix B.
+    """Fisher information (..., D, D) [1/m^2] on the position from that on delays (..., P, P): `T J T^T` of Appendix B.
 
     `gradient` (..., P, D) is that of the path lengths.
     """

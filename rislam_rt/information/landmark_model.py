@@ -26,8 +26,7 @@ Unknown = Literal["known", "planes", "images"]
 
 
 class LinearMeasurements(NamedTuple):
-    """M scalar measurements (ranges and cosines) of one cycle, linear in the agent's position and U unknowns of the
-    map."""
+    """M measurements (ranges, cosines) of a cycle, linear in the agent's position and U unknowns of the map."""
 
     agent: Floats
     """(M, 3) derivatives by the agent's position."""
@@ -57,8 +56,7 @@ class WallSpread(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LandmarkModel:
-    """Model of a trajectory's paths as linear measurements of the agent's position and of unknown landmarks and
-    walls."""
+    """Model of a trajectory's paths as linear measurements of agent's position and unknown landmarks and walls."""
 
     paths: Paths
     motion: Trajectory
@@ -88,8 +86,7 @@ class LandmarkModel:
         return len(self.labels)
 
     def prior_std(self, length: float = 10.0, tilt: float = 0.5) -> Floats:
-        """Prior standard deviations (U,) of the unknowns: one for every coordinate and offset [m], one for every tilt
-        [rad]."""
+        """Prior standard deviations (U,) of the unknowns, by coordinate and offset (`length` [m]) or tilt [rad]."""
         return np.array([tilt if " tilt " in label else length for label in self.labels])
 
     def landmark_error(self, covariance: Floats) -> dict[str, float]:
@@ -143,13 +140,8 @@ class LandmarkModel:
             parts += [self._wall_rows(cycle, int(path)) for path in bounced]
             order = np.concatenate([joined, bounced])
         agent, unknown = (np.concatenate(both) for both in zip(*parts, strict=True))
-        information = np.concatenate(
-            [
-                range_information(snr[order], self.radio)[:, None],
-                cosine_information(snr[order] / self.radio.array.num_antennas, self.radio),
-            ],
-            axis=1,
-        )
+        cosines = cosine_information(snr[order] / self.radio.array.num_antennas, self.radio)
+        information = np.column_stack([range_information(snr[order], self.radio), cosines])
         count = 3 if angles else 1
         return LinearMeasurements(
             agent[:, :count].reshape(-1, 3),
@@ -169,8 +161,7 @@ class LandmarkModel:
         return agent, np.concatenate([length[:, None], -cosines @ self.jacobian[last]], axis=1)
 
     def _wall_rows(self, cycle: int, path: int) -> tuple[Floats, Floats]:
-        """Derivatives of one wall return's range and two cosines by the agent (1, 3, 3) and by the unknowns (1, 3,
-        U)."""
+        """Derivatives of a wall return's range and two cosines by the agent (1, 3, 3) and by the unknowns (1, 3, U)."""
         tx, rx, heading = self.motion.tx[cycle], self.motion.rx[cycle], self.motion.heading[cycle]
         walls = self.paths.tx_walls[path][self.paths.tx_walls[path] >= 0]
         chain = mirror_chain(tx, self.wall_normal[walls], self.wall_offset[walls])
@@ -187,17 +178,10 @@ class LandmarkModel:
 
 
 def build_landmark_model(
-    paths: Paths,
-    motion: Trajectory,
-    landmark: Floats,
-    wall_normal: Floats,
-    wall_offset: Floats,
-    radio: RadioConfig,
-    *,
+    paths: Paths, motion: Trajectory, landmark: Floats, wall_normal: Floats, wall_offset: Floats, radio: RadioConfig, *,
     walls: Unknown = "planes",
-) -> LandmarkModel:
-    """Build the linear model of a trajectory's paths: which coordinates of landmarks and walls are unknown, and
-    derivatives.
+) -> LandmarkModel:  # fmt: skip
+    """Build the linear model of a trajectory's paths: which landmarks and walls are unknown, and derivatives.
 
     Parameters
     ----------

@@ -1,13 +1,28 @@
-"""Fisher information of resolved paths on the agent's position (Proposition 1), and the position error bound."""
+"""Fisher information of resolved paths on the position (Proposition 1), gradients of path lengths, position bound."""
 
-from typing import NamedTuple
+from enum import IntEnum
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.information.bound_outcome import Outcome
+from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RadioConfig
+
+
+class Outcome(IntEnum):
+    """Outcome of a bound or a code design: whether it exists, and why not."""
+
+    OK = 0
+    """The bound exists."""
+    UNOBSERVABLE = 1
+    """The information is singular: some direction is not seen at all, and the bound is infinite."""
+    DEGENERATE = 2
+    """Two paths coincide in delay and angle, so that their own gains cannot be told apart."""
+    NO_PATHS = 3
+    """No path carries any power: for a design, none of them meets the panel."""
+
 
 SINGULAR = 1e-13
 """Ratio of smallest to largest eigenvalue below which float64 cannot tell an information matrix from a singular one."""
@@ -61,3 +76,39 @@ def position_bound(information: Floats, prior: Floats | float = 0.0) -> Position
     usable = (outcome == Outcome.OK)[..., None]
     variance = np.where(usable[..., 0], (1.0 / np.where(usable, value, 1.0)).sum(axis=-1), np.inf)
     return PositionBound(variance, outcome)
+
+
+GradientMode = Literal["exact", "paper", "appendix"]
+"""Forms of a path length's gradient by the agent's position (see `vertex_gradient`)."""
+
+
+def vertex_gradient(
+    tx: Floats, rx: Floats, vertices: Floats, num_vertices: Integers, *, mode: GradientMode = "exact"
+) -> Floats:
+    """Gradients (..., P, 3) of path lengths by the agent's position, from the paths' interaction points.
+
+    Parameters
+    ----------
+    tx, rx
+        (..., 3) [m].
+    vertices
+        (..., P, V, 3) [m] in the order of travel.
+    num_vertices
+        (P,) number of vertices of each path; 0 is the line of sight.
+    mode
+        `exact`; `paper`: sum of all segments' unit vectors in the sense of travel (nu, kappa of eq. `derived`);
+        `appendix`: the last segment alone (H of Appendix B).
+    """
+    tx, rx = (np.broadcast_to(end[..., None, :], (*vertices.shape[:-2], 3)) for end in (tx, rx))
+    points = np.concatenate([tx[..., None, :], vertices, rx[..., None, :]], axis=-2)
+    count = np.asarray(num_vertices)
+    # the Rx closes the path right after its last vertex
+    step = np.arange(points.shape[-2])
+    points = np.where((step > count[:, None])[..., None], rx[..., None, :], points)
+    segment = unit(np.diff(points, axis=-2))
+    if mode == "paper":
+        return segment.sum(axis=-2)
+    last = np.take_along_axis(segment, np.broadcast_to(count[:, None, None], (*vertices.shape[:-2], 1, 3)), axis=-2)
+    if mode == "appendix":
+        return last[..., 0, :]
+    return last[..., 0, :] - segment[..., 0, :]

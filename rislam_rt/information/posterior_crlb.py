@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
 from rislam_rt.information.landmark_model import LinearMeasurements
-from rislam_rt.information.motion_prior import MotionPrior
+from rislam_rt.information.priors import MotionPrior
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,8 +69,7 @@ def posterior_bound(
 
 
 def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
-    """Square root (N, N + D) of the posterior covariance one time step on, from its root (N, N): `F = [I dt; 0 I]`,
-    discrete white noise."""
+    """Square root (N, N + D) of the posterior covariance one time step on, from its root (N, N)."""
     axes = motion.axes
     moved = spread.copy()
     moved[:axes] += dt * spread[axes : 2 * axes]
@@ -80,8 +79,7 @@ def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
 
 
 def _update(spread: Floats, slope: Floats) -> Floats:
-    """Triangular square root (N, N) of the posterior covariance after measurements with derivatives (M, N) and unit
-    variance, from a root (N, N or more)."""
+    """Square root (N, N) of the posterior covariance after measurements (M, N) of unit variance, from a root."""
     count, size = slope.shape
     stacked = np.zeros((count + size, count + spread.shape[1]))
     stacked[:count, :count] = np.eye(count)

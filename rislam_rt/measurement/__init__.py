@@ -7,7 +7,7 @@ from rislam_rt.measurement.dataset import NO_COMPONENT, load_signals, signals_da
 from rislam_rt.measurement.hardware import FrontEnd, HardwareConfig, build_front_end, expected_distortion
 from rislam_rt.measurement.measure import measure
 from rislam_rt.measurement.noise import paper_snr_db, reference_gain, with_reference_snr
-from rislam_rt.measurement.received import Clutter, Received, phase_reversed, receive
+from rislam_rt.measurement.received import Clutter, Received, receive
 from rislam_rt.measurement.sensor_model import build_sensor
 from rislam_rt.measurement.signal import num_tones, to_samples
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
@@ -15,31 +15,8 @@ from rislam_rt.measurement.waveform_receiver import capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [
-    "NO_COMPONENT",
-    "Clutter",
-    "FrontEnd",
-    "HardwareConfig",
-    "Received",
-    "ReceiverConfig",
-    "TrackingConfig",
-    "build_front_end",
-    "build_sensor",
-    "calibrate",
-    "capture",
-    "detection_probability",
-    "expected_distortion",
-    "find_components",
-    "init_tracks",
-    "load_signals",
-    "measure",
-    "num_tones",
-    "paper_snr_db",
-    "path_std",
-    "phase_reversed",
-    "receive",
-    "reference_gain",
-    "signals_dataset",
-    "step_tracks",
-    "to_samples",
-    "with_reference_snr",
-]
+    "NO_COMPONENT", "Clutter", "FrontEnd", "HardwareConfig", "Received", "ReceiverConfig", "TrackingConfig",
+    "build_front_end", "build_sensor", "calibrate", "capture", "detection_probability", "expected_distortion",
+    "find_components", "init_tracks", "load_signals", "measure", "num_tones", "paper_snr_db", "path_std",
+    "receive", "reference_gain", "signals_dataset", "step_tracks", "to_samples", "with_reference_snr",
+]  # fmt: skip

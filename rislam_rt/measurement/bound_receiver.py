@@ -22,11 +22,10 @@ from rislam_rt.measurement.components import (
     single,
 )
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.false_alarms import draw_false_alarms
 from rislam_rt.measurement.joint_bound import joint_errors
-from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
+from rislam_rt.measurement.panel_probability import panel_probability
 from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sensor_model import build_sensor
+from rislam_rt.measurement.sensor_model import build_sensor, draw_false_alarms
 from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 
@@ -35,14 +34,9 @@ NEGLIGIBLE = 1e-3
 
 
 def measure_bound(
-    received: Received,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    num_paths: int,
-    num_extra: int = 0,
-    *,
+    received: Received, radio: RadioConfig, config: ReceiverConfig, num_paths: int, num_extra: int = 0, *,
     rng: np.random.Generator,
-) -> tuple[Measurement, PathTruth]:
+) -> tuple[Measurement, PathTruth]:  # fmt: skip
     """Draw the multipath components of a cycle by the Cramér-Rao bound, with missed detections, merging and clutter.
 
     The errors have the variance that belongs to the true SNR; the standard deviations reported are those that the
@@ -58,20 +52,15 @@ def measure_bound(
     # false components are as many in all, whichever capture they are in
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
-    side = np.repeat(np.arange(len(parts)), [len(part.path) for part in parts])
+    parts = [part._replace(capture=np.full(len(part.path), number)) for number, part in enumerate(parts)]
     found = ReportedComponents._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
     order = np.argsort(found.points[:, 0])
-    found, side = ReportedComponents._make(field[order] for field in found), side[order]
-    told = panel_probability(ComponentSides(*found[1:], side), radio, config) if config.alternation else ()
+    found = ReportedComponents._make(field[order] for field in found)
+    told = panel_probability(found, radio, config) if config.alternation else ()
     measurement = Measurement(
-        found.points[:, 0],
-        clip_to_unit_disc(blind_axes(found.points[:, 1:], radio)),
-        np.abs(found.gain),
-        found.deviation[:, 0],
-        capped_cosine_std(found.deviation[:, 1:], radio),
-        found.gain_std / np.sqrt(2.0),
-        *told,
-    )
+        found.points[:, 0], clip_to_unit_disc(blind_axes(found.points[:, 1:], radio)), np.abs(found.gain),
+        found.deviation[:, 0], capped_cosine_std(found.deviation[:, 1:], radio), found.gain_std / np.sqrt(2.0), *told,
+    )  # fmt: skip
     return measurement, PathTruth(found.path)
 
 
@@ -93,7 +82,9 @@ def _capture(
     seen &= (points[:, 0] >= window[0]) & (points[:, 0] <= window[1])
     # Deviations go as one over the amplitude: this is the bound at the measured one.
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
-    true = ReportedComponents(parts.path[seen], points[seen], deviation[seen], gain[seen], errors.gain_std[seen])
+    none = np.zeros_like(parts.path)
+    fields = (parts.path, points, deviation, gain, errors.gain_std, none)
+    true = ReportedComponents._make(field[seen] for field in fields)
     return ReportedComponents._make(
         np.concatenate(fields) for fields in zip(true, draw_false_alarms(sensor, rng=rng), strict=True)
     )

@@ -18,8 +18,8 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import estimate_paths
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import fit_amplitudes
-from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding, tone_response
 from rislam_rt.measurement.hardware import Correction, image_spectrum
 from rislam_rt.measurement.signal import num_tones
 from rislam_rt.model import Body, RadioConfig
@@ -64,8 +64,8 @@ def calibrate(
         Whether the gain changes from cycle to cycle; it is then measured on the direct path.
     """
     known = _known(body, radio, config)
-    antennas, tones = _antennas(known.sounding, known.direct[None]), _tones(known.sounding, known.direct[None])
-    direct = antennas @ tones.T / np.sqrt(known.sounding.num_samples)
+    unit = np.full(1, 1.0 / np.sqrt(known.sounding.num_samples), dtype=np.complex128)
+    direct = waves_at(known.sounding, known.direct[None]).sum(unit)
     heard = np.array(samples)
     loudness = 0.0
     if swinging:
@@ -77,7 +77,7 @@ def calibrate(
     image = np.zeros(len(residue), dtype=np.complex128)
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
-        plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, _inverse(matrix)
+        plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, np.linalg.inv(matrix)
         drawn = np.array([_ideal_samples(inverse @ one, known, faintest) for one in plain])
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
@@ -86,7 +86,7 @@ def calibrate(
         rest = heard - image[:, None] * image_spectrum(heard) - model
         residue, spread = _constant_residue(rest)
     left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
-    return Correction(_inverse(matrix), residue, image, direct, loudness, left)
+    return Correction(np.asarray(np.linalg.inv(matrix)), residue, image, direct, loudness, left)
 
 
 def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> CalibrationReference:
@@ -106,41 +106,24 @@ def _chains(mean: Complexes, direct: Complexes) -> Complexes:
 
 
 def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
-    """Samples (L, M) that an ideal array would receive of the strong paths estimated in calibrated samples, without
-    ghosts."""
+    """Samples (L, M) that an ideal array would receive of the strong paths in calibrated samples, without ghosts."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
     kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
     fit = fit_amplitudes(known.sounding, kept, scaled)
-    arrival = _antennas(known.sounding, kept) * fit.amplitude * np.sqrt(known.noise)
-    return np.asarray(arrival @ _tones(known.sounding, kept).T)
+    return fit.waves.sum(fit.amplitude * np.sqrt(known.noise))
 
 
 def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
-    """Which paths (P,) calibration uses: those not so much weaker than a path of about their delay that they may be its
-    ghost."""
+    """Which paths (P,) calibration uses: none so much weaker than one of about its delay that it may be its ghost."""
     near = np.abs(delay[:, None] - delay) < GHOST_CELLS
     return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
 
 
-def _antennas(sounding: Sounding, parameters: Floats) -> Complexes:
-    """Antenna vectors (L, P) of paths (P, 3) for an ideal array."""
-    x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
-    return np.asarray(np.exp(2j * np.pi * (x * parameters[:, 1] + y * parameters[:, 2])))
-
-
-def _tones(sounding: Sounding, parameters: Floats) -> Complexes:
-    """Responses (M, P) of the sounding's tones to paths (P, 3)."""
-    return tone_response(sounding.frequency, parameters[:, 0])
-
-
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
-    """Array matrix (L, L) of coupling and chain gains, by regularised least squares from ideal to received samples (T,
-    L, M).
-
-    The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
-    misfit.
-    """
+    """Array matrix (L, L) of coupling and chain gains: regularised least squares from ideal to received (T, L, M)."""
+    # The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
+    # misfit.
     prior = spread / stray**2
     left = np.einsum("tlm,tkm->lk", plain, drawn.conj()) + prior * np.diag(np.diag(matrix))
     right = np.einsum("tlm,tkm->lk", drawn, drawn.conj()) + prior * np.eye(len(matrix))
@@ -148,23 +131,15 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
 
 
 def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
-    """Leakage residue (L, M) that stays the same over the cycles of unexplained samples (T, L, M), and the variance of
-    the rest."""
+    """Leakage residue (L, M), the constant part of unexplained samples (T, L, M), and the variance of the rest."""
     mean = rest.mean(axis=0)
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))
     return mean * max(1.0 - spread / len(rest) / power, 0.0), spread
 
 
-def _inverse(matrix: Complexes) -> Complexes:
-    """Inverse (L, L) of the array's matrix."""
-    return np.asarray(np.linalg.inv(matrix))
-
-
 def _image(rest: Complexes, heard: Complexes) -> Complexes:
-    """Complex amplitude (L,) of the mixers' image of the band, from unexplained and received samples (T, L, M).
-
-    At rest an image is the same as a chain's gain.
-    """
+    """Complex amplitude (L,) of the mixers' image of the band, from unexplained and received samples (T, L, M)."""
+    # At rest an image is the same as a chain's gain.
     rest, other = (part - part.mean(axis=0) for part in (rest, image_spectrum(heard)))
     return np.asarray(np.einsum("tlm,tlm->l", rest, other.conj()) / np.sum(np.abs(other) ** 2, axis=(0, 2)))

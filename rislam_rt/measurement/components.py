@@ -39,7 +39,7 @@ class ComponentErrors(NamedTuple):
 
 
 class ReportedComponents(NamedTuple):
-    """N multipath components of one capture as the receiver reports them, false ones included."""
+    """N multipath components as the receiver reports them, false ones included."""
 
     path: Integers
     """(N,) column of the strongest path, -1 for a false one."""
@@ -51,6 +51,8 @@ class ReportedComponents(NamedTuple):
     """(N,) complex gain."""
     gain_std: Floats
     """(N,) standard deviation of the complex gain."""
+    capture: Integers
+    """(N,) 0 for the sum of alternated codes, 1 + q for the difference of panel q."""
 
 
 def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
@@ -96,8 +98,7 @@ def single(received: Received) -> NoiselessComponents:
 
 
 def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
-    """Errors of components by the bound of a lone path, each as if no other were near; `draws` (N, 5) are standard
-    normal."""
+    """Errors of components by the bound of a lone path, as if no other were near; `draws` (N, 5) standard normal."""
     tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
     deviation = np.column_stack([tau, cosines])
     gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))
@@ -123,8 +124,7 @@ def clip_to_unit_disc(cosines: Floats) -> Floats:
 
 
 def capped_cosine_std(deviation: Floats, radio: RadioConfig) -> Floats:
-    """Standard deviations (N, 2) of direction cosines, at most `DISC_STD`, which they are along an axis without
-    aperture."""
+    """Standard deviations (N, 2) of direction cosines, at most `DISC_STD`, as along an axis without aperture."""
     blind = np.array([radio.array.rows, radio.array.cols]) < 2
     return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))
 

@@ -6,7 +6,6 @@ from rislam_rt.errors import ConfigError
 
 ESTIMATORS = ("bound", "waveform")
 """Ways from the channel to multipath components: errors drawn from the Cramér-Rao bound, or a real estimator."""
-
 RESOLUTIONS = ("cell", "joint")
 """Values of `ReceiverConfig.resolution`: criteria by which paths cannot be resolved."""
 ORDERS = ("ABBA", "AB")

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 NO_COMPONENT = -9
 """Fill value of integer variables of a signals data set where a cycle has fewer components than another."""
-
 SCHEMA: dict[str, Entry] = {
     "samples": (("time", "capture", "antenna", "tone"), "sqrt(J)", "received tones, noise of variance noise_variance"),
     "noise_variance": (("time", "capture"), "J", "variance of the noise in a tone, converters included"),
@@ -51,16 +50,10 @@ SCHEMA: dict[str, Entry] = {
 
 
 def signals_dataset(
-    paths: Paths,
-    trajectory: Trajectory,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    *,
-    rng: np.random.Generator,
+    paths: Paths, trajectory: Trajectory, radio: RadioConfig, config: ReceiverConfig, *, rng: np.random.Generator,
     on_cycle: Callable[[], None] | None = None,
-) -> "xr.Dataset":
-    """Data set of received signals: samples of every cycle, the components found in them with their tracks, and the
-    truth.
+) -> "xr.Dataset":  # fmt: skip
+    """Data set of received signals: samples of every cycle, the tracked components found in them, and the truth.
 
     Variables as in `SCHEMA`; the radio and the receiver are in the attributes. `on_cycle` is called after each cycle.
     """

@@ -24,8 +24,7 @@ LARGEST = 1e12
 
 @dataclass(frozen=True, slots=True)
 class HardwareConfig:
-    """Tolerances of a receiver's hardware faults, all 0 for an ideal front end. Amplitude ratios are linear: 0.01 is
-    -40 dB."""
+    """Tolerances of a receiver's hardware faults, all 0 for an ideal front end; amplitude ratios: 0.01 is -40 dB."""
 
     gain_std_db: float = 0.0
     """Standard deviation [dB] of the gain of an element and its receive chain."""
@@ -126,7 +125,8 @@ def build_front_end(
     loud = 10.0 ** (config.gain_std_db * rng.standard_normal(count) / 20.0)
     chain = loud * np.exp(1j * np.radians(config.phase_std_deg) * rng.standard_normal(count))
     turn = rng.uniform(-np.pi, np.pi)
-    residue = config.leakage_residue * _circular((count, num_tones(radio, receiver)), rng)
+    nothing = np.zeros((count, num_tones(radio, receiver)), dtype=np.complex128)
+    residue = config.leakage_residue * add_noise(nothing, 1.0, rng=rng)
     image = config.iq_image * np.exp(1j * rng.uniform(-np.pi, np.pi, count))
     coupled = np.eye(count) + config.coupling * np.exp(1j * turn) * _neighbours(array.positions(1.0), array.spacing)
     return FrontEnd(config, offset, chain[:, None] * coupled, residue, image)
@@ -197,8 +197,7 @@ def _with_phase_noise(
 
 
 def _neighbours(positions: Floats, spacing: float) -> Complexes:
-    """Mutual coupling (L, L) of antennas relative to that of nearest neighbours: as one over the distance, with its
-    phase."""
+    """Mutual coupling (L, L) of antennas relative to nearest neighbours': as one over the distance, with its phase."""
     distance = np.linalg.norm(positions[:, None] - positions, axis=-1)
     apart = np.where(distance > 0.0, distance, np.inf)
     phase = np.exp(-2j * np.pi * (np.where(distance > 0.0, distance, spacing) - spacing))
@@ -208,8 +207,7 @@ def _neighbours(positions: Floats, spacing: float) -> Complexes:
 def expected_distortion(
     config: HardwareConfig, radio: RadioConfig, receiver: ReceiverConfig, power: Floats, direct: Floats
 ) -> Floats:
-    """Expected power (K,) [J] a tone of hardware faults, which an estimator that knows their tolerances counts as
-    noise.
+    """Expected power (K,) [J] a tone of hardware faults, counted as noise where their tolerances are known.
 
     Of a calibrated front end only what no calibration takes out: phase noise and clipping.
 
@@ -227,8 +225,7 @@ def expected_distortion(
 
 
 def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) -> float:
-    """Power of multiplicative hardware faults relative to the signal's: by tolerances, or the share that calibration
-    `left`."""
+    """Power of multiplicative hardware faults relative to the signal's: by tolerances, or `left` by calibration."""
     trembling = np.radians(config.phase_noise_deg) ** 2 + _clipped(config.clip_rms)
     if left is not None:
         return float(trembling + left)
@@ -239,15 +236,8 @@ def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) 
 
 
 def _clipped(level: float) -> float:
-    """Power of clipping errors relative to that of a Gaussian signal clipped above `level` standard deviations; 0
-    clips nothing."""
+    """Power of clipping errors of a Gaussian signal clipped above `level` deviations, relative to its own; 0: none."""
     if not level:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))
     return float(2.0 * ((1.0 + level**2) * tail - level * np.exp(-0.5 * level**2) / np.sqrt(2.0 * np.pi)))
-
-
-def _circular(shape: tuple[int, ...], rng: np.random.Generator) -> Complexes:
-    """Draw circular complex normal numbers of unit variance."""
-    parts = rng.standard_normal((2, *shape)) / np.sqrt(2.0)
-    return parts[0] + 1j * parts[1]

@@ -5,9 +5,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_resolution_cells, join
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.estimation.inner_products import inner_of, waves_at
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
-from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.received import Received
 from rislam_rt.measurement.signal import num_tones
 from rislam_rt.model import RadioConfig

@@ -12,18 +12,10 @@ from rislam_rt.model import Measurement, Paths, PathTruth, RadioConfig
 
 
 def measure(
-    paths: Paths,
-    cycle: int,
-    heading: float,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    previous: Measurement | None = None,
-    doppler: Floats | None = None,
-    front_end: FrontEnd | None = None,
-    clutter: Clutter | None = None,
-    *,
-    rng: np.random.Generator,
-) -> tuple[Measurement, PathTruth]:
+    paths: Paths, cycle: int, heading: float, radio: RadioConfig, config: ReceiverConfig,
+    previous: Measurement | None = None, doppler: Floats | None = None, front_end: FrontEnd | None = None,
+    clutter: Clutter | None = None, *, rng: np.random.Generator,
+) -> tuple[Measurement, PathTruth]:  # fmt: skip
     """Measure one cycle with the receiver: multipath components in the order of their delays, and their true paths.
 
     Parameters

@@ -17,8 +17,7 @@ REFERENCE_DISTANCE = 3.0
 
 
 def reference_gain(radio: RadioConfig) -> float:
-    """Path gain |alpha| of the reference SNR's sphere, 3 m from Tx and Rx: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5
-    d^2)`."""
+    """Path gain |alpha| of the sphere of reference, 3 m away: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5 d^2)`."""
     rcs = np.pi * REFERENCE_RADIUS**2
     free_space = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain * rcs)
     return float(free_space / ((4.0 * np.pi) ** 1.5 * REFERENCE_DISTANCE**2))
@@ -31,13 +30,9 @@ def with_reference_snr(radio: RadioConfig, snr_db: float) -> RadioConfig:
 
 
 def paper_snr_db(
-    paths: Paths,
-    radio: RadioConfig,
-    config: ReceiverConfig | None = None,
-    *,
-    heading: Floats | float = 0.0,
+    paths: Paths, radio: RadioConfig, config: ReceiverConfig | None = None, *, heading: Floats | float = 0.0,
     num_samples: int = 128,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """SNR (K,) [dB] of the received signal as the paper defines it, `||Y||^2 / (L U sigma_n^2)` without the noise in Y.
 
     It counts the leakage and the wall returns, and falls with the number of samples U that one sounding is spread over.

@@ -6,11 +6,10 @@ complex amplitude times a factor that its Doppler shift sets, within the speed t
 has any. The captures change their roles for components in the sum.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.measurement.components import ReportedComponents
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.slot_motion import code_signs, slot_mean
 from rislam_rt.model import RadioConfig
@@ -30,26 +29,10 @@ SUREST = 1e-6
 """Least distance of the probability from 0 and 1: the model has its own errors."""
 
 
-class ComponentSides(NamedTuple):
-    """N multipath components with the capture of alternated codes in which each was found."""
-
-    points: Floats
-    """(N, 3) delay [s] and cosines."""
-    deviation: Floats
-    """(N, 3) standard deviations of delay [s] and cosines."""
-    gain: Complexes
-    """(N,) complex gain."""
-    gain_std: Floats
-    """(N,) standard deviation of the complex gain."""
-    capture: Integers
-    """(N,) 0 for the sum of the codes, 1 + q for the difference of panel q."""
-
-
 def panel_probability(
-    found: ComponentSides, radio: RadioConfig, config: ReceiverConfig
+    found: ReportedComponents, radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Floats, Integers | None]:
-    """Probability (N,) that each component, if a path made it, came over a panel, and number (N,) of the likeliest
-    panel.
+    """Probability (N,) that each component, if a path made it, came over a panel, and the likeliest panel (N,).
 
     Where there is one panel the second is None.
     """
@@ -71,8 +54,7 @@ def panel_probability(
 
 
 def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
-    """Amplitude ratios (`SHIFTS`,) at which a moving path leaks from the capture `of` into the capture `into`, by
-    Doppler shift.
+    """Amplitude ratios (`SHIFTS`,) at which moving paths leak from capture `of` into capture `into`, by Doppler shift.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
@@ -81,9 +63,10 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
     return np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
 
 
-def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexes, radio: RadioConfig) -> Floats:
-    """Odds (N,) of each component for being the leak of a source from another capture, against a path of its own
-    capture."""
+def _leak_odds(
+    found: ReportedComponents, sources: ReportedComponents, factors: Complexes, radio: RadioConfig
+) -> Floats:
+    """Odds (N,) of each component for being the leak of another capture's source, against a path of its own."""
     array = radio.array
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     gap = found.points[:, None] - sources.points
@@ -98,6 +81,6 @@ def _leak_odds(found: ComponentSides, sources: ComponentSides, factors: Complexe
     return np.asarray(np.sum(place * leak, axis=1) / own)
 
 
-def _pick(found: ComponentSides, rows: Booleans) -> ComponentSides:
+def _pick(found: ReportedComponents, rows: Booleans) -> ReportedComponents:
     """Select multipath components by row."""
-    return ComponentSides._make(field[rows] for field in found)
+    return ReportedComponents._make(field[rows] for field in found)

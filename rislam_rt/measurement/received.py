@@ -9,7 +9,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
+from rislam_rt.model import PathKind, Paths, RadioConfig
 
 HORIZON_MARGIN = 1e-3
 """Depth below the horizon [direction cosine] down to which an `upper` array receives, as leakage and level wall returns
@@ -83,17 +83,13 @@ class Clutter(NamedTuple):
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:
-    """Complex gain of the direct path from Tx to Rx (leakage) in a cycle, before cancellation; 0 where it is
-    hidden."""
+    """Complex gain of the direct path from Tx to Rx (leakage) in a cycle before cancellation; 0 where hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
 
 
 def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
-    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, whose wave spreads from the
-    Tx.
-
-    The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
-    """
+    """Lengths (N,) [m] of the Tx legs of received paths; 0 for leakage and wall returns, which spread from the Tx."""
+    # The Tx is where the departing rays of all paths meet (least squares); half the path, if they are too few to tell.
     length = np.zeros(len(path))
     landmark = np.flatnonzero(paths.landmark[path] >= 0)
     columns = np.flatnonzero(paths.valid[cycle] & (paths.num_vertices > 0))
@@ -109,18 +105,6 @@ def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
         corners = np.vstack([tx, paths.vertices[cycle, path[row], : bounces + 1]])
         length[row] = np.sum(np.linalg.norm(np.diff(corners, axis=0), axis=1))
     return length
-
-
-def phase_reversed(code: RisCode) -> RisCode:
-    """Panel code with every phase turned by pi: it changes the sign of the paths over the panel and nothing else.
-
-    Raises
-    ------
-    ConfigError
-        The panel has an odd number of levels, none of which is half a turn.
-    """
-    check_half_turn(code.levels)
-    return RisCode((code.index + code.levels // 2) % code.levels, code.levels)
 
 
 def check_half_turn(levels: int) -> None:

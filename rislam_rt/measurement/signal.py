@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, phasor
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement.config import MOST_TONES, ReceiverConfig
-from rislam_rt.measurement.estimation.sounding import tone_response
+from rislam_rt.measurement.estimation.path_signals import tone_response
 from rislam_rt.measurement.received import Received
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies
@@ -20,8 +20,7 @@ FEWEST_TONES = 16
 
 
 def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
-    """Number M of tones of a sounding: as set, or the power of two that leaves a quarter of its period after the last
-    delay.
+    """Number M of tones of a sounding: as set, or the power of two that leaves a quarter period after the last delay.
 
     Raises
     ------
@@ -41,8 +40,7 @@ def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
 
 
 def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elements: Floats | None = None) -> Complexes:
-    """Noiseless received signal of all paths as tones (L, M) [sqrt(J)]; `elements` (L, 3) [wavelengths] are true
-    positions, if given."""
+    """Noiseless received signal as tones (L, M) [sqrt(J)]; `elements` (L, 3) [wavelengths] are true positions."""
     count = num_tones(radio, config)
     frequencies = subcarrier_frequencies(count, radio.bandwidth)
     scale = np.sqrt(radio.energy / count)
@@ -54,8 +52,7 @@ def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elemen
 
 
 def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
-    """Noiseless received signal of a single flat pulse as samples (L, U) [sqrt(W)] at times n / B, n = 0 .. U-1; U is
-    `num_tones`.
+    """Noiseless received signal of one flat pulse as samples (L, U) [sqrt(W)] at n / B, n < U; U is `num_tones`.
 
     Unlike the tones, which repeat, the pulse's tails are cut off at the window's ends.
     """
@@ -66,16 +63,14 @@ def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig
 
 
 def to_tones(samples: Complexes, radio: RadioConfig) -> Complexes:
-    """Transform received samples (..., M) [sqrt(W)] at rate B from time 0 to tones (..., M) [sqrt(J)]; noise N0 B
-    becomes N0."""
+    """Transform received samples (..., M) [sqrt(W)] at rate B to tones (..., M) [sqrt(J)]; noise N0 B becomes N0."""
     count = samples.shape[-1]
     advance = np.exp(1j * np.pi * (count - 1) / count * np.arange(count))
     return np.fft.fft(samples * advance, axis=-1, norm="ortho") / np.sqrt(radio.bandwidth)
 
 
 def to_samples(spectrum: Complexes, radio: RadioConfig) -> Complexes:
-    """Transform tones (..., M) [sqrt(J)] to received samples (..., M) [sqrt(W)] at rate B from time 0 on; undoes
-    `to_tones`."""
+    """Transform tones (..., M) [sqrt(J)] to received samples (..., M) [sqrt(W)] at rate B; undoes `to_tones`."""
     count = spectrum.shape[-1]
     delay = np.exp(-1j * np.pi * (count - 1) / count * np.arange(count))
     return np.fft.ifft(spectrum, axis=-1, norm="ortho") * delay * np.sqrt(radio.bandwidth)
@@ -88,8 +83,7 @@ def add_noise(signal: Complexes, variance: float, *, rng: np.random.Generator) -
 
 
 def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float = 0.0) -> tuple[Complexes, float]:
-    """Quantise tones (L, M) by analogue-to-digital converters of `bits` bits for real and imaginary part each, 0 for
-    none.
+    """Quantise tones (L, M) by analogue-to-digital converters of `bits` bits for real and imaginary part, 0 for none.
 
     The converters see samples in time. Full scale is the largest sample of all, or `clip_rms` times the root mean
     square of a component; what lies above is cut off. Also returns the variance [J] that the steps add to a tone: a
@@ -115,11 +109,9 @@ def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
 
 
 def _element_exact(received: Received, radio: RadioConfig, frequencies: Floats, elements: Floats) -> Complexes:
-    """Received signal (L, M) as a sum of spherical waves, each element at its own distance from the wave's source.
-
-    No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the part
-    at the array's centre and the carrier is in the gain.
-    """
+    """Received signal (L, M) as a sum of spherical waves, each element at its own distance from the wave's source."""
+    # No plane-wave and no narrow-band approximation: the phase is `-2 pi (f_c + f) (delay at the element)`, and the
+    # part at the array's centre and the carrier is in the gain.
     source = received.direction * (received.wave_radius / radio.wavelength)[:, None]
     excess = np.linalg.norm(source - elements[:, None], axis=-1) - np.linalg.norm(source, axis=-1)
     response = np.zeros((len(elements), len(frequencies)), dtype=np.complex128)

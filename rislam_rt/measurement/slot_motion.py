@@ -30,8 +30,7 @@ def code_signs(order: str, panels: int) -> Floats:
 
 
 def codes_in_turn(panels: int) -> Floats:
-    """Hadamard matrix (C, C) of the signs of the codes in a slot: a code and its phase-reversed one for one panel, four
-    for two."""
+    """Hadamard matrix (C, C) of the signs of the codes in a slot: two codes for one panel, four for two."""
     return scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
 
 
@@ -62,8 +61,7 @@ def slot_weights(doppler: Floats, config: ReceiverConfig) -> tuple[Complexes, ..
 
 
 def split_by_code(received: Received, config: ReceiverConfig) -> list[Received]:
-    """Received paths with their gains in the sum of a slot's codes and, with alternation, in each panel's
-    difference."""
+    """Received paths with their gains in the sum of a slot's codes and, with alternation, in panels' differences."""
     if not config.alternation:
         return [received._replace(gain=received.gain * slot_weights(received.doppler, config)[0])]
     signs = code_signs(config.order, config.panels)

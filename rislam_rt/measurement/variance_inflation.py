@@ -23,14 +23,12 @@ wall returns of the paper's room, tried on everything else (`benchmarks/receiver
 
 
 def peak_bias(snr: Floats) -> Floats:
-    """Factor (...,) by which variances are too small because the SNR (...,) was measured at a peak (linear, all
-    antennas)."""
+    """Factor (...,) by which variances are too small as the SNR (...,) was measured at a peak (all antennas)."""
     return snr / np.maximum(snr - PEAK_EXCESS, 0.25 * snr)
 
 
 def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats:
-    """Factors (P, 3) by which the variances of paths (P, 3), in (B tau, u, v), are too small because of undetected
-    neighbours.
+    """Factors (P, 3) by which variances of paths (P, 3), in (B tau, u, v), are too small by undetected neighbours.
 
     Neighbours along one axis, `density` a cell and of SNR q each, do to the estimate on that axis what `q density` of
     N0 would add: the square of the autocorrelation's slope, integrated over all offsets, is the bound's own second
@@ -49,16 +47,14 @@ def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats
 
 
 def unmirrored(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Direction cosines (N, 2) with those outside the unit disc moved by a period of the array (grating lobe) into
-    it."""
+    """Direction cosines (N, 2), those outside the unit disc moved into it by an array's period (grating lobe)."""
     period = 1.0 / radio.array.spacing
     outside = np.linalg.norm(cosines, axis=-1, keepdims=True) > 1.0
     return np.where(outside, cosines - period * np.round(cosines / period), cosines)
 
 
 def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> Floats:
-    """Variances (N, 2) of direction cosines from the ambiguity between a direction and its grating lobe, a period of
-    the array away.
+    """Variances (N, 2) of direction cosines from the ambiguity with grating lobes, a period of the array away.
 
     The samples are the same for both. Their odds are those of lying in the sky, given the estimate and its deviation.
     """

@@ -7,16 +7,16 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
-from rislam_rt.measurement.components import capped_cosine_std, clip_to_unit_disc
+from rislam_rt.measurement.components import ReportedComponents, capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
-from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
-from rislam_rt.measurement.false_alarms import detection_threshold
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding
 from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
-from rislam_rt.measurement.panel_probability import ComponentSides, panel_probability
+from rislam_rt.measurement.panel_probability import panel_probability
 from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.sensor_model import detection_threshold
 from rislam_rt.measurement.signal import num_tones, tones
 from rislam_rt.measurement.slot_motion import codes_in_turn, split_by_code
 from rislam_rt.measurement.true_identity import identify
@@ -56,16 +56,10 @@ class DetectedComponents(NamedTuple):
 
 
 def capture(
-    received: Received,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    front_end: FrontEnd | None = None,
-    leakage: complex = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> list[Capture]:
-    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of several
-    codes.
+    received: Received, radio: RadioConfig, config: ReceiverConfig, front_end: FrontEnd | None = None,
+    leakage: complex = 0.0, *, rng: np.random.Generator,
+) -> list[Capture]:  # fmt: skip
+    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of codes.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
@@ -109,38 +103,25 @@ def _signed_sum(parts: list[Complexes], signs: Floats) -> Complexes:
 def find_components(
     captures: list[Capture], radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None
 ) -> DetectedComponents:
-    """Estimate the multipath components in the captures of one cycle, starting from those of the previous cycle, if
-    given."""
-    return by_delay([_find(one, radio, config, _known(one, radio, previous)) for one in captures])
-
-
-def by_delay(parts: list[DetectedComponents]) -> DetectedComponents:
-    """Join the components of several captures, in the order of their delays."""
+    """Estimate the multipath components in a cycle's captures, starting from those of the previous cycle, if given."""
+    parts = [_find(one, radio, config, _known(one, radio, previous)) for one in captures]
     joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
     order = np.argsort(joined[0])
     return DetectedComponents._make(field[order] for field in joined)
 
 
 def measure_waveform(
-    received: Received,
-    radio: RadioConfig,
-    config: ReceiverConfig,
-    previous: Measurement | None = None,
-    front_end: FrontEnd | None = None,
-    leakage: complex = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> tuple[Measurement, PathTruth]:
-    """Simulate the received signal of a cycle and estimate its multipath components; also the paths that they most
-    likely are."""
+    received: Received, radio: RadioConfig, config: ReceiverConfig, previous: Measurement | None = None,
+    front_end: FrontEnd | None = None, leakage: complex = 0.0, *, rng: np.random.Generator,
+) -> tuple[Measurement, PathTruth]:  # fmt: skip
+    """Simulate a cycle's received signal and estimate its multipath components, and the paths they likeliest are."""
     captures = capture(received, radio, config, front_end, leakage, rng=rng)
     found = find_components(captures, radio, config, previous)
     return to_measurement(found, radio, config), PathTruth(true_paths(found, received, radio, config))
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the true path that each estimated component most likely is, of those in its capture; -1 for
-    none."""
+    """Column (N,) of the true path that each estimated component most likely is, of its capture's; -1 for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -155,7 +136,8 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
         points, deviation = (
             np.column_stack(pair) for pair in ((found.tau, found.cosines), (found.tau_std, found.cosines_std))
         )
-        seen = ComponentSides(points, deviation, found.gain, np.sqrt(2.0) * found.amplitude_std, found.capture)
+        nobody, spread = np.full(len(found.tau), -1), np.sqrt(2.0) * found.amplitude_std
+        seen = ReportedComponents(nobody, points, deviation, found.gain, spread, found.capture)
         told = panel_probability(seen, radio, config)
     return Measurement(
         found.tau, found.cosines, np.abs(found.gain), found.tau_std, found.cosines_std, found.amplitude_std, *told
@@ -208,10 +190,8 @@ def _searched(
 
 def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
     """Components after merging estimated paths that cannot be resolved: parameters (N, 3), gains (N,), their standard
-    deviations (N, 3), (N,).
-
-    Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
-    """
+    deviations (N, 3), (N,)."""
+    # Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
     parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
     label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
     member = (label == np.unique(label)[:, None]).astype(np.float64)
@@ -231,8 +211,7 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """Number (P,) of the component of each estimated path: an unresolved one joins its nearest neighbour within a
-    cell."""
+    """Number (P,) of each estimated path's component: unresolved ones join their nearest neighbour within a cell."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

@@ -58,8 +58,7 @@ class PanelErrors:
 
     @property
     def weight(self) -> Complexes:
-        """Complex factor (N, M) of each panel element beside its commanded phase: amplitude and phase error, 0 if
-        dead."""
+        """Complex factor (N, M) of each panel element beside its commanded phase: amplitude, phase error; 0 if dead."""
         return np.where(self.dead, 0.0, self.amplitude) * np.exp(-1j * self.phase)
 
     def applied(self, code: RisCode) -> RisCode:

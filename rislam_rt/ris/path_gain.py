@@ -8,14 +8,12 @@ from rislam_rt.ris.response import leg_parts
 
 
 def image_amplitude(length: Floats, radio: RadioConfig) -> Floats:
-    """Amplitude |alpha| of a wall return over perfect walls, eq. `a1`: free space along a path of `length` (...,)
-    [m]."""
+    """Amplitude |alpha| of a wall return over perfect walls, eq. `a1`: free space along `length` (...,) [m]."""
     return radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi * length)
 
 
 def point_amplitude(strength: Floats, tx_length: Floats, rx_length: Floats, radio: RadioConfig) -> Floats:
-    """Amplitude |alpha| of a path over a point scatterer, eq. `a2`, for `strength`, the root of its cross-section
-    [m]."""
+    """Amplitude |alpha| of a path over a point scatterer, eq. `a2`; `strength` is the cross-section's root [m]."""
     scale = radio.wavelength * np.sqrt(4.0 * np.pi * radio.tx_gain * radio.rx_gain) / (4.0 * np.pi) ** 2
     return scale * strength / (tx_length * rx_length)
 

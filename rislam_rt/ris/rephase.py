@@ -12,8 +12,7 @@ from rislam_rt.model.ris import RisCode
 
 
 class Block(NamedTuple):
-    """Block of panel paths (I J,) that join each of the Tx legs (I,) with each of the Rx legs (J,), first Tx leg
-    first."""
+    """Block of panel paths (I J,) that join each of the Tx legs (I,) with each of the Rx legs (J,), Tx legs first."""
 
     tx: Integers
     rx: Integers
@@ -59,10 +58,8 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
 
 
 def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
-    """Sort panel paths into blocks of Tx legs that all join the same Rx legs.
-
-    With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
-    """
+    """Sort panel paths into blocks of Tx legs that all join the same Rx legs."""
+    # With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
     path_of = {(int(tx_leg[p]), int(rx_leg[p])): int(p) for p in np.flatnonzero(tx_leg >= 0)}
     partners: dict[int, list[int]] = {}
     for i, j in sorted(path_of):

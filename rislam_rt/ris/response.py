@@ -1,15 +1,35 @@
-"""Response of a panel's elements to the legs of a path: element-wise (eq. `single`, default) and far-field (`a3`)."""
+"""Response of a panel's elements to the legs of a path: eq. `single` (default) or far-field (`a3`); delays over it."""
 
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, phasor
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model.ris import DataSheet, RisCode, RisSpec
-from rislam_rt.ris.element import element_gain_area, element_pattern
+
+TANG_GAIN = 8.0
+"""Gain G of a panel's element of pattern cos^3 (Tang et al., IEEE TWC 2021): 2 (q + 1) for F = cos^q, q = 3."""
+
+
+def element_pattern(spec: RisSpec, cos_theta: Floats) -> Floats:
+    """Power pattern F(theta) of a panel's element at cosines (...,) of the angle to its normal; 0 behind the panel.
+
+    `tang`: cos^3 theta. `energy`: cos theta, the projected area of the cell.
+    """
+    front = np.clip(cos_theta, 0.0, 1.0)
+    return front * front * front if spec.element == "tang" else front
+
+
+def element_gain_area(spec: RisSpec, wavelength: float) -> float:
+    """Gain times area of a panel's element, G dx dy [m^2].
+
+    `tang`: 8 dx dy. `energy`: 4 pi (dx dy)^2 / lambda^2, what a perfectly conducting cell of that area re-radiates.
+    """
+    area = float(spec.spacing[0] * spec.spacing[1])
+    return TANG_GAIN * area if spec.element == "tang" else 4.0 * np.pi * area**2 / wavelength**2
 
 
 def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float) -> Complexes:
-    """Response (..., N, M) of every panel element to one leg: eq. `single` without its phase shift is the product of
-    two.
+    """Response (..., N, M) of every panel element to one leg: two make eq. `single` without its phase shift.
 
     Parameters
     ----------
@@ -30,8 +50,7 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
 
 
 def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) -> tuple[Floats, Floats]:
-    """Amplitudes (..., N, M) of a panel's element responses to one leg, for a coefficient of 1, and distances [m] of
-    the elements."""
+    """Amplitudes (..., N, M) of a panel's responses to one leg of coefficient 1, and elements' distances [m]."""
     ray, offsets = np.asarray(device - center), spec.offsets()
     along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
     distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
@@ -42,8 +61,7 @@ def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) 
 def far_field_response(
     spec: RisSpec, center: Floats, device: Floats, coefficient: Complexes, wavelength: float
 ) -> Complexes:
-    """Response (..., N, M) of every panel element to one leg in the far field (Appendix A): plane waves, amplitude of
-    the centre.
+    """Response (..., N, M) of panel elements to a leg in the far field (Appendix A): plane waves, centre's amplitude.
 
     Valid for distances above `2 D^2 / lambda`, D the panel's diagonal.
     """
@@ -70,3 +88,22 @@ def _leg_share(spec: RisSpec, wavelength: float) -> float:
     """Square root of the factor `sqrt(4 pi G dx dy) A / lambda` that joins two legs."""
     join = np.sqrt(4.0 * np.pi * element_gain_area(spec, wavelength)) * spec.amplitude / wavelength
     return float(np.sqrt(join))
+
+
+def delay_spread(spec: RisSpec, center: Floats, tx: Floats, rx: Floats) -> Floats:
+    """Delay spread (...,) [s] over a panel: largest difference between elements of the delay from tx (..., 3) over the
+    element to rx (..., 3)."""
+    elements = np.asarray(center) + spec.offsets().reshape(-1, 3)
+    length = sum(np.linalg.norm(np.asarray(end)[..., None, :] - elements, axis=-1) for end in (tx, rx))
+    return np.ptp(length, axis=-1) / SPEED_OF_LIGHT
+
+
+def delay_spread_warnings(spec: RisSpec, center: Floats, tx: Floats, rx: Floats, bandwidth: float) -> tuple[str, ...]:
+    """Warning if delays over a panel spread by more than 1 / B: a path over it has no single delay; else none."""
+    spread = float(np.max(delay_spread(spec, center, tx, rx), initial=0.0))
+    if spread * bandwidth <= 1.0:
+        return ()
+    return (
+        f"ris: delays over the panel spread by up to {spread * 1e9:.3g} ns, more than 1 / B = "
+        f"{1e9 / bandwidth:.3g} ns; take a smaller panel or a smaller bandwidth",
+    )

@@ -1,8 +1,9 @@
-"""The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`: all of |f| < B/2 at equal power, nothing outside."""
+"""The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`, equal power over |f| < B/2, and the tones that sample its band."""
 
 import numpy as np
+import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Complexes, Floats, phasor
 
 
 def effective_bandwidth(bandwidth: float) -> float:
@@ -11,8 +12,7 @@ def effective_bandwidth(bandwidth: float) -> float:
 
 
 def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
-    """Autocorrelation `R_s(tau) = int s(t) s(t - tau) dt` of the flat-band pulse (Appendix B), or its 1st or 2nd
-    derivative.
+    """Autocorrelation `int s(t) s(t - tau) dt` of the flat-band pulse (Appendix B), or its 1st or 2nd derivative.
 
     Parameters
     ----------
@@ -33,27 +33,10 @@ def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, deriv
     if derivative == 0:
         return energy * np.sinc(x / np.pi)
     if derivative == 1:
-        return -energy * scale * _bessel(1, x)
+        return -energy * scale * scipy.special.spherical_jn(1, x)
     if derivative == 2:
-        return energy * scale**2 * (2.0 * _bessel(2, x) - np.sinc(x / np.pi)) / 3.0
+        return energy * scale**2 * (2.0 * scipy.special.spherical_jn(2, x) - np.sinc(x / np.pi)) / 3.0
     raise ValueError(f"derivative: {derivative} received; give 0, 1 or 2")
-
-
-def _bessel(order: int, x: Floats) -> Floats:
-    """Spherical Bessel functions j1 and j2 (...,): closed form, and the power series below 1, where that cancels."""
-    near = np.abs(x) < 1.0
-    far = np.where(near, 1.0, x)
-    first = (np.sin(far) / far - np.cos(far)) / far
-    closed = first if order == 1 else 3.0 * first / far - np.sin(far) / far
-    half_square = 0.5 * np.where(near, x, 0.0) ** 2
-    series = np.ones_like(half_square)
-    for k in range(_SERIES_TERMS, 0, -1):
-        series = 1.0 - series * half_square / (k * (2 * order + 2 * k + 1))
-    return np.where(near, series * x**order / (3.0 if order == 1 else 15.0), closed)
-
-
-_SERIES_TERMS = 9
-"""Number of terms of the Bessel functions' power series: the next one is below 1e-16 of the first for |x| < 1."""
 
 
 def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
@@ -62,3 +45,13 @@ def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivativ
     Samples at any rate of at least B carry its whole energy: `sum s^2 / rate = E`.
     """
     return np.sqrt(bandwidth / energy) * autocorrelation(time, bandwidth, energy, derivative=derivative)
+
+
+def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
+    """Baseband frequencies (M,) [Hz] of a multicarrier sounding's tones, evenly spaced over the band, centred on 0."""
+    return (np.arange(num_subcarriers) - (num_subcarriers - 1) / 2.0) * bandwidth / num_subcarriers
+
+
+def delay_response(tau: Floats, frequencies: Floats) -> Complexes:
+    """Phase factors `exp(-j 2 pi f tau)` (..., M) of tones at frequencies (M,) [Hz] after delays (...,) [s]."""
+    return phasor(-2.0 * np.pi * np.asarray(tau)[..., None] * frequencies)

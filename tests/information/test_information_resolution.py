@@ -5,9 +5,8 @@ import pytest
 
 from rislam_rt.information import certainty_share, resolved_probability
 from rislam_rt.information.resolution import PHASES
-from rislam_rt.measurement.estimation.inner_products import inner_of, waves_at
+from rislam_rt.measurement.estimation.path_signals import build_sounding, inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
-from rislam_rt.measurement.estimation.sounding import build_sounding
 from rislam_rt.model import RadioConfig, RxArray, SensorModel
 
 SENSOR = SensorModel(RadioConfig(), resolution="joint")

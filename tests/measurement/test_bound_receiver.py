@@ -7,8 +7,9 @@ from scipy.special import ive
 
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
-from rislam_rt.measurement import ReceiverConfig, detection_probability, measure, path_std, phase_reversed
-from rislam_rt.model import PathKind, RadioConfig, RisCode, RxArray
+from rislam_rt.measurement import ReceiverConfig, detection_probability, measure, path_std
+from rislam_rt.measurement.received import check_half_turn
+from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()
 QUIET = ReceiverConfig(estimator="bound", clutter_rate=0.0, alternation=False)
@@ -188,11 +189,10 @@ def test_components_come_by_delay_and_same_seed_same_result(make_paths, make_gai
     np.testing.assert_array_equal(first[1].path, second[1].path)
 
 
-def test_twin_is_half_a_turn_and_needs_an_even_panel():
-    code = RisCode(np.array([[0, 1], [2, 3]]), 4)
-    np.testing.assert_allclose(np.exp(-1j * phase_reversed(code).xi), -np.exp(-1j * code.xi), atol=1e-15)
+def test_alternation_needs_an_even_panel():
+    check_half_turn(4)
     with pytest.raises(ConfigError, match="even number"):
-        phase_reversed(RisCode(np.array([[0, 1]]), 3))
+        check_half_turn(3)
 
 
 @pytest.mark.parametrize(

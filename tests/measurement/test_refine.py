@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement.estimation import refine as refinement
-from rislam_rt.measurement.estimation.inner_products import waves_at
+from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, waves_at
 from rislam_rt.measurement.estimation.positive_definite import inverse, solve
 from rislam_rt.measurement.estimation.refine import (
     LeastSquaresFit,
@@ -16,7 +16,6 @@ from rislam_rt.measurement.estimation.refine import (
     residual_fit,
     subset_fit,
 )
-from rislam_rt.measurement.estimation.sounding import Sounding, build_sounding
 from rislam_rt.measurement.signal import add_noise
 from rislam_rt.model import RadioConfig
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement import ReceiverConfig, measure
-from rislam_rt.measurement.estimation.inner_products import waves_at
+from rislam_rt.measurement.estimation.path_signals import build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import accuracy, fit_amplitudes, refine
-from rislam_rt.measurement.estimation.sounding import build_sounding
 from rislam_rt.measurement.signal import add_noise
 from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import PathKind, RadioConfig, RxArray

@@ -50,8 +50,7 @@ class LimitViolation(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathReport:
-    """Report of a comparison: matched paths with their errors, traced against analytic, and one-sided paths with their
-    explanations."""
+    """Report of a comparison: matched paths with their errors, traced against analytic, and paths of one side."""
 
     cycles: int
     labels: tuple[str, ...]
@@ -192,8 +191,7 @@ def _largest(errors: Floats) -> float:
 
 
 def _percentiles(errors: Floats) -> dict[str, float]:
-    """Median, 90th and 99th percentile and maximum of the errors (M,) of paths that two channels share; empty of
-    none."""
+    """Median, 90th and 99th percentile and maximum of errors (M,) of paths that two channels share; empty of none."""
     if len(errors) == 0:
         return {}
     p50, p90, p99, top = np.percentile(errors, [50.0, 90.0, 99.0, 100.0])

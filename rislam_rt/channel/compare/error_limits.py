@@ -29,14 +29,11 @@ from rislam_rt.model import Material, Paths, RadioConfig, Scene, Trajectory
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """Unit roundoff of float32 and float64."""
-
 STEPS = 8.0
 """Number of roundings of a coordinate at a bounce: the image (distance from the plane, product, difference), the ray
 towards it (difference, normalisation) and its hit (distance, product, sum)."""
-
 FIELD_STEPS = 4.0
 """Number of roundings of a field at a bounce or an antenna: coefficient, its real and its imaginary part, product."""
-
 SLAB_STEPS = 8.0
 """Number of roundings in a slab's reflection coefficient, each worth u of it and of the phase across the slab."""
 
@@ -57,8 +54,7 @@ class ErrorLimits(NamedTuple):
 
 
 class PathLegs(NamedTuple):
-    """Lengths, segments and walls of the two legs (M, 2) of matched paths; without a landmark the second leg is
-    zero."""
+    """Lengths, segments and walls of the two legs (M, 2) of matched paths; the second is zero without a landmark."""
 
     length: Floats
     """[m]."""
@@ -76,8 +72,7 @@ class PathLegs(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomPrecision:
-    """Numerical precision of paths in one room, from which their error limits follow: rounding and flatness of
-    walls."""
+    """Numerical precision of paths in one room, which sets their error limits: rounding and flatness of walls."""
 
     scene: Scene
     radio: RadioConfig
@@ -108,8 +103,7 @@ class RoomPrecision:
     def limits(
         self, paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, scale: Floats
     ) -> ErrorLimits:
-        """Error limits of the paths (cycle[i], path[i]) of the image-source channel; `scale` (M,) is their coherent
-        scale."""
+        """Error limits of the image-source channel's paths (cycle[i], path[i]), of coherent scale `scale` (M,)."""
         shape = _shape(paths, cycle, path, trajectory, build_walls(self.scene).names)
         reach = self.extent + shape.length
         shift = (2.0 + STEPS * shape.bounces) * self.roundoff * reach * (shape.length > 0.0)
@@ -139,8 +133,7 @@ class RoomPrecision:
         return error
 
     def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
-        """Gain's error limit (M,) from the antennas' patterns: a half-wave dipole's is a small difference over a
-        sine."""
+        """Gain's error limit (M,) from antenna patterns: a half-wave dipole's is a small difference over a sine."""
         error, antennas = np.zeros(len(path)), self.radio.antennas
         for pattern, ray in ((antennas.tx, paths.departure), (antennas.rx, paths.arrival)):
             if pattern == "hw_dipole":
@@ -244,26 +237,19 @@ def _ratio(a: Floats, b: Floats) -> Floats:
 
 
 def _bend(segments: Floats, beside: Floats) -> Floats:
-    """Error (M,) [m] of a polyline's length when its corners move by `beside` (M,) [m] across its segments (M, V).
-
-    A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
-    """
+    """Error (M,) [m] of a polyline's length when its corners move by `beside` (M,) [m] across its segments (M, V)."""
+    # A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     across = np.where(segments > 0.0, beside[:, None], 0.0)
     return np.minimum(_ratio(2.0 * across**2, segments), 2.0 * across).sum(axis=1)
 
 
 def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """Flatness of walls (W,) [m], the largest distance of corners from the wall's plane, and altitude (W,) [m] of the
-    largest triangle."""
+    """Largest distance (W,) [m] of corners from each wall's plane, and altitude (W,) [m] of its largest triangle."""
     corners, owner = walls.triangles, walls.wall_of_triangle
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))
     np.maximum.at(flatness, owner, height.max(axis=1, initial=0.0))
-    edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
-    order = np.lexsort((-area, owner))
-    largest = order[np.unique(owner[order], return_index=True)[1]]
-    return flatness, 2.0 * area[largest] / edges[largest].max(axis=1, initial=np.finfo(np.float64).tiny)
+    return flatness, walls.largest_triangles()[1]
 
 
 @cache

@@ -1,13 +1,12 @@
 """Matching of the paths of two channels by identity: kind, landmark and wall names on either leg, never by delay."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.compare.comparison_report import OneSidedPath, PathReport
-from rislam_rt.channel.compare.error_limits import ErrorLimits, RoomPrecision, coherent_scale, with_perfect_mirrors
+from rislam_rt.channel.compare.error_limits import RoomPrecision, coherent_scale, with_perfect_mirrors
 from rislam_rt.channel.compare.unmatched_paths import SHORTEST_SEGMENT, DifferenceExplainer, Identity
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.image_source.antennas import peak_amplitude
@@ -16,45 +15,13 @@ from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import angle_between
 from rislam_rt.model import Antennas, Paths, RadioConfig, Scene, Trajectory
 
-
-class IdentityColumns(NamedTuple):
-    """Path identities of two channels with their columns in either, -1 where a channel does not have them."""
-
-    identity: list[Identity]
-    traced: Integers
-    analytic: Integers
-
-
-class Matched(NamedTuple):
-    """M paths that both channels have, with columns, scale and error limits."""
-
-    labels: tuple[str, ...]
-    """(I,) identities in words."""
-    cycle: Integers
-    """(M,) cycle of each path."""
-    path: Integers
-    """(M,) number of its identity in `labels`."""
-    traced: Integers
-    """(M,) column in the traced paths."""
-    analytic: Integers
-    """(M,) column in the image-source paths."""
-    scale: Floats
-    """(M,) coherent scale of the gain."""
-    limits: ErrorLimits
-
-
 _RADIO = RadioConfig()
 
 
 def compare_paths(
-    traced: Paths,
-    analytic: Paths,
-    scene: Scene,
-    trajectory: Trajectory,
-    *,
-    radio: RadioConfig = _RADIO,
+    traced: Paths, analytic: Paths, scene: Scene, trajectory: Trajectory, *, radio: RadioConfig = _RADIO,
     shortest_segment: float = SHORTEST_SEGMENT,
-) -> PathReport:
+) -> PathReport:  # fmt: skip
     """Compare two path sets of one scene and trajectory, cycle by cycle and identity by identity.
 
     Gains are compared as they are: give both sides the same code. Every path that one side lacks is looked up in the
@@ -76,30 +43,44 @@ def compare_paths(
         ("trajectory", trajectory, Trajectory),
     ):
         expect(name, value, kind)
-    columns = _align(traced, analytic)
-    in_traced, in_analytic = _valid(traced, columns.traced), _valid(analytic, columns.analytic)
+    identities, traced_column, analytic_column = _align(traced, analytic)
+    in_traced, in_analytic = _valid(traced, traced_column), _valid(analytic, analytic_column)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
     certifier = DifferenceExplainer.of(scene, trajectory, depth, shortest_segment)
-    one_sided = [
-        _certify(certifier, columns.identity[path], int(cycle), bool(in_traced[cycle, path]))
-        for cycle, path in np.argwhere(in_traced != in_analytic)
-    ]
+    one_sided = []
+    for cycle, path in np.argwhere(in_traced != in_analytic):
+        identity, side = identities[path], "traced" if in_traced[cycle, path] else "analytic"
+        proof = certifier.explain(identity, int(cycle), side)
+        one_sided.append(OneSidedPath(int(cycle), certifier.label(identity), side, *proof))
     cycle, path = np.nonzero(in_traced & in_analytic)
-    precision = RoomPrecision.of(scene, radio, single=is_single(traced.source))
-    scale = _scale(analytic, columns.identity, (cycle, columns.analytic[path], path), trajectory, precision)
-    limits = precision.limits(analytic, cycle, columns.analytic[path], trajectory, scale)
-    labels = tuple(certifier.label(identity) for identity in columns.identity)
-    here = Matched(labels, cycle, path, columns.traced[path], columns.analytic[path], scale, limits)
-    return _report(traced, analytic, here, one_sided)
+    precision = RoomPrecision.of(
+        scene, radio, single=traced.source.startswith("traced") and "refined" not in traced.source
+    )
+    at_traced, at_analytic = (cycle, traced_column[path]), (cycle, analytic_column[path])
+    scale = _scale(analytic, identities, (*at_analytic, path), trajectory, precision)
+    gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
+    return PathReport(
+        cycles=traced.num_cycles,
+        labels=tuple(certifier.label(identity) for identity in identities),
+        path=path,
+        cycle=cycle,
+        kind=analytic.kind[at_analytic[1]],
+        length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
+        gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
+        gain_error=np.abs(np.abs(gain_t) - np.abs(gain_a)) / np.maximum(scale, np.finfo(np.float64).tiny),
+        phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
+        aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
+        aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
+        limits=precision.limits(analytic, *at_analytic, trajectory, scale),
+        one_sided=tuple(one_sided),
+        searched={"traced": traced.source, "analytic": analytic.source},
+    )
 
 
 def _scale(
-    analytic: Paths,
-    identity: list[Identity],
-    matched: tuple[Integers, Integers, Integers],
-    trajectory: Trajectory,
+    analytic: Paths, identity: list[Identity], matched: tuple[Integers, Integers, Integers], trajectory: Trajectory,
     precision: RoomPrecision,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Coherent scale (M,) of the gains of matched paths, given by cycle, analytic column and identity."""
     cycle, column, path = matched
     mirrors, antennas = with_perfect_mirrors(precision.scene), precision.radio.antennas
@@ -112,12 +93,12 @@ def _scale(
     return peak_amplitude(antennas) * coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
-def _align(traced: Paths, analytic: Paths) -> IdentityColumns:
+def _align(traced: Paths, analytic: Paths) -> tuple[list[Identity], Integers, Integers]:
     """Union of the path identities of two channels, with their columns in either."""
     sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
     identity = sorted(sides[0].keys() | sides[1].keys())
     here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
-    return IdentityColumns(identity, here[0], here[1])
+    return identity, here[0], here[1]
 
 
 def named_identity(paths: Paths, path: int) -> Identity:
@@ -135,47 +116,7 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     return valid
 
 
-def _certify(certifier: DifferenceExplainer, identity: Identity, cycle: int, is_traced: bool) -> OneSidedPath:
-    """Explain a path that only one channel has in a cycle, as a record for the report."""
-    side = "traced" if is_traced else "analytic"
-    proof = certifier.explain(identity, cycle, side)
-    return OneSidedPath(cycle, certifier.label(identity), side, proof.reason, proof.text, proof.size)
-
-
-def _report(traced: Paths, analytic: Paths, matched: Matched, one_sided: list[OneSidedPath]) -> PathReport:
-    """Assemble the report of a comparison: errors of the matched paths, traced against analytic."""
-    at_traced, at_analytic = (matched.cycle, matched.traced), (matched.cycle, matched.analytic)
-    gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
-    return PathReport(
-        cycles=traced.num_cycles,
-        labels=matched.labels,
-        path=matched.path,
-        cycle=matched.cycle,
-        kind=analytic.kind[at_analytic[1]],
-        length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
-        gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
-        gain_error=_relative(np.abs(np.abs(gain_t) - np.abs(gain_a)), matched.scale),
-        phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
-        aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
-        aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
-        limits=matched.limits,
-        one_sided=tuple(one_sided),
-        searched={"traced": traced.source, "analytic": analytic.source},
-    )
-
-
-def is_single(source: str) -> bool:
-    """Whether `Paths.source` says that the paths hold the tracer's own float32 numbers."""
-    return source.startswith("traced") and "refined" not in source
-
-
 def _level_difference(a: Floats, b: Floats) -> Floats:
-    """Absolute level difference |20 lg(a / b)| [dB] of the gains of matched paths, 0 where both are 0 (a panel seen
-    edge-on)."""
+    """Absolute level difference |20 lg(a / b)| [dB] of matched paths' gains, 0 where both are 0 (panel edge-on)."""
     floor = np.finfo(np.float64).tiny
     return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))
-
-
-def _relative(error: Floats, scale: Floats) -> Floats:
-    """Gain errors (M,) of matched paths relative to their coherent scale (M,), 0 where both are 0."""
-    return error / np.maximum(scale, np.finfo(np.float64).tiny)

@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.occluders import ALONE
-from rislam_rt.channel.walls import build_walls
+from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.plane_segmentation import FLOAT32_ROUNDING
@@ -19,20 +19,16 @@ from rislam_rt.model import PathKind, Scene, Trajectory
 
 Identity = tuple[int, str, tuple[str, ...], tuple[str, ...]]
 """Identity of a path by names: kind, landmark, Tx walls, Rx walls."""
-
 SHORTEST_SEGMENT = 10.07e-3
 """[m] Sionna RT drops a path with a segment below 1 cm; in float32 the limit bites up to this length."""
-
 HIDDEN = ("occluded", "close surfaces")
 """Reasons of failure by something in the way, rather than by a missing reflection."""
-
 ROUNDINGS = 8.0
 """Number of float32 roundings between the coordinates and a mirror image or a hit."""
 
 
 class Explanation(NamedTuple):
-    """Explanation of a missing path: reason (empty if none was found), what was computed, the length [m] it rests
-    on."""
+    """Explanation of a missing path: reason (empty if none was found), what was computed, length [m] it rests on."""
 
     reason: str
     text: str
@@ -100,7 +96,7 @@ class DifferenceExplainer:
         owner = np.repeat(np.arange(len(walls)), [len(o) for o in outlines])
         edges = np.concatenate([np.zeros((0, 2, 3)), *outlines])
         center = scene.bounds.mean(axis=0)
-        tilt = _tilts(facets, center)
+        tilt = _tilts(walls, center)
         return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
@@ -164,12 +160,11 @@ class DifferenceExplainer:
         return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
-        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along the segments of a leg.
-
-        The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
-        largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of what
-        its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came about by.
-        """
+        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along the segments of a leg."""
+        # The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
+        # largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of
+        # what its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came
+        # about by.
         size = [1.0 + np.abs(p - self.center).max(axis=-1) for p in (points, images)]
         rounding = ROUNDINGS * FLOAT32_ROUNDING
         shift, off = np.zeros(len(images)), rounding * float(size[0][0])
@@ -216,11 +211,10 @@ class DifferenceExplainer:
         return found
 
     def _free(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions that no wall or occluder stands across segment `number` of a leg.
-
-        Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the host
-        wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to tell.
-        """
+        """Conditions that no wall or occluder stands across segment `number` of a leg."""
+        # Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the
+        # host wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to
+        # tell.
         start, end, reach = leg.points[number], leg.points[number + 1], float(leg.shift[number])
         a, b = self.facets.distance(np.stack([start, end]))
         least = np.minimum(np.abs(a), np.abs(b))
@@ -258,10 +252,8 @@ class DifferenceExplainer:
 
     def _inside(self, point: Floats, ray: Floats, wall: int) -> float:
         """Distance [m] of a `ray` (3,) through a point (3,) of a wall's plane from the wall's outline, negative
-        outside.
-
-        It is measured across the ray, as are a ray's errors.
-        """
+        outside."""
+        # It is measured across the ray, as are a ray's errors.
         inside = bool(self.facets.contains(point[None], np.array([wall]))[0])
         along = unit(ray)
         edges = self.edges[self.wall_of_edge == wall] - point
@@ -270,12 +262,8 @@ class DifferenceExplainer:
         return distance if inside else -distance
 
 
-def _tilts(facets: WallFacets, center: Floats) -> Floats:
+def _tilts(walls: Walls, center: Floats) -> Floats:
     """Largest turn (W,) [rad] of the normal of each wall's largest triangle by float32 rounding of its corners."""
-    corners = facets.corners - center
-    sides = np.roll(corners, -1, axis=1) - corners
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1)
-    altitude = area / np.linalg.norm(sides, axis=-1).max(axis=1)
-    largest = [int(a + np.argmax(area[a:b])) for a, b in zip(facets.first, facets.first[1:], strict=False)]
-    rounding = 2.0 * FLOAT32_ROUNDING * np.abs(corners[largest]).max(axis=(1, 2), initial=0.0)
-    return rounding / np.maximum(altitude[largest], np.finfo(np.float64).tiny)
+    largest, altitude = walls.largest_triangles()
+    extent = np.abs(walls.triangles[largest] - center).max(axis=(1, 2), initial=0.0)
+    return 2.0 * FLOAT32_ROUNDING * extent / np.maximum(altitude, np.finfo(np.float64).tiny)

@@ -13,10 +13,66 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.image_source.clusters import WallClusters
+from rislam_rt.channel.image_source.facets import WallFacets
 from rislam_rt.channel.image_source.rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.geometry.planes import mirror
+
+CLUSTER = 48
+"""Largest number of walls in a cluster: testing that many costs about as much as the test of the box that spares it."""
+
+
+class WallClusters(NamedTuple):
+    """Bounding rectangles of all walls, and C clusters of walls with their bounding boxes."""
+
+    rectangles: Rectangles
+    members: list[Integers]
+    """(C,) walls of each cluster."""
+    center: Floats
+    """(C, 3) [m] centres of the clusters' bounding boxes."""
+    half: Floats
+    """(C, 3) [m] half the sizes of those boxes."""
+
+    def reached(self, normal: Floats, offset: Floats) -> tuple[Integers, Integers]:
+        """Pairs (beam, wall) where a wall's bounding rectangle reaches into all half-spaces (N, P, 3) of a beam."""
+        beams, planes = offset.shape
+        if beams == 0:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        flat, bound = normal.reshape(-1, 3), offset.reshape(-1, 1) - SURFACE_TOLERANCE
+        highest: Floats = flat @ self.center.T + np.abs(flat) @ self.half.T
+        near = np.logical_and.reduce((highest >= bound).reshape(beams, planes, -1), axis=1)
+        found = []
+        for number, members in enumerate(self.members):
+            rows = np.flatnonzero(near[:, number])
+            if len(rows) == 0:
+                continue
+            n, o = normal[rows].reshape(-1, 3), offset[rows].reshape(-1, 1) - SURFACE_TOLERANCE
+            within: Floats = n @ self.rectangles.center[members].T
+            for half in self.rectangles.halves:
+                within += np.abs(n @ half[members].T)
+            row, wall = np.nonzero((within >= o).reshape(len(rows), planes, -1).all(axis=1))
+            found.append((rows[row], members[wall]))
+        rows_found, walls_found = zip(*found, strict=True) if found else ([np.zeros(0, int)], [np.zeros(0, int)])
+        return np.concatenate(rows_found), np.concatenate(walls_found)
+
+
+def build_clusters(facets: WallFacets) -> WallClusters:
+    """Split walls into clusters of at most `CLUSTER` by halving along the longest extent of their centres."""
+    rectangles = facets.rectangles
+    members: list[Integers] = []
+    waiting = [np.arange(len(facets))] if len(facets) else []
+    while waiting:
+        walls = waiting.pop()
+        if len(walls) <= CLUSTER:
+            members.append(walls)
+            continue
+        points = rectangles.center[walls]
+        order = walls[np.argsort(points[:, np.argmax(np.ptp(points, axis=0))], kind="stable")]
+        waiting += [order[: len(order) // 2], order[len(order) // 2 :]]
+    low = np.array([facets.box[0, walls].min(axis=0) for walls in members]).reshape(-1, 3)
+    high = np.array([facets.box[1, walls].max(axis=0) for walls in members]).reshape(-1, 3)
+    return WallClusters(rectangles, members, (low + high) / 2.0, (high - low) / 2.0 + SURFACE_TOLERANCE)
+
 
 _BLOCK = 4_000_000
 """Numbers in the largest temporary array."""
@@ -71,8 +127,7 @@ class Beams(NamedTuple):
 
 
 class FoundSequences(NamedTuple):
-    """Wall sequences (N, d) that beam tracing leaves possible, with the numbers (N,) of the device's and the far end's
-    bounding ball."""
+    """Wall sequences (N, d) that beam tracing leaves possible, with device's and far end's bounding ball (N,)."""
 
     device: Integers
     far: Integers
@@ -82,8 +137,7 @@ class FoundSequences(NamedTuple):
 def search_beams(
     clusters: WallClusters, device: BoundingBalls, far: BoundingBalls, pairs: Integers, depth: int, barred: Booleans
 ) -> Iterator[FoundSequences]:
-    """Yield, in blocks, the wall sequences of 1 to `depth` bounces that beam tracing leaves possible between devices
-    and far ends.
+    """Yield, in blocks, wall sequences of 1 to `depth` bounces that beams leave possible from devices to far ends.
 
     Parameters
     ----------
@@ -131,8 +185,7 @@ def _blocks(count: int, width: int) -> Iterator[slice]:
 def _facing(
     rectangles: Rectangles, beams: Beams, row: Integers, wall: Integers, radius: Floats
 ) -> tuple[Integers, Integers]:
-    """Keep the pairs (beam, next wall) with part of the beam's last wall on that side of the next wall's plane where
-    the mirror image is: the ray comes from there."""
+    """Keep the pairs (beam, next wall) where part of the beam's last wall is on the image's side of the next wall."""
     last = beams.walls[row, 0]
     keep = wall != last
     row, wall, last = row[keep], wall[keep], last[keep]
@@ -148,10 +201,8 @@ def _facing(
 
 
 def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Floats) -> Beams:
-    """Mirror beams in a wall each (N,), and narrow them to that wall's bounding rectangle.
-
-    A ball that reaches through the plane has beams on both sides.
-    """
+    """Mirror beams in a wall each (N,), and narrow them to that wall's bounding rectangle."""
+    # A ball that reaches through the plane has beams on both sides.
     normal, offset = rectangles.normal[wall], rectangles.offset[wall]
     side = np.einsum("ni,ni->n", beams.image, normal) - offset
     ball = radius[beams.ball]
@@ -166,23 +217,18 @@ def _through(rectangles: Rectangles, beams: Beams, wall: Integers, radius: Float
     old_offset = beams.offset[row] - 2.0 * turned * offset[:, None]
     walls = np.concatenate([wall[:, None], beams.walls[row]], axis=1)
     return Beams(
-        beams.ball[row],
-        walls,
-        image,
-        np.concatenate([new[0], old_normal], axis=1),
+        beams.ball[row], walls, image, np.concatenate([new[0], old_normal], axis=1),
         np.concatenate([new[1], old_offset], axis=1),
-    )
+    )  # fmt: skip
 
 
 def _half_spaces(
     rectangles: Rectangles, wall: Integers, front: Floats, image: Floats, height: Floats, radius: Floats
 ) -> tuple[Floats, Floats]:
-    """Half-spaces that bound beams: normals (N, 5, 3), offsets (N, 5): wall's plane, its rectangle's four edges.
-
-    Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
-    beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height)
-    in the frame (q, front), that plane leans by atan2(m, height) + asin(radius / distance) from q towards the front.
-    """
+    """Half-spaces that bound beams: normals (N, 5, 3), offsets (N, 5): wall's plane, its rectangle's four edges."""
+    # Through each edge goes the plane that touches the image's ball, `height` (N,) behind the wall, such that ball and
+    # beam are on different sides of it. With the edge's inward normal q, and the ball's centre at (m, -height) in the
+    # frame (q, front), that plane leans by atan2(m, height) + asin(radius / distance) from q towards the front.
     inward = np.stack([s * d[wall] for d in rectangles.directions for s in (1.0, -1.0)], axis=1)
     edge = rectangles.center[wall][:, None] - np.stack(
         [s * h[wall] for h in rectangles.halves for s in (1.0, -1.0)], axis=1

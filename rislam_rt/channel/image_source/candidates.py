@@ -9,23 +9,20 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.beams import (
     BoundingBalls,
     FoundSequences,
+    WallClusters,
+    build_clusters,
     enclosing_balls,
     group_positions,
     search_beams,
 )
-from rislam_rt.channel.image_source.clusters import WallClusters, build_clusters
-from rislam_rt.channel.image_source.facets import WallFacets
-from rislam_rt.channel.image_source.sequences import wall_sequences
+from rislam_rt.channel.image_source.facets import WallFacets, row_blocks
 
 FEW = 2000
 """Number of wall sequences up to which `auto` tries all of them; beyond it beam tracing is faster."""
-
 NEAR = 0.03
 """Radius within which positions share their beams, as a share of the room's diagonal."""
-
 _ROWS = 200_000
 """Candidates in a block."""
-
 SEARCHES = ("auto", "exhaustive", "beams")
 """Values of `ImageSourceChannel.search`."""
 
@@ -56,8 +53,7 @@ def build_search(facets: WallFacets, depth: int, how: str) -> SequenceSearch:
 def candidate_rows(
     search: SequenceSearch, device: Floats, far: Floats, depth: int, host: int
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Yield candidates for specular legs, cycles (N,) and wall sequences (N, d) from device to far end, in blocks of
-    one d each.
+    """Yield candidates for specular legs, cycles (N,) and wall sequences (N, d), in blocks of one d each.
 
     Parameters
     ----------
@@ -96,3 +92,48 @@ def _rows(found: FoundSequences, groups: list[Integers]) -> Iterator[tuple[Integ
         row = np.repeat(np.arange(len(ball)), sizes[ball])
         place = np.arange(len(row)) - np.repeat(np.cumsum(sizes[ball]) - sizes[ball], sizes[ball])
         yield cycles[start[ball[row]] + place], walls[row]
+
+
+def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, host: int = -1) -> Iterator[Integers]:
+    """Yield candidate wall sequences in blocks (S, d), in the order from device to far end, for d = 1 .. depth.
+
+    No wall comes twice in a row. At every bounce what comes before and what comes after (a wall, or the ends) must
+    have a part on the same side of the wall in between; no possible path is lost by this.
+
+    Parameters
+    ----------
+    device, far
+        (K, 3) all positions of either end [m].
+    host
+        A wall that may not come last, nor what lies on it (the one that a panel hangs on), -1 for none.
+    """
+    if depth < 1 or len(facets) == 0:
+        return
+    device_side, far_side = facets.point_sides(device), facets.point_sides(far)
+    sides = facets.sides() if depth > 1 else np.zeros((len(facets), len(facets)), dtype=np.int64)
+    last = np.flatnonzero(far_side > 0)
+    level = (last if host < 0 else last[facets.plane[last] != facets.plane[host]])[:, None]
+    before = far_side[level[:, 0]]
+    for bounces in range(1, depth + 1):
+        ends_here = (device_side[level[:, 0]] & before) > 0
+        complete = level[ends_here]
+        yield from (complete[rows] for rows in row_blocks(len(complete), 16 * len(device)))
+        if bounces < depth:
+            level, before = _extended(level, before, sides)
+
+
+def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integers, Integers]:
+    """Put every possible wall in front of wall sequences (S, d); `before` (S,) are the side bits of their first wall on
+    which the ray goes on."""
+    # `sides[i, j]` tells on which sides of wall i wall j has a part.
+    grown, seen_from = [], []
+    for rows in row_blocks(len(level), len(sides)):
+        first = level[rows, 0]
+        row, wall = np.nonzero((sides[first] & before[rows, None]) > 0)
+        grown.append(np.concatenate([wall[:, None], level[rows][row]], axis=1))
+        seen_from.append(sides[wall, first[row]])
+    kept = [side > 0 for side in seen_from]
+    return (
+        np.concatenate([g[k] for g, k in zip(grown, kept, strict=True)] or [np.zeros((0, level.shape[1] + 1), int)]),
+        np.concatenate([s[k] for s, k in zip(seen_from, kept, strict=True)] or [np.zeros(0, int)]),
+    )

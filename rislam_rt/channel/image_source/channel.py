@@ -89,13 +89,11 @@ class ImageSourceChannel:
 
     def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
         """Specular legs from device positions (K, 3) [m] to one landmark; those to a panel arrive at its front."""
-        panel = self.scene.panel_number(number)
-        point = self.scene.landmark_positions[number : number + 1]
-        if panel < 0:
-            return find_legs(
-                self.sequence_search, self.coatings, device, point, self.depth, landmark=number, terminals=terminals
-            )
-        front, host = self.scene.panels[panel].spec.normal, self.walls.hosts[panel]
+        panel, point = self.scene.panel_number(number), self.scene.landmark_positions[[number]]
+        host, front, landmark = -1, None, number
+        if panel >= 0:
+            host, front, landmark = self.walls.hosts[panel], self.scene.panels[panel].spec.normal, -1
         return find_legs(
-            self.sequence_search, self.coatings, device, point, self.depth, host=host, front=front, terminals=terminals
-        )
+            self.sequence_search, self.coatings, device, point, self.depth, host=host, front=front, landmark=landmark,
+            terminals=terminals,
+        )  # fmt: skip

@@ -13,13 +13,10 @@ from rislam_rt.geometry.triangles import edge_planes
 
 SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
-
 _SIMPLE = 4
 """Largest number of triangles of walls that are tested all together; walls of more are tested one by one."""
-
 _BLOCK = 2_000_000
 """Numbers in the largest temporary array."""
-
 FRONT, BACK = 1, 2
 """Side bits: in front of a wall (where its normal points), behind it."""
 
@@ -77,8 +74,7 @@ class WallFacets:
         return inside
 
     def _on_few(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3), each in the plane of its wall (N,) of at most `_SIMPLE` triangles, lie on one of
-        these."""
+        """Whether points (N, 3) in the planes of walls (N,) of at most `_SIMPLE` triangles lie on one of these."""
         inside = np.zeros(len(points), dtype=np.bool_)
         for number in range(_SIMPLE):
             rows = np.flatnonzero(~inside & (self.first[wall] + number < self.first[wall + 1]))
@@ -88,8 +84,7 @@ class WallFacets:
         return inside
 
     def reflects(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3), each in the plane of its wall (N,), lie on that wall and on none that covers it: where
-        it reflects."""
+        """Whether points (N, 3) in the planes of walls (N,) lie on their wall, and on none that covers it."""
         own = self.contains(points, wall)
         for lower in np.unique(wall[own]) if any(map(len, self.over)) else []:
             for upper in self.over[lower]:
@@ -112,8 +107,7 @@ class WallFacets:
         return inside
 
     def possible_blockers(self, points: Floats) -> Integers:
-        """Numbers of the walls that can occlude a leg between points (N, 3): wall corners or points lie on both sides
-        of their plane."""
+        """Walls that can occlude a leg between points (N, 3): corners or points lie on both sides of their plane."""
         distance = self.distance(points)
         low, high = np.minimum(self.extent[0], distance.min(axis=0)), np.maximum(self.extent[1], distance.max(axis=0))
         return np.flatnonzero((low < -SURFACE_TOLERANCE) & (high > SURFACE_TOLERANCE))

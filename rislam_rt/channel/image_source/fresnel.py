@@ -30,8 +30,7 @@ def relative_permittivity(name: str, carrier: float) -> complex:
 
 
 def slab_permittivity(material: Material, carrier: float) -> complex:
-    """Complex relative permittivity of a wall's material at the carrier [Hz], by ITU-R P.2040 or as given; 1 for a
-    constant R.
+    """Complex relative permittivity of a material at the carrier [Hz], by ITU-R P.2040 or as given; 1 for constant R.
 
     Raises
     ------
@@ -122,11 +121,9 @@ class Coatings:
     def _reflect(
         self, field: Complexes, incident: Floats, reflected: Floats, normal: Floats, wall: Integers
     ) -> Complexes:
-        """Field vectors (N, 3) after a Fresnel bounce on walls (N,).
-
-        A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant
-        coefficient keeps the vertical and the horizontal component and scales both.
-        """
+        """Field vectors (N, 3) after a Fresnel bounce on walls (N,)."""
+        # A slab acts on the components across (TE) and in (TM) the plane of incidence; a wall with a constant
+        # coefficient keeps the vertical and the horizontal component and scales both.
         cos_theta = np.abs(np.sum(incident * normal, axis=-1))
         te, tm = slab_coefficients(cos_theta, self.permittivity[wall], self.thickness[wall], self.carrier)
         te = np.where(np.isnan(self.te[wall]), te, self.te[wall])
@@ -171,7 +168,6 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
-    """Reflected part `coefficient (onto . field) out` of a field (N, 3): its component along `onto`, turned to
-    `out`."""
+    """Reflected part `coefficient (onto . field) out` of a field (N, 3): its part along `onto`, turned to `out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

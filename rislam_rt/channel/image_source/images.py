@@ -16,8 +16,7 @@ from rislam_rt.geometry.planes import mirror, mirror_direction
 
 
 class ImageRays(NamedTuple):
-    """N specular legs, one row each: cycle (N,), walls (N, d), bounce points (N, d, 3) and far end's image (N, 3)
-    [m]."""
+    """N specular legs, one row each: cycle (N,), walls (N, d), bounces (N, d, 3) and far end's image (N, 3) [m]."""
 
     cycle: Integers
     walls: Integers
@@ -30,17 +29,9 @@ class ImageRays(NamedTuple):
 
 
 def find_legs(
-    search: SequenceSearch,
-    coatings: Coatings,
-    device: Floats,
-    far: Floats,
-    depth: int,
-    *,
-    host: int = -1,
-    front: Floats | None = None,
-    landmark: int = -1,
-    terminals: LegEnds | None = None,
-) -> SpecularLegs:
+    search: SequenceSearch, coatings: Coatings, device: Floats, far: Floats, depth: int, *, host: int = -1,
+    front: Floats | None = None, landmark: int = -1, terminals: LegEnds | None = None,
+) -> SpecularLegs:  # fmt: skip
     """Every specular leg of up to `depth` bounces from device positions (K, 3) to far ends (K, 3) or (1, 3) [m].
 
     Parameters
@@ -55,25 +46,16 @@ def find_legs(
         Antennas at both ends; None for isotropic and vertical ones.
     """
     facets = search.facets
-    found = {0: [_direct_rays(device, far)]}
+    nothing = np.zeros((len(device), 0), dtype=np.int64)
+    straight = np.zeros((len(device), 0, 3))
+    found = {0: [ImageRays(np.arange(len(device)), nothing, straight, np.broadcast_to(far, device.shape))]}
     for cycle, walls in candidate_rows(search, device, far, depth, host):
         rays = _reflected_rays(facets, cycle, walls, device, far)
         found.setdefault(walls.shape[1], []).append(rays)
     blockers = facets.possible_blockers(np.concatenate([device, far]))
-    visible = [_visible(facets, _joined(p), device, far, blockers, host, front, landmark) for p in found.values()]
+    joined = (ImageRays._make(np.concatenate(part) for part in zip(*parts, strict=True)) for parts in found.values())
+    visible = [_visible(facets, rays, device, far, blockers, host, front, landmark) for rays in joined]
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, depth, terminals)
-
-
-def _joined(parts: list[ImageRays]) -> ImageRays:
-    """Concatenate blocks of legs that have the same number of bounces."""
-    return ImageRays(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def _direct_rays(device: Floats, far: Floats) -> ImageRays:
-    """Straight legs without a bounce, one a cycle, before any visibility test."""
-    cycles = len(device)
-    nothing = np.zeros((cycles, 0), dtype=np.int64)
-    return ImageRays(np.arange(cycles), nothing, np.zeros((cycles, 0, 3)), np.broadcast_to(far, device.shape))
 
 
 def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device: Floats, far: Floats) -> ImageRays:
@@ -97,8 +79,7 @@ def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device
 def _plane_crossing(
     start: Floats, end: Floats, normal: Floats, offset: Floats, tolerance: tuple[float, float]
 ) -> tuple[Booleans, Floats]:
-    """Which segments (N, 3) cross their wall's plane, both ends farther off it than the tolerances [m], and the points
-    (n, 3) where they do."""
+    """Which segments (N, 3) cross their planes, ends farther off than the tolerances [m], and where (n, 3)."""
     a = np.einsum("ni,ni->n", start, normal) - offset
     b = np.einsum("ni,ni->n", end, normal) - offset
     crosses = (a * b < 0.0) & (np.abs(a) > tolerance[0]) & (np.abs(b) > tolerance[1])
@@ -107,15 +88,9 @@ def _plane_crossing(
 
 
 def _visible(
-    facets: WallFacets,
-    rays: ImageRays,
-    device: Floats,
-    far: Floats,
-    blockers: Integers,
-    host: int,
-    front: Floats | None,
-    landmark: int,
-) -> ImageRays:
+    facets: WallFacets, rays: ImageRays, device: Floats, far: Floats, blockers: Integers, host: int,
+    front: Floats | None, landmark: int,
+) -> ImageRays:  # fmt: skip
     """Legs that no wall or occluder hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
@@ -135,13 +110,9 @@ def _visible(
 
 
 def _legs(
-    facets: WallFacets,
-    coatings: Coatings,
-    found: list[ImageRays],
-    device: Floats,
-    depth: int,
+    facets: WallFacets, coatings: Coatings, found: list[ImageRays], device: Floats, depth: int,
     terminals: LegEnds | None,
-) -> SpecularLegs:
+) -> SpecularLegs:  # fmt: skip
     """Arrange legs by cycle and wall sequence (K, S), one column for each sequence that some cycle has."""
     cycles = len(device)
     columns: list[Integers] = []

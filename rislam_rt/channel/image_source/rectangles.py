@@ -78,10 +78,9 @@ def _span(points: Floats, owner: Integers, starts: Integers, direction: Floats) 
 
 
 def _filled(rectangles: Rectangles, corners: Floats, wall: Integers) -> Booleans:
-    """Whether (W,) the triangles (T, 3, 3) of walls (T,) fill their wall's bounding rectangle.
-
-    They do where their areas add up to the rectangle's, and every edge that one triangle has alone lies on its border.
-    """
+    """Whether (W,) the triangles (T, 3, 3) of walls (T,) fill their wall's bounding rectangle."""
+    # They do where their areas add up to the rectangle's, and every edge that one triangle has alone lies on its
+    # border.
     count = len(rectangles.offset)
     sides = np.roll(corners, -1, axis=1) - corners
     area = np.zeros(count)

@@ -7,11 +7,10 @@ import numpy as np
 from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.path_composition import compose_paths
-from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
-from rislam_rt.channel.traced.sequences import wall_sides
+from rislam_rt.channel.traced.sequences import CandidateIndices, in_blocks, wall_sides
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError, expect
@@ -89,10 +88,8 @@ class TracedChannel:
         return rephase(paths, code)
 
     def _trace(self, queries: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
-        """Trace the specular legs of several queries; also whether all possible wall sequences were tried.
-
-        Queries that leave the same occluder out are solved together, block by block.
-        """
+        """Trace the specular legs of several queries; also whether all possible wall sequences were tried."""
+        # Queries that leave the same occluder out are solved together, block by block.
         legs: dict[int, SpecularLegs] = {}
         complete = True
         for spared in dict.fromkeys(query.spared for query in queries):

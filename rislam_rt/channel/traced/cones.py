@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.channel.traced.path_buffer import as_indices
+from rislam_rt.channel.traced.tracer_scene import as_indices
 
 if TYPE_CHECKING:
     from rislam_rt.channel.traced.tracer_scene import TracerScene
@@ -37,8 +37,7 @@ class Cones(NamedTuple):
     """Each device ball with its far ball."""
 
     def lead_on(self, walls: Integers) -> Booleans:
-        """Which wall sequences (N, d) a far end leaves possible: their first wall reaches into the cones over the
-        others."""
+        """Which wall sequences (N, d) a far end leaves possible: the first wall reaches into the others' cones."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
         target, size = _wall_ball(self.tracer_scene, columns[0])
@@ -47,8 +46,7 @@ class Cones(NamedTuple):
         return keep
 
     def reach(self, walls: Integers) -> Booleans:
-        """Which wall sequences (N, d) both ends leave possible: a device ball reaches into the cones of its far
-        ball."""
+        """Which wall sequences (N, d) both ends leave possible: a device ball reaches into its far ball's cones."""
         keep = np.zeros(len(walls), dtype=np.bool_)
         columns = _columns(walls)
         for device, ball in self.device:
@@ -77,8 +75,7 @@ class Cones(NamedTuple):
 
 
 def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Cones:
-    """Group devices (N, 3) [m] and their far ends (N, 3), or the single one (1, 3), into the balls that cones start
-    from."""
+    """Group devices (N, 3) [m] and far ends (N, 3), or the single one (1, 3), into the balls that cones start from."""
     device, far = device - tracer_scene.origin, far - tracer_scene.origin
     cell = (
         NEAR * 2.0 * (tracer_scene.wall_boxes.margin * 1e3 - 1.0)
@@ -120,12 +117,11 @@ def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
 
 
 def _meets(target: Any, axis: Any, size: Any, source: Any, half: Any) -> Any:
-    """Whether rays from a ball about 0 of radius `source` through one at `axis` of radius `half` can meet a third.
-
-    A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the ball
-    of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size - source
-    and b = source + half: a quadratic inequality, its discriminant written without a difference of large numbers.
-    """
+    """Whether rays from a ball about 0 of radius `source` through one at `axis` of radius `half` can meet a third."""
+    # A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the
+    # ball of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size -
+    # source and b = source + half: a quadratic inequality, its discriminant written without a difference of large
+    # numbers.
     a, b = size - source, source + half
     square = dr.squared_norm(axis) - b * b
     room = dr.squared_norm(a * axis + b * target) - dr.squared_norm(dr.cross(target, axis))

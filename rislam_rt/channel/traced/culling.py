@@ -12,9 +12,8 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.path_buffer import as_indices
 from rislam_rt.channel.traced.sequences import NO_WALL
-from rislam_rt.channel.traced.tracer_scene import TracerScene, as_points
+from rislam_rt.channel.traced.tracer_scene import TracerScene, as_indices, as_points
 
 _NO_WALL = NO_WALL % 2**32
 
@@ -25,8 +24,7 @@ BLOCK = 4_000_000
 def cull_candidates(
     tracer_scene: TracerScene, sequences: Integers, device: Floats, far: Floats
 ) -> Iterator[tuple[Integers, Integers]]:
-    """Yield, in blocks, the candidate pairs (device, wall sequence) that survive culling, of all devices (N, 3) [m] and
-    sequences (S, D).
+    """Yield, in blocks, the pairs of devices (N, 3) [m] and wall sequences (S, D) that survive culling.
 
     Far ends (N, 3) go with their devices, a single one (1, 3) with all.
     """
@@ -49,11 +47,9 @@ def cull_candidates(
 
 
 def _near_walls(tracer_scene: TracerScene, walls: list[mi.UInt], device: mi.Point3f, far: mi.Point3f) -> mi.Bool:
-    """Whether each candidate survives culling: its mirror path over `walls` bounces on or near every one of them.
-
-    The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a bounce
-    are that near the plane the bounce may be anywhere along, and stays.
-    """
+    """Whether each candidate survives culling: its mirror path over `walls` bounces on or near every one of them."""
+    # The margin is a thousandth of the room: hundreds of times what float32 leaves uncertain. Where both ends of a
+    # bounce are that near the plane the bounce may be anywhere along, and stays.
     wall_boxes, margin = tracer_scene.wall_boxes, tracer_scene.wall_boxes.margin
     real = [wall != _NO_WALL for wall in walls]
     normal = [dr.gather(mi.Vector3f, wall_boxes.normal, wall, here) for wall, here in zip(walls, real, strict=True)]

@@ -4,9 +4,9 @@ Such paths have no identity that lasts from cycle to cycle and no wall sequence 
 `Paths`: one flat list over the cycles holds them. They are what Sionna's `PathSolver` finds, position by position.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
-from rislam_rt.geometry.angles import unit
-from rislam_rt.model import RadioConfig, Scene, Trajectory
+from rislam_rt.geometry.angles import rotation_z, unit
+from rislam_rt.model import PathKind, Paths, RadioConfig, Scene, Trajectory
 
 
 class DiffuseKind(IntEnum):
@@ -88,17 +88,6 @@ class DiffusePaths:
         return len(self.cycle)
 
 
-class SolvedPaths(NamedTuple):
-    """Scattered and diffracted paths at one position of the agent: `DiffusePaths` without the cycle."""
-
-    kind: Integers
-    tau: Floats
-    departure: Floats
-    arrival: Floats
-    gain: Complexes
-    vertices: Floats
-
-
 def trace_diffuse_paths(
     scene: Scene, radio: RadioConfig, trajectory: Trajectory, config: DiffuseConfig
 ) -> DiffusePaths:
@@ -109,26 +98,28 @@ def trace_diffuse_paths(
     SetupError
         The machine lacks something that the tracer needs.
     """
-    solved = [_nothing(config.depth)]
-    cycles = [np.zeros(0, dtype=np.int64)]
+    none, whole, points = np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    nothing = none.astype(np.complex128)
+    solved = [DiffusePaths(whole, whole, none, points, points, nothing, np.zeros((0, config.depth, 3)))]
     own = any(reflector.material.scattering > 0.0 for reflector in scene.reflectors)
     if config.scattering > 0.0 or config.diffraction or own:
         start_tracer()
         origin = room_center(scene)
         tracer_scene = _scattering_scene(scene, radio.carrier, origin, config.scattering)
         for cycle, (tx, rx) in enumerate(zip(trajectory.tx - origin, trajectory.rx - origin, strict=True)):
-            solved.append(_solve(tracer_scene, tx, rx, origin, config, config.scattering > 0.0 or own))
-            cycles.append(np.full(len(solved[-1].kind), cycle))
-    columns = SolvedPaths(*(np.concatenate(column) for column in zip(*solved, strict=True)))
-    antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * columns.tau)
-    return DiffusePaths(np.concatenate(cycles), **columns._replace(gain=columns.gain * antennas)._asdict())
+            solved += _solve(tracer_scene, cycle, tx, rx, origin, config, config.scattering > 0.0 or own)
+    names = ("cycle", "kind", "tau", "departure", "arrival", "gain", "vertices")
+    columns: list[Any] = [np.concatenate([getattr(one, name) for one in solved]) for name in names]
+    found = DiffusePaths(*columns)
+    antennas = np.sqrt(radio.tx_gain * radio.rx_gain) * np.exp(-2j * np.pi * radio.carrier * found.tau)
+    return replace(found, gain=found.gain * antennas)
 
 
 def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: float) -> Any:
     """Sionna scene of the room with scattering walls; corners of one material are joined, so that edges diffract."""
     import sionna.rt as rt
 
-    from rislam_rt.channel.traced.scattering_materials import rough_material
+    from rislam_rt.channel.traced.radio_materials import rough_material
     from rislam_rt.channel.traced.tracer_scene import build_mesh
 
     tracer_scene = rt.load_scene()
@@ -137,14 +128,12 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
         num_rows=1, num_cols=1, pattern="iso", polarization="V"
     )
     walls, absorber = build_walls(scene), rt.AbsorberRadioMaterial("shade")
+    shades = {f"shade-{one.name}": one.shade for one in scene.scatterers if one.shade is not None}
+    shades |= {f"shade-alone-{index}": shade for index, shade in enumerate(scene.occluders)}
     objects = []
-    for scatterer in scene.scatterers:
-        if scatterer.shade is not None:
-            mesh = build_mesh(f"shade-{scatterer.name}", scatterer.shade.triangles - origin)
-            objects.append(rt.SceneObject(mesh, f"shade-{scatterer.name}", radio_material=absorber))
-    for index, shade in enumerate(scene.occluders):
-        mesh = build_mesh(f"shade-alone-{index}", shade.triangles - origin)
-        objects.append(rt.SceneObject(mesh, f"shade-alone-{index}", radio_material=absorber))
+    for name, shade in shades.items():
+        mesh = build_mesh(name, shade.triangles - origin)
+        objects.append(rt.SceneObject(mesh, name, radio_material=absorber))
     for number, material in enumerate(dict.fromkeys(walls.material)):
         wanted = np.array([m == material for m in walls.material])[walls.wall_of_triangle]
         mesh = build_mesh(f"walls-{number}", walls.triangles[wanted] - origin)
@@ -155,29 +144,20 @@ def _scattering_scene(scene: Scene, carrier: float, origin: Floats, scattering: 
 
 
 def _solve(
-    tracer_scene: Any, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
-) -> SolvedPaths:
-    """Scattered and diffracted paths that Sionna finds between a Tx and an Rx position (3,) [m] relative to
-    `origin`."""
+    tracer_scene: Any, cycle: int, tx: Floats, rx: Floats, origin: Floats, config: DiffuseConfig, diffuse: bool
+) -> list[DiffusePaths]:
+    """Scattered and diffracted paths that Sionna finds in a cycle, if any; Tx and Rx (3,) [m] are from `origin`."""
     import sionna.rt as rt
 
     tracer_scene.get("tx").position, tracer_scene.get("rx").position = tx.tolist(), rx.tolist()
     paths = rt.PathSolver(deterministic=True)(
-        tracer_scene,
-        max_depth=config.depth,
-        max_num_paths_per_src=10 * config.samples,
-        samples_per_src=config.samples,
-        los=False,
-        specular_reflection=True,
-        diffuse_reflection=diffuse,
-        refraction=False,
-        diffraction=config.diffraction,
-        edge_diffraction=config.diffraction,
-        seed=config.seed,
-    )
+        tracer_scene, max_depth=config.depth, max_num_paths_per_src=10 * config.samples, samples_per_src=config.samples,
+        los=False, specular_reflection=True, diffuse_reflection=diffuse, refraction=False,
+        diffraction=config.diffraction, edge_diffraction=config.diffraction, seed=config.seed,
+    )  # fmt: skip
     tau = np.array(paths.tau, dtype=np.float64).reshape(-1)
     if tau.size == 0:
-        return _nothing(config.depth)
+        return []
     events = np.array(paths.interactions, dtype=np.int64).reshape(config.depth, -1)
     diffracted = (events == rt.InteractionType.DIFFRACTION).any(axis=0)
     keep = np.flatnonzero((tau >= 0.0) & (diffracted | (events == rt.InteractionType.DIFFUSE).any(axis=0)))
@@ -188,10 +168,64 @@ def _solve(
     gain = np.empty(len(tau), dtype=np.complex128)
     gain.real, gain.imag = (np.array(part).ravel() for part in paths.a)
     kind = np.where(diffracted, DiffuseKind.DIFFRACTED, DiffuseKind.DIFFUSE)
-    return SolvedPaths(kind[keep], tau[keep], unit(first - origin - tx), unit(last - origin - rx), gain[keep], vertices)
+    away, back = unit(first - origin - tx), unit(last - origin - rx)
+    return [DiffusePaths(np.full(len(keep), cycle), kind[keep], tau[keep], away, back, gain[keep], vertices)]
 
 
-def _nothing(depth: int) -> SolvedPaths:
-    """An empty set of diffuse paths."""
-    none, points = np.zeros(0), np.zeros((0, 3))
-    return SolvedPaths(none.astype(np.int64), none, points, points, none.astype(np.complex128), np.zeros((0, depth, 3)))
+CELLS = 2.0
+"""Summing cells to a resolution cell, along delay and along each direction cosine."""
+
+
+def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> Paths:
+    """Sum scattered and diffracted paths within half a resolution cell into one path each, cycle by cycle.
+
+    These paths have no identity: a column means nothing from one cycle to the next.
+
+    Gains add up, carrier phases included; delay and directions are the mean by power. The kind is `VT`, for want of
+    another: they came over walls alone.
+    """
+    groups, cycle = _cells(extras, trajectory, radio)
+    count, cycles = len(cycle), len(trajectory)
+    power = np.abs(extras.gain) ** 2
+    total = np.maximum(np.bincount(groups, power, count), np.finfo(np.float64).tiny)
+    gain = np.bincount(groups, extras.gain.real, count) + 1j * np.bincount(groups, extras.gain.imag, count)
+
+    def mean(values: Floats) -> Floats:
+        return np.bincount(groups, power * values, count) / total
+
+    first = np.searchsorted(cycle, np.arange(cycles))
+    column = np.arange(count) - first[cycle]
+    width = int(column.max(initial=-1)) + 1
+
+    def dense(values: np.ndarray) -> np.ndarray:
+        table = np.zeros((cycles, width, *values.shape[1:]), dtype=values.dtype)
+        table[cycle, column] = values
+        return table
+
+    return Paths(
+        kind=np.full(width, PathKind.VT),
+        landmark=np.full(width, -1),
+        tx_walls=np.full((width, 1), -1),
+        rx_walls=np.full((width, 1), -1),
+        valid=dense(np.ones(count, dtype=np.bool_)),
+        tau=dense(mean(extras.tau)),
+        departure=dense(unit(np.stack([mean(axis) for axis in extras.departure.T], axis=-1))),
+        arrival=dense(unit(np.stack([mean(axis) for axis in extras.arrival.T], axis=-1))),
+        gain=dense(gain),
+        vertices=dense(np.stack([mean(axis) for axis in extras.vertices[:, 0].T], axis=-1)[:, None]),
+        num_vertices=np.ones(width, dtype=np.int64),
+        walls=(),
+        landmarks=(),
+        source=extras.source,
+    )
+
+
+def _cells(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> tuple[Integers, Integers]:
+    """Number (N,) of the cell of delay and angle of each diffuse path, and each cell's cycle (C,), ascending."""
+    array = radio.array
+    body = np.einsum("ni,nij->nj", extras.arrival, rotation_z(trajectory.heading[extras.cycle]))
+    widths = CELLS * np.array([radio.bandwidth, array.rows * array.spacing, array.cols * array.spacing])
+    place = np.column_stack([extras.tau, body[:, :2]]) * widths
+    keys = np.column_stack([extras.cycle, np.floor(place).astype(np.int64), body[:, 2] >= 0.0])
+    cells, groups = np.unique(keys, axis=0, return_inverse=True)
+    return groups.ravel(), cells[:, 0]

@@ -17,8 +17,8 @@ from sionna.rt.utils import spectrum_to_matrix_4f
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.traced.leg_query import LegEndpoints
-from rislam_rt.channel.traced.material import ConstantReflection
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
+from rislam_rt.channel.traced.radio_materials import ConstantReflection
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene
 from rislam_rt.channel.walls import Walls
@@ -30,13 +30,9 @@ then 0, for all segments of a leg alike."""
 
 
 def leg_coefficients(
-    tracer_scene: TracerScene,
-    walls: Walls,
-    sequences: Integers,
-    ends: LegEndpoints,
-    geometry: PathGeometry,
+    tracer_scene: TracerScene, walls: Walls, sequences: Integers, ends: LegEndpoints, geometry: PathGeometry,
     antennas: Antennas,
-) -> Complexes:
+) -> Complexes:  # fmt: skip
     """Field coefficient (N,) of legs over wall sequences (N, D), from reflections and antenna patterns, without
     spreading loss and carrier phase.
 
@@ -62,10 +58,8 @@ def leg_coefficients(
 
 def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -> Complexes:
     """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of a reflection between the (theta, phi) bases of rays (N, 3)
-    before and after.
-
-    A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
-    """
+    before and after."""
+    # A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
     if isinstance(material, ConstantReflection):
         return incidence_jones(material, np.ones(1))
     along = np.vecdot(incident, normal)
@@ -116,8 +110,7 @@ def _azimuth(direction: Floats) -> Floats:
 
 
 def _turn(basis: tuple[Floats, Floats], across: Floats) -> Floats:
-    """Matrices (N, 2, 2) that turn fields: components along theta_hat and phi_hat to those along s = `across` (N, 3)
-    and k x s."""
+    """Matrices (N, 2, 2) that turn fields along theta_hat and phi_hat to those along s = `across` (N, 3) and k x s."""
     c, s = (np.vecdot(vector, across) for vector in basis)
     return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
 

@@ -7,7 +7,6 @@ from rislam_rt.model import Scene
 SEGMENT_LIMIT = 1e-5
 """[m] Shortest path segment that Sionna RT is told to keep, instead of its own 1 cm, which loses double bounces near a
 corner; below `shortest_segment` the rays' offsets take over anyway."""
-
 LIFT = 2e-6
 """[m] Distance in front of its host wall at which a panel's centre is traced, so that the float32 rounding of the
 wall's mesh cannot hide it."""

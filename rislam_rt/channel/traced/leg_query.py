@@ -9,10 +9,9 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.legs import SpecularLegs
-from rislam_rt.channel.traced.candidate_indices import CandidateIndices, join_indices
 from rislam_rt.channel.traced.float32_limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
-from rislam_rt.channel.traced.sequences import point_sides, possible_sequences
+from rislam_rt.channel.traced.sequences import CandidateIndices, join_indices, point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 
@@ -111,13 +110,10 @@ class QueryBatch(NamedTuple):
         sizes = [len(query.device) for query in self.queries]
         far = np.concatenate([query.far for query in self.queries])
         heading = np.concatenate([query.heading for query in self.queries])
-        from_rx, to_rx = (np.repeat(np.array(flag, dtype=np.bool_), sizes) for flag in self._flags())
+        from_rx = np.repeat([query.from_rx for query in self.queries], sizes)
+        to_rx = np.repeat([query.to_rx for query in self.queries], sizes)
         device = rows.device
         return LegEndpoints(self.device[device], far[rows.far], heading[device], from_rx[device], to_rx[device])
-
-    def _flags(self) -> tuple[list[bool], list[bool]]:
-        """Which queries start at the Rx, and which end there."""
-        return [query.from_rx for query in self.queries], [query.to_rx for query in self.queries]
 
     def legs(self, found: FoundLegs) -> list[SpecularLegs]:
         """Split the legs that the tracer found by query."""
@@ -187,11 +183,7 @@ def _as_legs(
         return values
 
     return SpecularLegs(
-        walls=sequences[columns],
-        valid=dense(np.ones(len(device), dtype=np.bool_)),
-        length=dense(geometry.length),
-        at_device=dense(geometry.at_device),
-        at_far_end=dense(geometry.at_far_end),
-        coefficient=dense(found.coefficient),
-        vertices=dense(geometry.vertices),
-    )
+        walls=sequences[columns], valid=dense(np.ones(len(device), dtype=np.bool_)), length=dense(geometry.length),
+        at_device=dense(geometry.at_device), at_far_end=dense(geometry.at_far_end),
+        coefficient=dense(found.coefficient), vertices=dense(geometry.vertices),
+    )  # fmt: skip

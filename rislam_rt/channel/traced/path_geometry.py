@@ -28,8 +28,7 @@ class PathGeometry(NamedTuple):
 
 
 def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Floats) -> PathGeometry:
-    """Geometry of legs between devices and far ends (N, 3) [m] over wall sequences (N, D), in float64 on the walls'
-    planes.
+    """Geometry of legs from devices to far ends (N, 3) [m] over wall sequences (N, D), in float64 on the planes.
 
     The far end is mirrored in the walls from its own end on; the straight line from the device to the last image meets
     the first wall, the one from there to the image before meets the second, and so on.
@@ -55,8 +54,7 @@ def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Flo
 
 
 def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> Floats:
-    """Unit vectors (N, D + 1, 3) of travel along each segment of legs that leave along `at_device` (N, 3), the last
-    repeated."""
+    """Unit vectors (N, D + 1, 3) of travel along each segment of legs that begin along (N, 3), the last repeated."""
     travel = [at_device]
     for wall in sequences.T:
         travel.append(

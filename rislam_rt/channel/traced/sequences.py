@@ -1,12 +1,12 @@
-"""Wall sequences that the tracer tries: all that the positions of walls and ends leave possible.
+"""Wall sequences that the tracer tries, all that the positions of walls and ends leave possible, and their indices.
 
 A reflection needs both its neighbours (a wall, or an end of the leg) on the same side of its plane. What that rules
 out is not asked; everything else is, for every position, so no path depends on where rays happen to be shot. Where
 that would be too many, cones from both ends (`cones.py`) rule out more, and nothing that exists.
 """
 
-from collections.abc import Callable, Iterator
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -17,19 +17,14 @@ from rislam_rt.errors import ConfigError
 
 FRONT, BACK = 1, 2
 """Sides of a plane, as bits: a wall may have parts on both."""
-
 NO_WALL = -1
 """Padding of wall sequences."""
-
 MANY = 100_000
 """Number of wall sequences of one bounce count up to which all are tried at every position, without cones."""
-
 MOST_LOOKS = 2_000_000_000
 """Largest number of wall sequences of one bounce count that may be tested: some minutes."""
-
 MOST_SEQUENCES = 10_000_000
 """Largest number of wall sequences that may be left for tracing."""
-
 _BLOCK = 4_000_000
 """Largest number of entries of a temporary table."""
 
@@ -66,13 +61,9 @@ class Narrowing(Protocol):
 
 
 def possible_sequences(
-    sides: Integers,
-    device: Integers,
-    far: Integers,
-    depth: int,
-    barred: Booleans | None = None,
+    sides: Integers, device: Integers, far: Integers, depth: int, barred: Booleans | None = None,
     narrowing: Callable[[], Narrowing] | None = None,
-) -> tuple[Integers, bool]:
+) -> tuple[Integers, bool]:  # fmt: skip
     """Wall sequences (S, depth) of up to `depth` bounces, from device to far end, padded with `NO_WALL`.
 
     Also whether these are all that sides allow (else they have been narrowed).
@@ -142,10 +133,8 @@ def turned_round(sequences: Integers) -> Integers:
 
 
 def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> Iterator[tuple[Integers, Integers]]:
-    """Put every possible wall in front of wall sequences (S, d), block by block.
-
-    `onward` (S,) are the side bits of their first wall on which the ray goes on; the longer ones come with theirs.
-    """
+    """Put every possible wall in front of wall sequences (S, d), block by block."""
+    # `onward` (S,) are the side bits of their first wall on which the ray goes on; the longer ones come with theirs.
     for rows in _blocks(len(level), len(sides)):
         first = level[rows, 0]
         row, wall = np.nonzero(((sides[first] & onward[rows, None]) > 0) & (sides[:, first].T > 0))
@@ -157,3 +146,33 @@ def _blocks(count: int, width: int) -> Iterator[slice]:
     step = max(1, _BLOCK // max(width, 1))
     for start in range(0, count, step):
         yield slice(start, min(start + step, count))
+
+
+class CandidateIndices(NamedTuple):
+    """N candidates or legs, as indices into tables of far ends, devices and sequences, (N,) each."""
+
+    far: Integers
+    device: Integers
+    sequence: Integers
+
+    def only(self, keep: Integers | slice) -> "CandidateIndices":
+        """Select candidates by row."""
+        return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
+
+
+def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
+    """Yield candidates regrouped into blocks of `size` rows, the last one shorter."""
+    waiting: list[CandidateIndices] = []
+    for part in parts:
+        waiting.append(part)
+        while (count := sum(len(rows.far) for rows in waiting)) >= size:
+            together = join_indices(waiting)
+            yield together.only(slice(0, size))
+            waiting = [together.only(slice(size, count))]
+    if waiting:
+        yield join_indices(waiting)
+
+
+def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
+    """Concatenate candidates of several parts."""
+    return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -10,14 +10,12 @@ import sionna.rt as rt
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
-from rislam_rt.channel.traced.material import ConstantReflection
-from rislam_rt.channel.traced.scattering_materials import PolarisedReflection, slab_material
+from rislam_rt.channel.traced.radio_materials import specular_material
 from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import inside_any
-from rislam_rt.model import Material
 
 NO_OCCLUDER = -1
 """Key of `TracerScene.views` for the room with all its occluders."""
@@ -121,7 +119,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: 
     scene = rt.load_scene()
     scene.frequency = carrier
     materials = list(dict.fromkeys(walls.material))
-    radio_materials = tuple(_material(material, m) for m, material in enumerate(materials))
+    radio_materials = tuple(specular_material(material, m) for m, material in enumerate(materials))
     material_of_wall = np.array([materials.index(m) for m in walls.material], dtype=np.int64)
     members = [np.flatnonzero(material_of_wall[walls.wall_of_triangle] == m) for m in range(len(materials))]
     objects = [
@@ -151,15 +149,10 @@ def _part(objects: list[rt.SceneObject]) -> mi.Scene:
 
 
 def _numbered(
-    scene: rt.Scene,
-    origin: Floats,
-    walls: Walls,
-    ids: Integers,
-    members: list[Integers],
-    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers],
-    views: dict[int, mi.Scene],
+    scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, members: list[Integers],
+    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers], views: dict[int, mi.Scene],
     occluders: dict[int, mi.Scene],
-) -> TracerScene:
+) -> TracerScene:  # fmt: skip
     """Assemble the tracer's scene: number the triangles of all shapes (M,) by wall, and find each wall's largest."""
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
@@ -168,25 +161,11 @@ def _numbered(
     place = np.argsort(rows)
     shape_of = np.repeat(ids[order], sizes)[place]
     primitive_of = (np.arange(len(rows)) - np.repeat(first, sizes))[place]
-    edge = walls.triangles[:, 1:] - walls.triangles[:, :1]
-    area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1)
-    by_size = np.lexsort((-area, walls.wall_of_triangle))
-    largest = by_size[np.unique(walls.wall_of_triangle[by_size], return_index=True)[1]]
+    largest, _ = walls.largest_triangles()
     return TracerScene(
-        scene,
-        walls,
-        origin,
-        shape_of[largest],
-        primitive_of[largest],
-        walls.triangles[largest, 0] - origin,
-        ids[order],
-        first,
-        walls.wall_of_triangle[rows],
-        *materials,
-        _wall_boxes(walls, origin),
-        views,
-        occluders,
-    )
+        scene, walls, origin, shape_of[largest], primitive_of[largest], walls.triangles[largest, 0] - origin,
+        ids[order], first, walls.wall_of_triangle[rows], *materials, _wall_boxes(walls, origin), views, occluders,
+    )  # fmt: skip
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
@@ -197,17 +176,19 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
     margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
     offset = mi.Float((walls.offset - walls.normal @ origin).astype(np.float32))
     return WallBoxes(
-        mi.Vector3f(as_points(walls.normal)),
-        offset,
-        as_points(0.5 * (low + high)),
-        mi.Vector3f(as_points(0.5 * (high - low))),
-        margin,
-    )
+        mi.Vector3f(as_points(walls.normal)), offset, as_points(0.5 * (low + high)),
+        mi.Vector3f(as_points(0.5 * (high - low))), margin,
+    )  # fmt: skip
 
 
 def as_points(points: Floats) -> mi.Point3f:
     """Convert positions (N, 3) [m] to float32 points of the tracer's backend."""
     return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
+
+
+def as_indices(values: Integers) -> mi.UInt:
+    """Convert numbers (N,) to unsigned integers of the tracer's backend."""
+    return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
 
 
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
@@ -221,19 +202,3 @@ def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
     params["faces"] = mi.UInt(np.arange(3 * len(triangles), dtype=np.uint32))
     params.update()
     return mesh
-
-
-def _material(material: Material, number: int) -> rt.RadioMaterialBase:
-    """Sionna radio material of a specular wall: constant R, constant TE and TM, or a slab by permittivity or ITU."""
-    if material.reflection is not None:
-        return ConstantReflection(f"constant-{number}", material.reflection * material.specular_share)
-    if material.reflection_te is not None:
-        return PolarisedReflection(f"polarised-{number}", material, material.scattering)
-    if material.permittivity is not None:
-        return slab_material(f"slab-{number}", material, material.scattering)
-    try:
-        return rt.ITURadioMaterial(
-            f"itu-{number}", material.itu, material.thickness, scattering_coefficient=material.scattering
-        )
-    except ValueError as error:
-        raise SceneError(f"material.itu: '{material.itu}' received; {error}") from None

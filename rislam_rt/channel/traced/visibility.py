@@ -13,17 +13,16 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import sionna.rt as rt
 from sionna.rt.path_solvers import image_method
 from sionna.rt.path_solvers.image_method import ImageMethod
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.candidate_indices import CandidateIndices
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
-from rislam_rt.channel.traced.path_buffer import fill_buffer, read_vertices, turned_vertices
-from rislam_rt.channel.traced.sequences import NO_WALL, turned_round
-from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_points
+from rislam_rt.channel.traced.sequences import NO_WALL, CandidateIndices, turned_round
+from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_points
 
 
 class SingleRays:
@@ -45,13 +44,9 @@ class SingleRays:
 
 
 def visible_rows(
-    tracer_scene: TracerScene,
-    sequences: Integers,
-    far: Floats,
-    device: Floats,
-    rows: CandidateIndices,
+    tracer_scene: TracerScene, sequences: Integers, far: Floats, device: Floats, rows: CandidateIndices,
     spared: int = NO_OCCLUDER,
-) -> tuple[CandidateIndices, Floats]:
+) -> tuple[CandidateIndices, Floats]:  # fmt: skip
     """Candidates for legs that the tracer finds visible, and their bounce points (N, D, 3) [m] from device to far end.
 
     Parameters
@@ -82,8 +77,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Rows of the visible legs whose segments up to the last bounce miss the occluding mesh of the scatterer at their
-    end."""
+    """Rows of visible legs whose segments to the last bounce miss the occluding mesh of the scatterer at their end."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
@@ -95,32 +89,21 @@ def _clear_of_occluder(
 
 
 def _trace(
-    tracer_scene: TracerScene,
-    candidates: Integers,
-    far: mi.Point3f,
-    device: mi.Point3f,
-    rows: CandidateIndices,
-    method: ImageMethod,
-    spared: int,
-) -> PathsBuffer:
+    tracer_scene: TracerScene, candidates: Integers, far: mi.Point3f, device: mi.Point3f, rows: CandidateIndices,
+    method: ImageMethod, spared: int,
+) -> PathsBuffer:  # fmt: skip
     """Run the tracer's image method on candidate wall sequences (N, D), in the room without the occluder `spared`."""
     with _short_segments():
         return method(
-            scene=SingleRays(tracer_scene.views[spared]),
-            paths=fill_buffer(tracer_scene, candidates, rows),
-            diffraction=False,
-            diffraction_lit_region=False,
-            src_positions=far,
-            tgt_positions=device,
-        )
+            scene=SingleRays(tracer_scene.views[spared]), paths=fill_buffer(tracer_scene, candidates, rows),
+            diffraction=False, diffraction_lit_region=False, src_positions=far, tgt_positions=device,
+        )  # fmt: skip
 
 
 def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
-    """Rows of the candidates that the tracer found visible with every bounce on the wall asked for.
-
-    The image method also accepts a hit on another wall in the same plane; that is another path's business. Where walls
-    lie on each other the ray meets any of them, and the one on top reflects.
-    """
+    """Rows of the candidates that the tracer found visible with every bounce on the wall asked for."""
+    # The image method also accepts a hit on another wall in the same plane; that is another path's business. Where
+    # walls lie on each other the ray meets any of them, and the one on top reflects.
     valid = np.array(traced.valid, dtype=np.bool_)
     wanted = turned_round(sequences)
     depth = wanted.shape[1]
@@ -144,3 +127,38 @@ def _short_segments() -> Iterator[None]:
         yield
     finally:
         image_method.MIN_SEGMENT_LENGTH = own
+
+
+def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices) -> PathsBuffer:
+    """Fill Sionna's path buffer with candidates, from far ends to devices over wall sequences (N, D), in reverse.
+
+    Its vertices are any point of each wall's plane, which the image method needs, from the tracer scene's origin.
+    """
+    count, depth = sequences.shape
+    buffer = PathsBuffer(count, max(depth, 1), False)  # at depth 0 the image method counts down from 0 without end
+    walls = turned_round(sequences)
+    for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(tracer_scene.corner[walls], 1, 0), strict=True)):
+        real = wall != NO_WALL
+        event = np.where(real, rt.InteractionType.SPECULAR, rt.InteractionType.NONE)
+        at, here = dr.full(mi.UInt, column + 1, count), mi.Bool(real)
+        buffer.set_interaction_type(at, as_indices(event), mi.Bool(True))
+        buffer.set_shape(at, as_indices(tracer_scene.shape[wall]), here)
+        buffer.set_primitive(at, as_indices(tracer_scene.primitive[wall]), here)
+        buffer.set_vertex(at, as_points(point), here)
+        buffer.set_prob(at, mi.Float(1.0), here)
+    buffer._src_indices = as_indices(rows.far)
+    buffer._tgt_indices = as_indices(rows.device)
+    return buffer
+
+
+def read_vertices(tracer_scene: TracerScene, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
+    """Bounce points (N, D, 3) [m] read from the tracer's buffer for the paths `keep`, from device to far end."""
+    columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
+    return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + tracer_scene.origin, sequences)
+
+
+def turned_vertices(vertices: Floats, sequences: Integers) -> Floats:
+    """Bounce points (N, D, 3) of the tracer's buffer in opposite order, zero where there is no wall."""
+    index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
+    turned = np.take_along_axis(vertices, np.maximum(index, 0)[..., None], axis=1)
+    return np.where((index >= 0)[..., None], turned, 0.0)

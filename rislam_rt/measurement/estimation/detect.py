@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers, phasor
-from rislam_rt.measurement.estimation.sounding import Sounding
+from rislam_rt.measurement.estimation.path_signals import Sounding
 
 OVERSAMPLING = 2
 """Grid points per resolution cell of the delay."""
@@ -66,13 +66,9 @@ def _delay_spectrum(grid: MatchedFilterGrid, beams: Complexes) -> Complexes:
 
 
 def pick_peaks(
-    sounding: Sounding,
-    grid: MatchedFilterGrid,
-    residual: Complexes,
-    threshold: float,
-    window: tuple[float, float],
+    sounding: Sounding, grid: MatchedFilterGrid, residual: Complexes, threshold: float, window: tuple[float, float],
     most: int,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """Detect paths (P, 3) as peaks of the matched filter on a residual, of a measured SNR above a linear threshold.
 
     The strongest first; each is interpolated and subtracted before the next is looked for.
@@ -103,10 +99,8 @@ def pick_peaks(
 def _climb(
     grid: MatchedFilterGrid, start: Floats, residual: Complexes, window: tuple[float, float]
 ) -> tuple[Floats, complex, Complexes, Complexes]:
-    """Interpolate a peak of the matched filter from its grid point (3,), by Newton steps along each parameter.
-
-    Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
-    """
+    """Interpolate a peak of the matched filter from its grid point (3,), by Newton steps along each parameter."""
+    # Also returns `a^H y` there, and the signal's factors over antennas (L,) and tones (M,).
     point = start
     for _ in range(CLIMB_STEPS):
         moves = _newton_moves(_moments(grid, _signals(grid, point), residual), grid)

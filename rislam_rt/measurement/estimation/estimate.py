@@ -12,6 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, into_range, pick_peaks
+from rislam_rt.measurement.estimation.path_signals import Sounding
 from rislam_rt.measurement.estimation.refine import (
     Accuracy,
     LeastSquaresFit,
@@ -26,7 +27,6 @@ from rislam_rt.measurement.estimation.refine import (
     subset_fit,
     without_idle,
 )
-from rislam_rt.measurement.estimation.sounding import Sounding
 
 BATCH = 16
 """Largest number of paths that are added between two refinements."""
@@ -61,20 +61,15 @@ class Estimate(NamedTuple):
 
 
 def estimate_paths(
-    sounding: Sounding,
-    grid: MatchedFilterGrid,
-    samples: Complexes,
-    threshold: float,
-    window: tuple[float, float],
-    most: int,
-    known: Floats = NOTHING,
-) -> Estimate:
+    sounding: Sounding, grid: MatchedFilterGrid, samples: Complexes, threshold: float, window: tuple[float, float],
+    most: int, known: Floats = NOTHING,
+) -> Estimate:  # fmt: skip
     """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, and repeat.
 
     Parameters
     ----------
     threshold
-        On the measured SNR `L M |alpha|^2` of a path, linear; see `false_alarms` for the rate that it stands for.
+        On the measured SNR `L M |alpha|^2` of a path, linear; see `sensor_model` for the rate that it stands for.
     window
         First and last delay, in resolution cells.
     most
@@ -95,7 +90,10 @@ def estimate_paths(
         grown = fit_amplitudes(sounding, np.concatenate([fit.parameters, fresh]), samples)
         # From nothing, every round moves all paths; where most were known, only those that a new one touches.
         local = _touched(grown, len(fresh), samples.size) if len(known) else np.ones(len(grown.parameters), dtype=bool)
-        grown = _refine_some(sounding, grown, samples, local)
+        if local.all():
+            grown = refine(sounding, grown, samples, steps=SEARCH_STEPS)
+        else:
+            grown = refine_some(sounding, grown, samples, np.flatnonzero(local), steps=SEARCH_STEPS)
         grown = drop(sounding, grown, samples, threshold, window)
         if grown.cost >= fit.cost - threshold:
             break
@@ -121,18 +119,10 @@ def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
     return touched
 
 
-def _refine_some(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, chosen: Booleans) -> LeastSquaresFit:
-    """Refine the chosen paths (P,) of a fit for the next search round, the others held."""
-    if chosen.all():
-        return refine(sounding, fit, samples, steps=SEARCH_STEPS)
-    return refine_some(sounding, fit, samples, np.flatnonzero(chosen), steps=SEARCH_STEPS)
-
-
 def drop(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> LeastSquaresFit:
-    """Drop paths of a fit that left the delay window or the unit disc, or without which the cost grows by less than the
-    threshold."""
+    """Drop paths of a fit that left the window or the unit disc, or that lower the cost by less than the threshold."""
     keep = np.all(np.abs(fit.parameters - into_range(fit.parameters, window)) <= SLACK, axis=-1)
     if not keep.all():
         fit = subset_fit(sounding, fit, keep, samples)
@@ -165,8 +155,7 @@ def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshol
 def _neighbours_instead(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
 ) -> Floats | None:
-    """Parameters (P - 1, 3) of a fit without one path, its neighbours refined; None if the cost is not below
-    `enough`."""
+    """Parameters (P - 1, 3) of a fit without one path, neighbours refined; None if the cost is not below `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
     whole, local = residual_fit(sounding, fit, near, samples)
     others = near != row

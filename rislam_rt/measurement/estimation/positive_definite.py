@@ -39,8 +39,7 @@ def whitened(matrix: Floats, right: Floats) -> Floats:
 
 
 def _factor(matrix: Floats) -> tuple[Floats, Floats]:
-    """Scale (n,) to unit diagonal and lower Cholesky factor of the scaled matrix, with a ridge that grows until it
-    exists."""
+    """Scale (n,) to unit diagonal and lower Cholesky factor of the scaled matrix, with as large a ridge as it takes."""
     scale, ridge = 1.0 / np.sqrt(np.maximum(np.diagonal(matrix), np.finfo(np.float64).tiny)), RIDGE
     while True:
         scaled = matrix * scale

@@ -11,10 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.measurement.estimation.inner_products import InnerProducts, PathSignals, inner_of, waves_at
+from rislam_rt.measurement.estimation.path_signals import (
+    InnerProducts,
+    PathSignals,
+    Sounding,
+    correlate_waves,
+    inner_of,
+    wave_signals,
+    waves_at,
+)
 from rislam_rt.measurement.estimation.positive_definite import RIDGE, inverse, solve, whitened
-from rislam_rt.measurement.estimation.sounding import Sounding
-from rislam_rt.measurement.estimation.spherical_waves import correlate_waves, wave_signals
 
 PRIOR = np.array([0.0, 2.0, 2.0])
 """Half the information that lying in the unit disc gives on a cosine (standard deviation 0.5): it matters only along an
@@ -83,8 +89,7 @@ def fit_amplitudes(sounding: Sounding, parameters: Floats, samples: Complexes) -
 
 
 def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: float) -> LeastSquaresFit:
-    """Least-squares fit of amplitudes from the correlations (4, P) of signals and derivatives with samples of this
-    energy."""
+    """Least-squares amplitudes from the correlations (4, P) of signals and derivatives with samples of this energy."""
     count, matched = len(waves.parameters), seen[0]
     covariance = inverse(inner.signal)
     amplitude = _times(covariance, matched)
@@ -150,14 +155,9 @@ def contribution(fit: LeastSquaresFit, rows: Integers | Booleans, samples: Compl
 
 
 def refine(
-    sounding: Sounding,
-    fit: LeastSquaresFit,
-    samples: Complexes,
-    *,
-    steps: int,
-    tolerance: float = SEARCH_TOLERANCE,
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, *, steps: int, tolerance: float = SEARCH_TOLERANCE,
     enough: float = 0.0,
-) -> LeastSquaresFit:
+) -> LeastSquaresFit:  # fmt: skip
     """Refine path parameters by up to `steps` damped Gauss-Newton steps.
 
     They end when one promises less than `tolerance` of noise energy from every path; with `enough`, also when the cost
@@ -180,10 +180,13 @@ def refine(
             if not restless.any():
                 return fit
             if len(restless) > FEW:
-                rows = _along(sounding, fit, restless)
+                overlap = np.abs(fit.inner.signal[:, restless]) > OVERLAP * sounding.num_samples
+                rows = np.flatnonzero(overlap.any(axis=1))
                 if len(rows) < WORTHWHILE * len(restless):
                     return refine_some(sounding, fit, samples, rows, steps=left, tolerance=tolerance)
-            trial = fit_amplitudes(sounding, fit.parameters + _limited(step), samples)
+            trial = fit_amplitudes(
+                sounding, fit.parameters + np.clip(step.reshape(3, -1).T, -LARGEST_STEP, LARGEST_STEP), samples
+            )
             if trial.cost < fit.cost:
                 gained = fit.cost - trial.cost
                 fit, damping = trial, max(0.1 * damping, LEAST_DAMPING)
@@ -195,14 +198,9 @@ def refine(
 
 
 def refine_some(
-    sounding: Sounding,
-    fit: LeastSquaresFit,
-    samples: Complexes,
-    rows: Integers,
-    *,
-    steps: int,
+    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, rows: Integers, *, steps: int,
     tolerance: float = SEARCH_TOLERANCE,
-) -> LeastSquaresFit:
+) -> LeastSquaresFit:  # fmt: skip
     """Refine the parameters of some paths by Gauss-Newton steps, the other paths held."""
     begun, local = residual_fit(sounding, fit, rows, samples)
     some = refine(sounding, begun, local, steps=steps, tolerance=tolerance)
@@ -211,14 +209,8 @@ def refine_some(
     return fit_amplitudes(sounding, parameters, samples)
 
 
-def _along(sounding: Sounding, fit: LeastSquaresFit, chosen: Booleans) -> Integers:
-    """Rows of the paths whose signals overlap with those of chosen ones (P,), these included."""
-    return np.flatnonzero((np.abs(fit.inner.signal[:, chosen]) > OVERLAP * sounding.num_samples).any(axis=1))
-
-
 def accuracy(fit: LeastSquaresFit) -> Accuracy:
-    """Standard deviations of a fit's parameters and amplitudes by their joint bound; enormous where paths cannot be
-    resolved."""
+    """Standard deviations of a fit's parameters and amplitudes by their joint bound; enormous where not resolved."""
     information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
     deviations = np.sqrt((whitened(information, np.eye(len(information))) ** 2).sum(axis=0)).reshape(3, -1).T
     return Accuracy(deviations, np.sqrt(amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)))
@@ -245,8 +237,7 @@ def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes
 
 
 def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
-    """Which paths (P,) to keep when those are dropped, one by one, without which the cost grows by less than the
-    threshold.
+    """Which paths (P,) to keep when those are dropped, one by one, that lower the cost by less than the threshold.
 
     The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
     """
@@ -277,8 +268,3 @@ def information_matrix(inner: InnerProducts, covariance: Floats, amplitude: Comp
     information = shared.reshape(3 * count, 3 * count)
     information.flat[:: 3 * count + 1] += np.repeat(PRIOR, count)
     return information
-
-
-def _limited(step: Floats) -> Floats:
-    """Clip a Gauss-Newton step (3P,) to `LARGEST_STEP` for each path (P, 3)."""
-    return np.clip(step.reshape(3, -1).T, -LARGEST_STEP, LARGEST_STEP)

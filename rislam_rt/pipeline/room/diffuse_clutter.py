@@ -33,8 +33,7 @@ def trace_diffuse_clutter(
     """
     if not section.wanted:
         return None
-    from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, trace_diffuse_paths
-    from rislam_rt.channel.traced.resolution_cells import as_paths
+    from rislam_rt.channel.traced.diffuse_paths import DiffuseConfig, as_paths, trace_diffuse_paths
 
     if not section.diffuse:
         smooth = [replace(r, material=replace(r.material, scattering=0.0)) for r in scene.reflectors]

@@ -13,16 +13,6 @@ from rislam_rt.slam.classify.network import (
 from rislam_rt.slam.classify.sighting_features import FEATURES, Sightings, fit_motion, track_features
 
 __all__ = [
-    "FEATURES",
-    "Network",
-    "Sightings",
-    "blend",
-    "classify",
-    "classify_geometric",
-    "fit_motion",
-    "load_classifier",
-    "log_odds",
-    "network_arrays",
-    "read_network",
-    "track_features",
-]
+    "FEATURES", "Network", "Sightings", "blend", "classify", "classify_geometric", "fit_motion", "load_classifier",
+    "log_odds", "network_arrays", "read_network", "track_features",
+]  # fmt: skip

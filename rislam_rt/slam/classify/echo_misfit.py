@@ -30,8 +30,7 @@ class Echo(NamedTuple):
 
 
 def echo_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats) -> Echo:
-    """Misfit of each of T tracks to the double bounce (echo) over the best two walls whose own returns are other
-    tracks.
+    """Misfit of each of T tracks to the double bounce (echo) over the best two walls that other tracks show.
 
     `seen` (T, 3): length [m] and two cosines in the room's axes; `strength` (T,): log amplitude over that of free
     space of the same length; `offset` (3,) [m]: from Rx to Tx, in the room's axes.

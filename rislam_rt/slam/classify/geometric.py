@@ -7,8 +7,7 @@ A corner of two walls at right angles moves as a point does, and is taken for on
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.slam.classify.sighting_features import FEATURES
-from rislam_rt.slam.classify.stillness import stillness
+from rislam_rt.slam.classify.sighting_features import FEATURES, stillness
 
 TURN, TURN_STD = FEATURES.index("turn"), FEATURES.index("turn_std")
 """Columns of `track_features` that hold the turn and the logarithm of its deviation."""

@@ -126,13 +126,8 @@ def _predict(
     # what would come from below the horizon is not heard
     uncertainty = np.where(image[:, rx, 2] < -COSINE_FLOOR * to_rx[:, rx], FAR, uncertainty)
     walls = np.concatenate([mirrors.walls[rx], mirrors.walls[tx]], axis=1)
-    parents = np.concatenate(
-        [
-            np.broadcast_to(points[:, None, None], (*total.shape, 1)),
-            np.broadcast_to(walls, (len(points), *walls.shape)),
-        ],
-        axis=2,
-    )
+    own = np.broadcast_to(points[:, None, None], (*total.shape, 1))
+    parents = np.concatenate([own, np.broadcast_to(walls, (len(points), *walls.shape))], axis=2)
     place = np.concatenate([total[..., None], cosines], axis=2)
     return place.reshape(-1, 3), level.ravel(), uncertainty.ravel(), parents.reshape(-1, 5)
 

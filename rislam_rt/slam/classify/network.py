@@ -16,7 +16,6 @@ NUM_LAYERS = 3
 """Number of the network's layers."""
 WEIGHTS = "weights.npz"
 """The trained network's file, beside this module."""
-
 LEAST_SHARE, SURE = 0.3, 8.0
 """Least weight of the latest classification in a track's log odds, and the largest log odds of one classification."""
 

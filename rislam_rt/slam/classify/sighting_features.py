@@ -19,30 +19,12 @@ from rislam_rt.model import Body, RadioConfig
 from rislam_rt.ris.path_gain import image_amplitude
 from rislam_rt.slam.classify.echo_misfit import echo_misfit
 from rislam_rt.slam.classify.image_misfit import image_misfit
-from rislam_rt.slam.classify.stillness import stillness
 
 FEATURES = (
-    "strength",
-    "fading",
-    "snr",
-    "length",
-    "elevation",
-    "arrival_std",
-    "turn",
-    "turn_std",
-    "turn_along",
-    "turn_along_std",
-    "approach",
-    "approach_std",
-    "misfit_static",
-    "misfit_moving",
-    "echo_misfit",
-    "echo_strength",
-    "image_misfit",
-    "image_strength",
-    "mirror",
-    "age",
-)
+    "strength", "fading", "snr", "length", "elevation", "arrival_std", "turn", "turn_std", "turn_along",
+    "turn_along_std", "approach", "approach_std", "misfit_static", "misfit_moving", "echo_misfit", "echo_strength",
+    "image_misfit", "image_strength", "mirror", "age",
+)  # fmt: skip
 """Names of the columns of `track_features`, in their order."""
 STD_SCALE = 1.5
 """By how much true errors exceed the reported standard deviations: unresolved neighbours pull at a component."""
@@ -166,17 +148,10 @@ def fit_motion(sightings: Sightings) -> MotionFit:
     approach = _fit_approach(seen[..., 0], weight[..., 0], -towards, bulge)
     count = 3.0 * held.sum(axis=1)
     return MotionFit(
-        turn.value[:, 0],
-        turn.std[:, 0],
-        turn.value[:, 1],
-        turn.std[:, 1],
-        approach.value[:, 0],
-        approach.std[:, 0],
-        (turn.static + approach.static) / count,
-        (turn.moving + approach.moving) / count,
-        height,
+        turn.value[:, 0], turn.std[:, 0], turn.value[:, 1], turn.std[:, 1], approach.value[:, 0], approach.std[:, 0],
+        (turn.static + approach.static) / count, (turn.moving + approach.moving) / count, height,
         1.0 / np.sqrt(0.5 * np.sum(weight[..., 1:], axis=(1, 2))),
-    )
+    )  # fmt: skip
 
 
 class _Fitted(NamedTuple):
@@ -233,3 +208,23 @@ def _mean(values: Floats, held: Booleans) -> Floats:
     """Mean (T, ...) over the cycles that a track was seen, of values (T or 1, W, ...)."""
     share = held / np.maximum(held.sum(axis=1, keepdims=True), 1)
     return np.einsum("tk,tk...->t...", share, np.broadcast_to(values, (*held.shape, *values.shape[2:])))
+
+
+def stillness(turn: Floats, turn_std: Floats, approach: Floats, approach_std: Floats) -> Floats:
+    """Probability (M,) that a track is a static point's, not a wall's, from fitted turn and approach; equal priors.
+
+    Each likelihood is Gaussian in the fitted turn and approach. A wall has turn 0 and approach 2 (0 for a pair of
+    opposite walls); a landmark's path, images included, a turn of 1 with a spread of 0.35 and an approach of 1.8 with
+    a spread of 0.3.
+    """
+    static = _log_normal(turn - 1.0, np.hypot(turn_std, 0.35)) + _log_normal(
+        approach - 1.8, np.hypot(approach_std, 0.3)
+    )
+    wall = _log_normal(turn, np.hypot(turn_std, 0.1))
+    wall += np.logaddexp(*(_log_normal(approach - a, np.hypot(approach_std, 0.1)) for a in (2.0, 0.0))) - np.log(2.0)
+    return np.asarray(0.5 * (1.0 + np.tanh(0.5 * (static - wall))))
+
+
+def _log_normal(miss: Floats, std: Floats) -> Floats:
+    """Log density of a normal, without its constant."""
+    return np.asarray(-0.5 * (miss / std) ** 2 - np.log(std))

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
+from rislam_rt.model import Body, DataSheet, Measurement, RadioConfig, RisCode, SensorModel
 from rislam_rt.model.sensor import ONE_PULSE
+from rislam_rt.slam.classify import Sightings, classify, classify_geometric, load_classifier, track_features
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
@@ -28,8 +29,8 @@ from rislam_rt.slam.nested.particles.particle_belief import (
 )
 from rislam_rt.slam.nested.particles.prior_map import set_prior_map
 from rislam_rt.slam.nested.particles.weights import FLOOR, Seen, update
-from rislam_rt.slam.nested.wall_return_removal import wall_returns
-from rislam_rt.slam.observations import stranger_density
+from rislam_rt.slam.nested_config import NestedConfig
+from rislam_rt.slam.observations import PANEL, free_space, stranger_density
 from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
@@ -48,10 +49,12 @@ from rislam_rt.slam.window.cycle_explanation import (
     unexplained,
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
+from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import REFRESH
+from rislam_rt.slam.window.tracks import WindowTracks
 
 BROAD = 10.0
 """Prior standard deviation [m] of a landmark's position before its measurements."""
@@ -237,3 +240,31 @@ def _history(front: WindowState, row: int) -> LandmarkHistory:
         compile_forms(own[None]), known, landmarks.anchor[local], prior @ place, prior, slots, seen,
         log.momentary[at],
     )  # fmt: skip
+
+
+def wall_returns(
+    tracks: WindowTracks, log: Log, cycle: int, poses: Floats, body: Body, radio: RadioConfig, config: NestedConfig
+) -> Booleans:
+    """Whether each track (T,) is a wall return, by the classifier, from K estimated poses (K, 4) [m, rad].
+
+    What the receiver says ran over the panel is none, however it looks to a classifier.
+    """
+    count, window = len(tracks.ident), len(poses)
+    if not count:
+        return np.zeros(0, dtype=np.bool_)
+    row = np.minimum(np.searchsorted(tracks.ident, log.track), count - 1)
+    at = (tracks.ident[row] == log.track).nonzero()[0]
+    row, slot = row[at], log.cycle[at] - (cycle - window + 1)
+    if config.classifier == "amplitude":
+        ratio = log.log_amplitude[at] + np.log(np.maximum(log.seen[at, 0], 1e-3)) - free_space(radio)
+        bright = np.bincount(row, ratio > np.log(config.specular_ratio), count)
+        found = bright > 0.5 * np.bincount(row, minlength=count)
+    else:
+        seen, std, level = np.zeros((count, window, 3)), np.ones((count, window, 3)), np.zeros((count, window))
+        held = np.zeros((count, window), dtype=np.bool_)
+        seen[row, slot], std[row, slot], level[row, slot] = log.seen[at], log.std[at], log.log_amplitude[at]
+        held[row, slot] = True
+        features = track_features(Sightings(seen, std, level, held, poses[:, :3], poses[:, 3]), body, radio)
+        network = config.classifier == "network"
+        found = (classify(features, load_classifier()) if network else classify_geometric(features)) < 0.5
+    return np.asarray(found & (tracks.side < PANEL))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.channel.compare.poses import random_poses
+from rislam_rt.channel.compare.channel_comparison import random_poses
 from rislam_rt.design import focus_codes
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles

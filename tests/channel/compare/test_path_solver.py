@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sionna_comparison import compare_with_path_solver
 
-from rislam_rt.channel.compare.poses import random_poses
+from rislam_rt.channel.compare.channel_comparison import random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.errors import TraceError
 from rislam_rt.model import RadioConfig

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.channel.traced.diffuse_paths import DiffusePaths
-from rislam_rt.channel.traced.resolution_cells import as_paths
+from rislam_rt.channel.traced.diffuse_paths import DiffusePaths, as_paths
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Body, RadioConfig, Trajectory
 

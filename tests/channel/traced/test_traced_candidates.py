@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.traced import TracedChannel, sequences
-from rislam_rt.channel.traced.candidate_indices import CandidateIndices, in_blocks
 from rislam_rt.channel.traced.sequences import (
     BACK,
     FRONT,
     NO_WALL,
+    CandidateIndices,
+    in_blocks,
     point_sides,
     possible_sequences,
     turned_round,

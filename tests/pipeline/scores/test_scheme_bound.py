@@ -9,7 +9,7 @@ from scipy.stats import ncx2
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.information import MotionPrior, assumed_std, build_landmark_model, heard_paths, posterior_bound
-from rislam_rt.information.prior import FLOOR_TILT, UPRIGHT_TILT
+from rislam_rt.information.priors import FLOOR_TILT, UPRIGHT_TILT
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup

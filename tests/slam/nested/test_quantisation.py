@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rislam_rt.slam.nested.particles.drjit_engine import TOP, decode, encode, steps
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
 from rislam_rt.slam.nested.particles.landmark_cloud import Kernel, kernel_width
-from rislam_rt.slam.nested.particles.quantisation import TOP, decode, encode, steps
 
 
 def test_points_come_back_to_half_a_step(rng: np.random.Generator) -> None:

@@ -7,7 +7,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam import NestedConfig
-from rislam_rt.slam.nested.wall_return_removal import wall_returns
+from rislam_rt.slam.nested.particle_filter import wall_returns
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.window.measurement_log import Log, append, empty_log
 from rislam_rt.slam.window.tracks import no_tracks, start

@@ -7,9 +7,8 @@ from rooms import BODY, CYCLE, HEADING, RADIO, build_room
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import bp_slam
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance, begin
-from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
 from rislam_rt.slam.schemes.shared.gaussian_sums import Sums, born, carry, predict_ranges, prune, unit_of
-from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims
 
 CONFIG = bp_slam.BpSlamConfig(sigma_a=0.01)

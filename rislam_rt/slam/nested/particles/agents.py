@@ -58,8 +58,7 @@ def whiten(weight: Floats, values: Floats) -> Whitened:
 
 
 def standardise(weight: Floats, values: Floats) -> Floats:
-    """Agent particles (N, K) corrected to weighted mean zero and, where N allows, unit covariance, by least
-    movement."""
+    """Agent particles (N, K) moved least to weighted mean zero and, where N allows, unit covariance."""
     values = values - weight @ values
     if values.shape[1] == 0 or 1.0 / np.sum(weight**2) < ROOM * values.shape[1]:
         return values
@@ -103,11 +102,9 @@ def posterior(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _likelihood(log_weight: Floats, known: Floats) -> tuple[Floats, Floats] | None:
-    """Gaussian fitted to agent particles' weights: slope b (K,), precision I + C of `exp(a + b y - y C y / 2)`.
-
-    Poisson regression with a logarithmic link: its solution gives the sample the same mean and second moment as the
-    weights do, and noise on the weights only costs accuracy. None where it does not exist or is no Gaussian.
-    """
+    """Gaussian fitted to agent particles' weights: slope b (K,), precision I + C of `exp(a + b y - y C y / 2)`."""
+    # Poisson regression with a logarithmic link: its solution gives the sample the same mean and second moment as the
+    # weights do, and noise on the weights only costs accuracy. None where it does not exist or is no Gaussian.
     count, dims = known.shape
     rows, cols = np.triu_indices(dims)
     size = 1 + dims + len(rows)

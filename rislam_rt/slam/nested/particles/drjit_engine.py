@@ -3,13 +3,18 @@
 A lane of the machine takes some of the particles of one agent particle, four at a time: what depends on the agent
 particle alone is loaded once a lane and not once a particle, and memory is read in packets. Sums are kept a lane and
 put together in double precision outside, in a fixed order, so that the result is the same with any number of threads.
+
+Passes over particles wait for memory, not arithmetic: points are quantised to 21-bit numbers, three in 8 bytes. A step
+is one millionth of a block's largest offset, as fine as single precision is there: x in the upper 21 bits of the first
+word, y in those of the second, and z in what both have left, its upper 11 bits in the first word.
 """
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.backend import prepare_backend
@@ -23,8 +28,56 @@ from rislam_rt.slam.nested.particles.landmark_cloud import (
     combine,
     restoring_map,
 )
-from rislam_rt.slam.nested.particles.quantisation import TOP, WORDS, Quantisation, decode, encode, join, split, steps
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
+
+TOP = 2**20 - 1
+"""Largest quantised coordinate, in steps."""
+WORDS = 2
+"""Number of 32-bit words of a quantised point."""
+LOW = 2**11 - 1
+"""Mask of the 11 bits of a word that x and y leave to z."""
+FINEST = 1e-12
+"""Least quantisation step [m]."""
+Words = npt.NDArray[np.uint32]
+"""Arrays of 32-bit words."""
+
+
+class Quantisation(NamedTuple):
+    """Quantised points of a landmark's cloud."""
+
+    words: Any
+    """Blocks of M points, two words each."""
+    step: Floats
+    """Quantisation step (B,) [m] of each block."""
+
+
+def steps(reach: Floats) -> Floats:
+    """Quantisation steps [m] that hold offsets up to `reach` [m]."""
+    return np.maximum(reach / TOP, FINEST)
+
+
+def encode(points: Floats, step: Floats) -> Words:
+    """Quantised words (B, M, 2) of points (B, M, 3), with a step [m] for each block (B,)."""
+    whole = np.clip(np.rint(points / step[:, None, None]), -TOP, TOP).astype(np.int32).view(np.uint32)
+    first, second = join(whole[..., 0], whole[..., 1], whole[..., 2])
+    return np.stack([first, second], axis=-1).astype(np.uint32)
+
+
+def decode(words: Words, step: Floats) -> Floats:
+    """Points (B, M, 3) [m] of quantised words; undoes `encode`."""
+    parts = split(words[..., 0], words[..., 1])
+    return np.stack([part.astype(np.uint32).view(np.int32) >> 11 for part in parts], axis=-1) * step[:, None, None]
+
+
+def join(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
+    """Pack three signed coordinates of 21 bits into two 32-bit words, in arithmetic for numpy and Dr.Jit alike."""
+    return (x << 11) | ((z >> 10) & LOW), (y << 11) | ((z & 1023) << 1)
+
+
+def split(first: Any, second: Any) -> tuple[Any, Any, Any]:
+    """Unpack two 32-bit words into three coordinates in the upper 21 bits of a word; a shift of 11 drops the rest."""
+    return first, second, (first << 21) | ((second & LOW) << 10)
+
 
 PACKET = 4
 """Number of particles that a lane handles at once; M must be a multiple of it."""
@@ -131,8 +184,7 @@ class DrJitEngine:
         return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
-        """Ancestors (N * size,) by systematic resampling: survivors mark their first child, a running maximum fills
-        in."""
+        """Ancestors (N * size,) by systematic resampling: survivors mark first children, a running maximum fills in."""
         dr, count, old = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, old)
         packets = old // PACKET

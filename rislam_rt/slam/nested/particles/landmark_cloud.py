@@ -1,7 +1,7 @@
 """The cloud of one landmark's particles for all agent particles: M points about a centre, shared through indices.
 
 Points are stored as offsets from a centre in float64, in single precision (numpy) or as numbers of 21 bits (Dr.Jit,
-`quantisation.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in
+`drjit_engine.py`), which costs nothing: an offset of 0.1 m is exact to 1e-7 m. An agent particle finds its points in
 block `block[i]` and its weights in row `row[i]`. When agent particles are resampled only the indices are: nothing is
 copied until weights change, and points are written anew only when landmark particles are resampled themselves.
 """
@@ -22,7 +22,6 @@ LEAST_STD = 1e-4
 """Least standard deviation [m] of a cloud that is resampled: a collapsed one must not stay so."""
 LARGEST_WIDTH = 0.9
 """Largest kernel width of resampling, in standard deviations."""
-
 SECOND = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 """Index (3, 3) of the second moments xx, xy, ... among sums in the order xx, yy, zz, xy, xz, yz."""
 

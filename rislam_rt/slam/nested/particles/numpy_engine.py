@@ -22,11 +22,6 @@ CACHE = 16384
 """Number of landmark particles handled at a time."""
 
 
-def _rsqrt(square: Floats) -> Floats:
-    """Reciprocal square roots, as Dr.Jit has them."""
-    return 1.0 / np.sqrt(square)
-
-
 class NumpyEngine:
     """Engine of landmark particles in plain numpy, a few agent particles at a time."""
 
@@ -56,7 +51,7 @@ class NumpyEngine:
             new[rows] = cloud.log_weight[cloud.row[rows]] - log_total[rows, None]
             if kinds:
                 with np.errstate(over="ignore", invalid="ignore"):
-                    new[rows] += log_likelihood(kinds, own.__getitem__, x, y, z, _rsqrt)
+                    new[rows] += log_likelihood(kinds, own.__getitem__, x, y, z, lambda square: 1.0 / np.sqrt(square))
             np.copyto(new[rows], np.float32(HOPELESS), where=~(new[rows] > HOPELESS))
             lanes[:, rows, 0] = _sum_up(new[rows], x, y, z)
         sums = combine(lanes)

@@ -164,13 +164,9 @@ def drop(belief: Nested, keep: Booleans) -> Nested:
     """Belief of particles with only some of the landmarks, those of `keep` (F,)."""
     rows = np.flatnonzero(keep)
     return belief._replace(
-        clouds=tuple(belief.clouds[row] for row in rows),
-        centre=belief.centre[:, rows],
-        mean=belief.mean[:, rows],
-        covariance=belief.covariance[:, rows],
-        ess=belief.ess[rows],
-        updates=belief.updates[rows],
-    )
+        clouds=tuple(belief.clouds[row] for row in rows), centre=belief.centre[:, rows], mean=belief.mean[:, rows],
+        covariance=belief.covariance[:, rows], ess=belief.ess[rows], updates=belief.updates[rows],
+    )  # fmt: skip
 
 
 def gaussian(belief: Nested) -> tuple[Floats, Floats]:

@@ -97,11 +97,9 @@ def owners(returns: Returns) -> Integers:
 def _sightings(
     belief: Nested, owner: int, rows: Integers, seen: Seen, by_feature: Floats, config: NestedConfig
 ) -> list[Sighting]:
-    """Returns `rows` as likelihoods for the clouds of one landmark, sorted by kind, so that kernels recur.
-
-    Other features' errors, given the trajectory, are the same every cycle, and their share must not average out: what
-    the n-th measurement of the owner carries of it counts n times.
-    """
+    """Returns `rows` as likelihoods for the clouds of one landmark, sorted by kind, so that kernels recur."""
+    # Other features' errors, given the trajectory, are the same every cycle, and their share must not average out: what
+    # the n-th measurement of the owner carries of it counts n times.
     poses = poses_of(belief.position, belief.heading, seen.body)
     features = belief.mean.copy()
     features[:, owner] = belief.centre[:, owner]

@@ -26,7 +26,7 @@ from rislam_rt.slam.schemes.shared.gaussian_sums import (
     range_moments,
 )
 from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan, birth_ratio
+from rislam_rt.slam.schemes.shared.ranges import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.sum_correction import absorb, claims, newborn
 from rislam_rt.slam.start_prior import StartPrior

@@ -11,21 +11,17 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
+from rislam_rt.model.sensor import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
-from rislam_rt.slam.schemes.bp_slam_aoa.unresolved_returns import unresolved_neighbours
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
 
 GATE = 40.0
 """Squared Mahalanobis distance beyond which nothing associates (chi^2, 3 dof: 1e-8)."""
-
-
 SLACK = 0.1
 """Distance [m] of the agent from where it was expected up to which a pair is still weighed."""
-
-
 HERMITE = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
 """Gauss-Hermite nodes and weights of a standard normal."""
 
@@ -59,12 +55,9 @@ class View(NamedTuple):
 
 
 def expect_scan(
-    features: GaussianFeatures,
-    predicted: PredictedReturns,
-    scan: ComponentScan,
-    sensor: SensorModel,
+    features: GaussianFeatures, predicted: PredictedReturns, scan: ComponentScan, sensor: SensorModel,
     config: BpSlamAoaConfig,
-) -> View:
+) -> View:  # fmt: skip
     """Predicted returns of features' Gaussians for association: detection probabilities, pulls of neighbours, pairs."""
     variance = features.strength_variance + config.fading**2
     loud = predicted.log_amplitude[:, None] + np.sqrt(variance)[:, None] * HERMITE[0]
@@ -130,3 +123,23 @@ def claims(features: GaussianFeatures, view: View, density: Floats, fresh: Float
     evidence = np.log(missed).sum() + np.log1p((ratio * found.to_feature).sum(axis=1)).sum()
     evidence += np.log1p(to_component.sum(axis=0)).sum() - np.log1p(to_component * found.to_feature).sum()
     return found, float(evidence)
+
+
+def unresolved_neighbours(
+    features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
+) -> tuple[Floats, ...]:
+    """Probability (C,) that a return merges into a louder one; mean (C, 3) and covariance of neighbours' pull."""
+    weight = features.existence[features.owner] * features.share * detection
+    sure = np.flatnonzero(weight > 0.1)
+    weight = weight[sure]
+    gap = predicted.seen[sure] - predicted.seen[:, None]
+    close = sensor.may_merge(gap / np.array([SPEED_OF_LIGHT, 1.0, 1.0]))
+    close &= features.owner[:, None] != features.owner[sure]
+    louder = predicted.log_amplitude[sure] - predicted.log_amplitude[:, None]
+    held = np.where(close, weight, 0.0)
+    hidden = 1.0 - np.prod(1.0 - np.where(louder > 0.0, held, 0.0), axis=1)
+    mean, variance = merged_pull(np.exp(np.minimum(louder, 0.0)))
+    fainter = np.where(louder > 0.0, 0.0, held)
+    pull = np.einsum("co,coi->ci", fainter * mean, gap)
+    second = fainter * (variance + (1.0 - fainter) * mean**2)
+    return hidden, pull, np.einsum("co,coi,coj->cij", second, gap, gap)

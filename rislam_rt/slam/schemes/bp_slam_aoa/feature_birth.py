@@ -113,13 +113,9 @@ def hypothesise(
 
 
 def born(
-    found: list[BirthHypotheses],
-    existence: Floats,
-    course: AgentTrajectory,
-    ends: Ends,
-    first: int,
+    found: list[BirthHypotheses], existence: Floats, course: AgentTrajectory, ends: Ends, first: int,
     config: BpSlamAoaConfig,
-) -> GaussianFeatures:
+) -> GaussianFeatures:  # fmt: skip
     """New features of BP-SLAM with angles as Gaussian sums, one feature for each set of birth hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
     parts = BirthHypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))

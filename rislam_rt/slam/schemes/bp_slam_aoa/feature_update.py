@@ -27,13 +27,9 @@ MOST_SCATTER = 9.0
 
 
 def absorb(
-    features: GaussianFeatures,
-    view: View,
-    course: AgentTrajectory,
-    scan: ComponentScan,
-    found: Association,
+    features: GaussianFeatures, view: View, course: AgentTrajectory, scan: ComponentScan, found: Association,
     fresh: Floats,
-) -> tuple[GaussianFeatures, AgentTrajectory]:
+) -> tuple[GaussianFeatures, AgentTrajectory]:  # fmt: skip
     """Update features' Gaussian sums and the agent's trajectory by the components, one by one, the surest first."""
     ref, predicted = course.mean.copy(), view.predicted
     edges = np.searchsorted(features.owner, np.arange(len(features.ident) + 1))
@@ -56,8 +52,7 @@ def absorb(
         gain = through(by_course, course.covariance)
         spread = predicted.own[part] + gain @ by_course.swapaxes(1, 2)
         seen = predicted.seen[part] + by_course @ (course.mean - ref)
-        heard = Heard(view, scan, part, pairs, found.to_feature[row] / fresh)
-        learnt = learn(heard, seen, spread, features)
+        learnt = learn(view, scan, part, pairs, found.to_feature[row] / fresh, seen, spread, features)
         weight = fields["share"][part] * learnt.factor
         total = float(weight.sum())
         existence[row] = existence[row] * total / (existence[row] * total + 1.0 - existence[row])
@@ -82,21 +77,6 @@ def absorb(
     ), course._replace(covariance=0.5 * (course.covariance + course.covariance.T))
 
 
-class Heard(NamedTuple):
-    """Components that one feature may have made, with their messages."""
-
-    view: View
-    """Predicted returns of the cycle."""
-    scan: ComponentScan
-    """Components of the cycle."""
-    part: slice
-    """Rows of the feature's Gaussians."""
-    pairs: slice
-    """Rows of the candidate pairs of these Gaussians."""
-    message: Floats
-    """Messages (M,) of the components to the feature, over the density of anything else."""
-
-
 class Learnt(NamedTuple):
     """Update of G Gaussians of a feature: one equivalent component in place of all that each may have made."""
 
@@ -114,17 +94,22 @@ class Learnt(NamedTuple):
     """Logarithm (G,) of the feature's scatter."""
 
 
-def learn(heard: Heard, seen: Floats, spread: Floats, features: GaussianFeatures) -> Learnt:
-    """Update of each Gaussian of one feature: moments over the components that it may have made and "missed"."""
-    view, scan, part = heard.view, heard.scan, heard.part
-    gaussian, component, noise, loudness, log_loudness = (column[heard.pairs] for column in view.pairs)
+def learn(
+    view: View, scan: ComponentScan, part: slice, pairs: slice, message: Floats, seen: Floats, spread: Floats,
+    features: GaussianFeatures,
+) -> Learnt:  # fmt: skip
+    """Update of each Gaussian of one feature, rows `part`: moments over the components of `pairs` and "missed".
+
+    `message` (M,) are those of the components to the feature, over the density of anything else.
+    """
+    gaussian, component, noise, loudness, log_loudness = (column[pairs] for column in view.pairs)
     mine = gaussian - part.start
     wide = spread + view.disturbance[part]
     total = wide[mine] + noise[:, None] * np.eye(3)
     inverse = np.linalg.inv(total)
     miss = scan.seen[component] - seen[mine]
     pulled = (inverse @ miss[..., None])[..., 0]
-    weight = np.exp(log_density(miss, inverse) + log_loudness) * heard.message[component]
+    weight = np.exp(log_density(miss, inverse) + log_loudness) * message[component]
     count = len(seen)
     none = 1.0 - view.detection[part]
     factor = none + np.bincount(mine, weight, minlength=count)

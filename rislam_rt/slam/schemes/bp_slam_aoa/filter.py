@@ -7,24 +7,26 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.observations import free_space, is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, claims, expect_scan, likelihoods, spread_of
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_update import absorb
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
+    POINT,
+    WALL,
     Ends,
     GaussianFeatures,
     carry,
     no_features,
     predict_returns,
+    spread_over,
 )
-from rislam_rt.slam.schemes.bp_slam_aoa.pose_and_map import known_map, pose_moments
-from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance
+from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance
 from rislam_rt.slam.schemes.shared.gaussian_sums import join, prune
 from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of
+from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of, position_errors
 from rislam_rt.slam.schemes.shared.sum_correction import is_strong
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_step
@@ -192,7 +194,9 @@ def _predict(
                 or (level > 0 and state.cycle % LIVELY_STRIDE == 0)
             )
             course, carried = advance(state.course, dt, levels[level], keep)
-            moved = state._replace(course=course, features=_survive(state.features, carried, config))
+            features = carry(state.features, carried, config.drift_std)
+            features = features._replace(existence=config.survival_probability * features.existence)
+            moved = state._replace(course=course, features=features)
         predicted = predict_returns(moved.features, moved.course, ends, free)
         return moved, expect_scan(moved.features, predicted, scan, state.sensor, config)
 
@@ -212,12 +216,6 @@ def _predict(
     return moved._replace(motion_mode=motion_mode / motion_mode.sum(), fresh=unseen), view, ends
 
 
-def _survive(features: GaussianFeatures, carried: Step, config: BpSlamAoaConfig) -> GaussianFeatures:
-    """BP-SLAM's features given the trajectory after a time step, each less probable by the chance that it has gone."""
-    moved = carry(features, carried, config.drift_std)
-    return moved._replace(existence=config.survival_probability * moved.existence)
-
-
 def _claimed(
     state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
@@ -234,3 +232,39 @@ def _claimed(
         miss = scan.seen[shown] - view.predicted.seen[best]
         nis += float(miss @ np.linalg.solve(spread, miss))
     return numbers, nis
+
+
+def start_variance(start: StartPrior) -> Floats:
+    """Covariance (3, 3) [m^2] of the start that was told, which a report adds to the pose; its height is exact."""
+    return start.position_std**2 * np.diag([1.0, 1.0, 0.0])
+
+
+def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Reported position (3,), velocity (3,), their covariance (6, 6), and `count` equally likely positions."""
+    covariance = course.covariance[:6, :6].copy()
+    covariance[:3, :3] += start_variance(start)
+    covariance = 0.5 * (covariance + covariance.T)
+    position, velocity = start.position + course.mean[:3], course.mean[3:6]
+    return position, velocity, covariance, position + position_errors(covariance, count)
+
+
+def known_map(features: GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float) -> MapEstimate:
+    """Reported map of the features that exist, each by its likeliest Gaussian, as points and walls; no wanderers."""
+    total = features.covariance + spread_over(features.slope, course)
+    best = np.zeros(len(features.ident))
+    np.maximum.at(best, features.owner, features.share)
+    shown = (features.existence[features.owner] > threshold) & (features.share > 0.5)
+    shown &= features.share >= best[features.owner]
+    points, walls = (np.flatnonzero(shown & (features.kind == kind)) for kind in (POINT, WALL))
+    image, spread = features.mean[walls], total[walls]
+    size = np.linalg.norm(image, axis=1)
+    normal = image / np.maximum(size, 1e-9)[:, None]
+    along = np.einsum("wi,wij,wj->w", normal, spread, normal)
+    across = np.maximum(np.einsum("wii->w", spread) - along, 0.0)
+    std = np.stack([np.sqrt(0.5 * across) / np.maximum(size, 1e-9), 0.5 * np.sqrt(along)], axis=1)
+    count = len(points)
+    return MapEstimate(
+        features.ident[features.owner[points]], start.position + features.mean[points],
+        total[points] + start_variance(start), np.full(count, -1), np.zeros(count),
+        np.exp(np.clip(features.strength[points], -30.0, 30.0)), normal, 0.5 * size + normal @ start.position, std,
+    )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
-from rislam_rt.slam.schemes.shared.bistatic_ranges import length_of
+from rislam_rt.slam.schemes.shared.ranges import length_of
 
 WALL, POINT, WANDERER = 0, 1, 2
 """Kinds of feature: a wall, a point scatterer, a path of no lasting place."""

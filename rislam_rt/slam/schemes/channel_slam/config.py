@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.slam.schemes.shared.delay_config import DelayConfig
-from rislam_rt.slam.schemes.shared.range_scan import Odds
+from rislam_rt.slam.schemes.shared.ranges import Odds
 from rislam_rt.slam.setting_checks import check_counts, check_inside
 
 

@@ -17,11 +17,8 @@ from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, 
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
-from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
-from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
 from rislam_rt.slam.schemes.shared.gaussian_sums import (
-    PredictedRanges,
     Sums,
     born,
     carry,
@@ -33,7 +30,7 @@ from rislam_rt.slam.schemes.shared.gaussian_sums import (
     range_moments,
 )
 from rislam_rt.slam.schemes.shared.loopy_association import Association
-from rislam_rt.slam.schemes.shared.range_scan import Scan
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, Scan
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.sum_correction import absorb
 from rislam_rt.slam.start_prior import StartPrior
@@ -147,7 +144,8 @@ def _correct(
     sight = predict_ranges(state.sums, agent.course, agent.pose[0], model)
     own = (state.sums.ident[:, None] == label).astype(float)
     hit, shown = np.nonzero(own)
-    squares = _squares(state.sums, sight, agent.course, scan, hit, shown)
+    mean, variance = range_moments(state.sums, sight, agent.course)
+    squares = (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
     missed = 1.0 - own.sum(axis=1, keepdims=True)
     found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0), 1)
     sums, course = absorb(state.sums, sight, agent.course, scan, found, config.odds)
@@ -156,14 +154,6 @@ def _correct(
         strains[name] = strains.get(name, 1.0) + STRAIN_RATE * (square - strains.get(name, 1.0))
     fit = np.array([strains.get(name, 1.0) <= config.strain_limit for name in sums.ident.tolist()], dtype=bool)
     return _keep(state._replace(sums=sums, agent=agent._replace(course=course), strains=strains), fit, config), squares
-
-
-def _squares(
-    sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, hit: Integers, shown: Integers
-) -> Floats:  # fmt: skip
-    """Squared normalised innovations of those virtual transmitters of Channel-SLAM whose ranges were measured."""
-    mean, variance = range_moments(sums, sight, course)
-    return (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
 
 
 def _give_birth(

@@ -78,12 +78,9 @@ def follow(
     spread[:, 0, 0], spread[:, 1, 1] = std[spare] ** 2, rate_std**2
     fresh = first + np.arange(len(spare))
     new = RangeTracks(
-        np.stack([length[spare], np.zeros(len(spare))], axis=1),
-        spread,
-        fresh,
-        np.ones(len(spare), dtype=np.int64),
+        np.stack([length[spare], np.zeros(len(spare))], axis=1), spread, fresh, np.ones(len(spare), dtype=np.int64),
         np.zeros(len(spare), dtype=np.int64),
-    )
+    )  # fmt: skip
     label = np.empty(len(length), dtype=np.int64)
     label[hit], label[spare] = tracks.label[rows], fresh
     return RangeTracks._make(np.concatenate(pair) for pair in zip(old, new, strict=True)), label

@@ -9,10 +9,9 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, MapEstimate, Measurement, SensorModel, SlamEstimate
 from rislam_rt.slam.observations import is_los, observations_of
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step, advance, begin
-from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic
 from rislam_rt.slam.schemes.shared.delay_config import DelayConfig
 from rislam_rt.slam.schemes.shared.gauge import over_all_turns
-from rislam_rt.slam.schemes.shared.range_scan import Scan
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, Scan
 from rislam_rt.slam.schemes.shared.report import Points, lift, position_errors
 from rislam_rt.slam.schemes.shared.sum_correction import is_strong
 from rislam_rt.slam.start_prior import StartPrior

@@ -11,12 +11,11 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
-from rislam_rt.slam.schemes.shared.bistatic_ranges import Bistatic, length_of
+from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 
 POINT, PLANE, DRIFT = 0, 1, 2
 """Kinds of a feature's Gaussian: a static point, a wall (the image of the Tx moves), or a wandering point, as a path
 over a wall and a scatterer seems to be."""
-
 NUDGE = 1e-5
 """Step of central differences [m, m/s]."""
 LEAST_SPEED = 1e-3
@@ -25,8 +24,6 @@ LEAST_ACROSS = 1e-4
 """Smallest squared sine of a feature's angle, for cosines that a Gaussian has beyond one."""
 UPRIGHT, UPRIGHT_STD = (0.0, 0.5 * np.pi, np.pi), 0.02
 """Turns [rad] of upright walls and the ceiling about a level direction of motion, and their deviation [rad]."""
-
-
 STRONG_KINDS = np.array([0.2, 0.5, 0.3])
 """Probabilities of point, wall and wanderer for a path as strong as a wall return; a corner of two walls returns like a
 point."""
@@ -106,11 +103,9 @@ def carry(sums: Sums, step: Step, wander: Floats) -> Sums:
     covariance[:, 0, 0] += np.einsum("kia,ab,kib->k", lost, step.residual, lost)[sums.owner]
     covariance[sums.kind == DRIFT] += np.diag(wander**2)
     return sums._replace(
-        slope=sums.slope @ step.transfer,
-        base_slope=sums.base_slope @ step.transfer,
-        walk_slope=sums.walk_slope @ step.transfer,
-        covariance=covariance,
-    )
+        slope=sums.slope @ step.transfer, base_slope=sums.base_slope @ step.transfer,
+        walk_slope=sums.walk_slope @ step.transfer, covariance=covariance,
+    )  # fmt: skip
 
 
 def axes_of(walk: Floats) -> tuple[Floats, Floats]:

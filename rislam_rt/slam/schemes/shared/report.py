@@ -12,8 +12,6 @@ from rislam_rt.slam.step_info import StepOutcome
 
 STEP = 1e-6
 """Step of central differences [m, 1, rad]."""
-
-
 NIS_LIMIT = 3.0
 """Running mean of the NIS per degree of freedom above which a rival filter says that it has diverged."""
 

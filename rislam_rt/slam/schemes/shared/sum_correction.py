@@ -13,12 +13,10 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
 from rislam_rt.slam.schemes.shared.gaussian_sums import PredictedRanges, Sums, spread_of
 from rislam_rt.slam.schemes.shared.loopy_association import Association, associate
-from rislam_rt.slam.schemes.shared.range_scan import Odds, Scan
+from rislam_rt.slam.schemes.shared.ranges import Odds, Scan
 
 NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
-
-
 ROUNDS, TOLERANCE = 30, 1e-3
 """Largest number of rounds of loopy association, and the change of messages at which it ends: finer than the sums."""
 
@@ -80,14 +78,10 @@ def absorb(
     slope = sums.slope - gain[:, :, None] * sight.by_course[:, None]
     change = course.mean - ref
     moved = sums._replace(
-        base=sums.base + sums.base_slope @ change,
-        walk=sums.walk + sums.walk_slope @ change,
-        existence=existence,
-        mean=sums.mean + gain * pulls[0][:, None] + slope @ change,
-        slope=slope,
-        covariance=sums.covariance - gain[:, :, None] * inner[:, None],
-        share=share,
-    )
+        base=sums.base + sums.base_slope @ change, walk=sums.walk + sums.walk_slope @ change, existence=existence,
+        mean=sums.mean + gain * pulls[0][:, None] + slope @ change, slope=slope,
+        covariance=sums.covariance - gain[:, :, None] * inner[:, None], share=share,
+    )  # fmt: skip
     return moved, course
 
 

@@ -1,4 +1,4 @@
-"""Scan of ranges measured in one cycle, and how likely each range is a new feature's first."""
+"""Ranges of one cycle: measured ones, how likely each is a new feature's first, and the model of a bistatic range."""
 
 from typing import NamedTuple
 
@@ -42,3 +42,20 @@ def birth_ratio(length: Floats, undetected: float, odds: Odds) -> Floats:
     region = 4.0 * np.pi * odds.max_range**2 * odds.max_range / 3
     density = undetected * odds.detection_probability * shell / region
     return np.where(inside, density, 0.0) / odds.clutter_density
+
+
+class Bistatic(NamedTuple):
+    """Model of a feature's range, `|p_T - a| + |a - p_R|` of a feature at `a`, both ends carried by the agent."""
+
+    tx: Floats
+    """Tx (3,) [m] from the agent's position, turned by the heading."""
+    rx: Floats
+    """Rx (3,) [m] from the agent's position, turned by the heading."""
+
+
+def length_of(vector: Floats) -> Floats:
+    """Euclidean lengths (...,) of vectors (..., 3), without the temporaries of a norm."""
+    square = vector[..., 0] ** 2
+    for axis in range(1, vector.shape[-1]):
+        square = square + vector[..., axis] ** 2
+    return np.sqrt(square)
