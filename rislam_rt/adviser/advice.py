@@ -1,5 +1,4 @@
-"""Advice on a room before a run: link budgets of its landmarks, remedies for those not detected, and the cost of
-tracing."""
+"""Advice on a room before a run: link budgets of its landmarks, remedies, and the cost of tracing."""
 
 from typing import Any, NamedTuple
 

@@ -1,5 +1,4 @@
-"""Coverage of a RIS panel: SNR of its direct path under the best code, at positions all over the plan at the agent's
-height."""
+"""Coverage of a RIS panel: SNR of its direct path under the best code all over the plan at the agent's height."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -36,8 +35,7 @@ class Coverage(NamedTuple):
 
     @property
     def heard(self) -> float:
-        """Share of a coverage map's positions with a direct path at which its SNR exceeds the detection threshold; zero
-        if there are none."""
+        """Share of a coverage map's positions with a direct path where it exceeds the threshold; 0 without any."""
         seen = np.isfinite(self.margin_db)
         return float(np.mean(self.margin_db[seen] >= 0.0)) if seen.any() else 0.0
 
@@ -64,8 +62,7 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
 
 
 def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """SNR over the detection threshold (panels, N) [dB] of each RIS panel's direct path under the best code, for agent
-    positions (N, 3) [m], headed along x."""
+    """Margin (panels, N) [dB] of each RIS panel's direct path under the best code, for agents (N, 3) [m]."""
     assert scene.ris is not None
     count = len(points)
     still = Trajectory(

@@ -1,5 +1,4 @@
-"""Reasons why a landmark is not detected at a position: occluded, behind the panel, below the array, not resolved, too
-weak, or no path."""
+"""Reasons why a landmark is not detected: occluded, behind the panel, below the array, not resolved, too weak."""
 
 from typing import NamedTuple
 
@@ -18,8 +17,7 @@ CLEARANCE = 1e-6
 
 
 class Reasons(NamedTuple):
-    """Room with its paths at K positions of the agent and all surfaces that hide, from which reasons for missed
-    detections of landmarks are found."""
+    """Room with its paths at K positions and all surfaces that hide, to find why landmarks are not detected."""
 
     scene: Scene
     paths: Paths
@@ -51,8 +49,7 @@ class Reasons(NamedTuple):
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:
-        """Name of the reflector or occluder that stands between a landmark and Tx or Rx at one position; empty if none
-        does."""
+        """Name of the mesh that stands between a landmark and Tx or Rx at one position; empty if none does."""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):
             last = point + CLEARANCE * (end - point)
             _, hit = crossings(end[None], last[None], self.triangles)

@@ -1,5 +1,4 @@
-"""Scores of data association: how well a filter assigned measurements to landmarks, by true identities that only the
-scorer sees."""
+"""Scores of data association: how well measurements were assigned to landmarks, by true identities."""
 
 from typing import NamedTuple
 
@@ -43,8 +42,7 @@ def association_score(label: Integers, truth: Integers) -> AssociationScore:
 
 
 def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> tuple[float, float, float]:
-    """Accuracy, precision and recall of data association, from counts (L, I) of how often label (L,) met identity (I,);
-    -1 is none."""
+    """Accuracy, precision, recall from counts (L, I) of how often label (L,) met identity (I,); -1 is none."""
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[scipy.optimize.linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
@@ -61,8 +59,7 @@ def association_fractions(labels: Integers, identities: Integers, counts: Intege
 
 
 def label_switches(label: Integers, truth: Integers) -> int:
-    """Number of times that a true identity's label differs from the label it last had; a -1 on either side does not
-    count."""
+    """Number of times that a true identity's label differs from its last one; -1 does not count."""
     switches = 0
     both = (np.asarray(label) != NONE) & (np.asarray(truth) != NONE)
     for identity in np.unique(np.asarray(truth)[both]):

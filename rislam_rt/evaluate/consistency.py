@@ -1,5 +1,4 @@
-"""Consistency of a filter: its errors normalised by its own covariances (NEES, NIS), to be held against chi-square
-bounds."""
+"""Consistency of a filter: its errors normalised by its own covariances (NEES, NIS)."""
 
 import numpy as np
 

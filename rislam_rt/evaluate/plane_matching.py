@@ -1,5 +1,4 @@
-"""Matching of estimated wall planes with a room's true walls, and ghost planes that stand for none: the one criterion
-of all scores."""
+"""Matching of estimated planes with a room's true walls, and ghost planes that stand for none."""
 
 from typing import NamedTuple
 

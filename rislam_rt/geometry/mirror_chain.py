@@ -21,8 +21,7 @@ class MirrorChain(NamedTuple):
 
 
 def mirror_chain(point: Floats, normal: Floats, offset: Floats) -> MirrorChain:
-    """Mirror points (..., 3) in D planes, normals (D, 3) and offsets (D,) [m], one after the other, with derivatives by
-    the chain rule."""
+    """Mirror points (..., 3) in D planes, normals (D, 3) and offsets (D,) [m], in turn, with derivatives."""
     depth = len(offset)
     linear = np.eye(3)
     planes = np.zeros((*point.shape[:-1], depth, 3, 3))

@@ -39,8 +39,7 @@ class _Mesh(NamedTuple):
     """Angle (T,) [rad] by which a triangle's normal may differ from that of its plane."""
 
     def in_plane(self, normal: Floats, distance: float, turn: float, offset: float) -> Integers:
-        """Rows of the triangles that lie in a plane: normals that agree within `slack + turn`, and all corners within
-        `offset` [m]."""
+        """Rows of the triangles in a plane: normals within `slack + turn`, all corners within `offset` [m]."""
         here, widest = abs(float(_GENERIC @ normal)), float(self.slack.max()) + turn
         low, high = np.searchsorted(self.key, [here - widest, here + widest])
         angle = np.linalg.norm(np.cross(self.normal[low:high], normal), axis=-1)
@@ -112,8 +111,7 @@ def _grown(mesh: _Mesh, seed: int, free: Booleans, angle: float, offset: float) 
 
 
 def _fitted(triangles: Floats, group: Integers) -> PlanarRegions:
-    """Planes of groups (T,) of triangles: that of a group's first triangle where it is exact, else the least-squares
-    fit to all corners."""
+    """Planes of groups (T,) of triangles: that of the first where it is exact, else fitted to all corners."""
     normal, offset = triangle_planes(triangles)
     _, first = np.unique(group, return_index=True)
     normal, offset = normal[first], offset[first]

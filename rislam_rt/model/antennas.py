@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from rislam_rt.errors import ConfigError
 
 PATTERNS = ("iso", "dipole", "hw_dipole", "tr38901")
-"""Antenna patterns: isotropic, short dipole, half-wave dipole (both along z), and the sector of 3GPP TR 38.901 (8 dBi,
-along body x)."""
+"""Antenna patterns: isotropic, short and half-wave dipole along z, sector of 3GPP TR 38.901 (8 dBi, along body x)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +23,7 @@ class Antennas:
     polarization: str = "V"
     """Polarisation of the Tx, `V` or `H`."""
     rx_polarization: str = ""
-    """Polarisation of the Rx, `V` or `H`; empty: that of the Tx. A crossed link receives only what walls have
-    turned."""
+    """Polarisation of the Rx, `V` or `H`; empty: the Tx's. A crossed link receives only what walls have turned."""
 
     def __post_init__(self) -> None:
         for name in ("tx", "rx"):
@@ -50,8 +48,7 @@ class Antennas:
 
     @property
     def of_landmark(self) -> tuple[str, str]:
-        """Pattern and polarisation with which a landmark (scatterer or RIS panel) re-radiates: isotropic, polarised as
-        the Tx."""
+        """Pattern and polarisation with which a landmark re-radiates: isotropic, polarised as the Tx."""
         return "iso", self.polarization
 
     @property

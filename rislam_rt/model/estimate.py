@@ -64,8 +64,7 @@ class MapEstimate:
 
     @property
     def ris(self) -> int:
-        """Row of the landmark that is identified as the RIS panel, of several panels as the first; -1 if none is. See
-        `panel_row`."""
+        """Row of the landmark identified as the (first) RIS panel; -1 if none is. See `panel_row`."""
         return self.panel_row(0)
 
     def panel_row(self, panel: int) -> int:

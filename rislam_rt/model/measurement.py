@@ -1,5 +1,4 @@
-"""Measurement of one cycle: the multipath components that the receiver reports, and, kept apart for scoring, the true
-path of each."""
+"""Measurement of one cycle: the components that the receiver reports, and, kept apart, the true path of each."""
 
 from dataclasses import dataclass
 

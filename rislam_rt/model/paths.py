@@ -150,8 +150,7 @@ class Paths:
         return int(self.kind[path]), int(self.landmark[path]), tx, rx
 
     def label(self, path: int) -> str:
-        """Text of a propagation path's identity, e.g. `VS wall_y0 sphere | wall_x0`: walls of the Rx leg after the
-        bar."""
+        """Text of a path's identity, e.g. `VS wall_y0 sphere | wall_x0`: walls of the Rx leg after the bar."""
         kind, landmark, tx, rx = self.identity(path)
         names = [self.walls[w] for w in tx] + ([self.landmarks[landmark]] if landmark >= 0 else [])
         text = " ".join([PathKind(kind).name, *names])

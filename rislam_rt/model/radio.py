@@ -87,6 +87,5 @@ class RadioConfig:
         return self.bandwidth**2 / 12.0
 
     def integrated_snr(self, gain: Floats | Complexes) -> Floats:
-        """Integrated SNR L E |alpha|^2 / N0 of path gains alpha (...,): after integration over the signal and all L
-        antennas, linear."""
+        """Integrated SNR L E |alpha|^2 / N0 (...,) of path gains alpha, over signal and L antennas, linear."""
         return self.array.num_antennas * self.energy * np.abs(gain) ** 2 / self.noise_psd

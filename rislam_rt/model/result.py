@@ -104,8 +104,7 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """Whether (K, I) each of a scheme's landmarks was identified as a given RIS panel in each cycle (probability
-        above one half)."""
+        """Whether (K, I) each of a scheme's landmarks was identified as a RIS panel (probability above one half)."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:
@@ -115,8 +114,7 @@ class SchemeResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamResult:
-    """Result of a whole run: the true scene and paths, the result of each scheme, and all that is needed to repeat
-    it."""
+    """Result of a whole run: true scene and paths, each scheme's result, and all that is needed to repeat it."""
 
     name: str
     """Name of the pipeline."""

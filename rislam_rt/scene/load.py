@@ -101,14 +101,12 @@ def scene_file(path: str | Path) -> Path:
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
-    """Build a scene from the validated content of its file: read the meshes that it names, and collect what is wrong
-    with them."""
+    """Build a scene from the validated content of its file and its meshes, and collect what is wrong with them."""
     mesh_files = MeshFiles(file.parent, spec.limits, spec.meshes)
     findings: list[Finding] = []
 
     def made(kind: str, sections: Sequence[Any], build: Callable[[Any], Any]) -> list[Any]:
-        """Reflectors, scatterers, occluders or panels made from their sections of the scene file; what is wrong with a
-        section goes to the findings."""
+        """Parts made from their sections of the scene file; what is wrong with a section goes to the findings."""
         found = []
         for number, section in enumerate(sections):
             try:

@@ -15,8 +15,7 @@ _PLY_NOTE = re.compile(rb"^(?:comment|obj_info)(?:[ \t][^\r\n]*)?(?:\r\n|\r|\n)"
 
 
 def without_comments(content: bytes) -> bytes:
-    """Content of a PLY file without the comments in its header: one that names a texture would send the reader to look
-    for it."""
+    """Content of a PLY file without its header's comments: the reader would look for a texture named there."""
     end = content.find(b"end_header", 0, MAX_HEADER)
     return content if end < 0 else _PLY_NOTE.sub(b"", content[:end]) + content[end:]
 

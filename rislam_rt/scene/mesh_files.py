@@ -12,8 +12,7 @@ from rislam_rt.scene.schema import LimitsSection, MeshesSection, MeshSection
 
 
 class MeshFiles:
-    """Reader of a scene's mesh files: each is read once and kept for the digest, and together they have no more faces
-    than the scene's limit."""
+    """Reader of a scene's mesh files, each read once and kept for the digest, together within the limit of faces."""
 
     def __init__(self, folder: Path, limits: LimitsSection, placement: MeshesSection) -> None:
         self.folder, self.limits, self.placement = folder, limits, placement
@@ -22,8 +21,7 @@ class MeshFiles:
         self.faces = 0
 
     def mesh(self, place: str, section: MeshSection) -> Mesh:
-        """Read the mesh `file` or `file#node` of a scene and place it in the room as its section says, or else as
-        `[meshes]` says for all."""
+        """Read a scene's mesh `file` or `file#node`, placed in the room as its section or else `[meshes]` says."""
         name, _, node = place.partition("#")
         if name not in self.contents:
             self.contents[name] = read_inside(self.folder, name, MAX_MESH_BYTES)

@@ -1,5 +1,4 @@
-"""Meshes read from the content of files (PLY, OBJ, STL, GLB) and checked before anything else sees them, and written as
-PLY."""
+"""Meshes read from the content of files (PLY, OBJ, STL, GLB) and checked, and written as PLY."""
 
 import io
 import logging
@@ -56,8 +55,7 @@ def as_mesh(triangles: Floats) -> Mesh:
 
 
 class MeshReader:
-    """Parser of mesh files that keeps the last file parsed: a scene picks many nodes of one GLB file, one after the
-    other."""
+    """Parser of mesh files that keeps the last file parsed: a scene picks many nodes of one GLB file."""
 
     def __init__(self) -> None:
         self._key: tuple[str, bytes] = ("", b"")
@@ -134,8 +132,7 @@ def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
 
 
 def _own_ply(content: bytes) -> Mesh | None:
-    """Mesh from a PLY file of the common binary layout, read without trimesh, whose import takes half a second; None
-    for any other layout."""
+    """Mesh from a PLY file of the common binary layout, without trimesh's slow import; None for any other."""
     header = _PLY_HEADER.match(content)
     if header is None:
         return None
@@ -167,8 +164,7 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Keep libraries from logging while a mesh file is parsed, tracebacks of failures that have an answer here least of
-    all."""
+    """Keep libraries from logging while a mesh file is parsed: their failures have an answer here."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

@@ -64,8 +64,7 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
-    """Trajectory at constant velocity (3,) [m/s] from `start` (3,) [m]; heading along it, 0 if it has no horizontal
-    part."""
+    """Trajectory at constant velocity (3,) [m/s] from `start` (3,) [m], heading along it (0 if vertical)."""
     time = np.arange(cycles, dtype=np.float64) * cycle_s
     speed = np.asarray(velocity, dtype=np.float64)
     heading = np.arctan2(speed[1], speed[0]) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
@@ -96,8 +95,7 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
 
 
 def along_heading(course: Floats) -> Floats:
-    """Headings (K,) [rad] along velocities or tangents (K, 3); where one has no horizontal part, that of the one
-    before, or after."""
+    """Headings (K,) [rad] along velocities or tangents (K, 3); of a vertical one, that of the one before, or after."""
     level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
     if not level.any():
         return np.zeros(len(course))

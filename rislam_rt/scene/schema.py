@@ -15,8 +15,7 @@ from rislam_rt.toml import parse_toml
 MAX_SCENE_BYTES = 4_000_000
 """Most bytes of a scene file, which people write; anything larger is another file by mistake."""
 SMALLEST = 1e-6
-"""Smallest length [m] or time [s] in a scene file, a micrometre or a microsecond: nothing that a radio sees is
-finer."""
+"""Smallest length [m] or time [s] in a scene file: nothing that a radio sees is finer."""
 
 Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
 Length = Annotated[float, Field(ge=SMALLEST, le=1e5, allow_inf_nan=False)]
@@ -27,8 +26,7 @@ Name = Annotated[
     Field(pattern=r"^[.\-]*[\p{L}\p{N}_][\p{L}\p{M}\p{N}_.\-]*$", max_length=64),
     AfterValidator(lambda name: unicodedata.normalize("NFC", name)),
 ]
-"""Name in a scene file: letters and digits of any script, in the composed form, so that names which look alike are
-alike."""
+"""Name in a scene file: letters and digits of any script, composed, so that names which look alike are alike."""
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[

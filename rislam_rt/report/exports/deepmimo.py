@@ -182,11 +182,7 @@ def _materials(scene: Scene, radio: RadioConfig) -> list[dict[str, Any]]:
 
 
 def _electric(material: Material, carrier: float) -> dict[str, float]:
-    """Permittivity and conductivity [S/m] of a material for DeepMIMO, at the carrier [Hz].
-
-    A constant coefficient has neither: it is written as the half-space that reflects so at normal incidence, and a
-    coefficient of 1 as a metal.
-    """
+    """Permittivity and conductivity [S/m] at the carrier [Hz] for DeepMIMO; of a constant R, its half-space's."""
     if material.itu is not None:
         a, b, c, d = itu_parameters(material.itu, carrier)
         ghz = carrier / 1e9

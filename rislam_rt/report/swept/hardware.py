@@ -1,5 +1,4 @@
-"""Table, figure and page of the hardware study: errors of the receiver with impairments, with and without
-calibration."""
+"""Table, figure and page of the hardware study: the receiver's errors with impairments and calibration."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,8 +15,7 @@ from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 TITLE = "Hardware: what a laboratory must reach for the panel to matter"
 SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
-"""Tolerable impairment: least share of panel detections relative to an ideal front end, and most further false
-components a cycle."""
+"""Tolerable: least share of panel detections relative to an ideal front end, most further false components."""
 WAYS = {
     "built": ("", "receiver"), "told": ("", "told"), "calibrated": (CALIBRATED, "receiver"),
     "calibrated_told": (CALIBRATED, "told"),

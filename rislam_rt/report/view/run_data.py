@@ -82,10 +82,7 @@ def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, An
 
 
 def _code(scheme: SchemeResult, row: int, shapes: list[list[int]]) -> str:
-    """Phase levels of the code applied in a cycle as text in base 36, panel by panel with `|` between.
-
-    Every level has as many digits as the largest.
-    """
+    """Phase levels applied in a cycle in base 36, of one width, panel by panel with `|` between."""
     index = scheme.applied[row].ravel()
     digits = len(np.base_repr(scheme.levels - 1, 36))
     sizes = [rows * cols for rows, cols in shapes]

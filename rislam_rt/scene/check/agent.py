@@ -19,8 +19,7 @@ MAX_SPEED = 10.0
 
 
 def agent_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of an agent whose start or path lies outside the meshes' bounds, on a surface, inside an
-    object, or through a wall."""
+    """Scene check: errors of an agent out of bounds, on a surface, inside an object, or through a wall."""
     motion = room.scene.agent
     places = {"agent": motion.position, "Tx": motion.tx, "Rx": motion.rx}
     for part, points in places.items():
@@ -35,8 +34,7 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of an open room, of a speed in wrong units, of scatterers inside objects or below an array
-    that looks up."""
+    """Scene check: warnings of an open room, a wrong unit of speed, scatterers in objects or below the array."""
     motion = room.scene.agent
     directions = sphere_directions(NUM_PROBES)
     lost = ray_hits(motion.position[0], directions, room.triangles) < 0
@@ -84,8 +82,7 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _inside_object(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: error of an agent whose start is inside an object; the path crosses no surface, or that was found
-    before."""
+    """Scene check: error of an agent whose start is inside an object; the path crosses no surface."""
     start = room.scene.agent.position[0]
     name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:

@@ -17,8 +17,7 @@ MAX_TURN = 1e-2
 
 
 def panel_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of a RIS panel outside the bounds, off its host, facing out of the room, or over another
-    panel."""
+    """Scene check: errors of a RIS panel out of bounds, off its host, facing out, or over another panel."""
     for panel, key in _keyed(room):
         at = panel.center
         tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
@@ -74,8 +73,7 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
 
 
 def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of a RIS panel that reflects more than a perfect plate, or whose elements are so far apart
-    that beams are ambiguous."""
+    """Scene check: warnings of a RIS panel that outdoes a perfect plate, or whose beams are ambiguous."""
     spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))

@@ -19,8 +19,7 @@ from rislam_rt.scene.shapes import joined, quad
 from rislam_rt.spelling import counted
 
 THICKEST = 0.6
-"""Thickest wall [m]: an opening goes through all walls this near it that run along it, as both faces of a thick wall
-do."""
+"""Thickest wall [m]: an opening goes through all parallel walls this near, as both faces of a thick wall are."""
 ALONG = np.radians(5.0)
 """Largest angle [rad] between an opening of a floor plan and the wall that it goes through."""
 _SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
@@ -127,8 +126,7 @@ def _rectangle(line: Line, low: float, high: float, bottom: float, top: float) -
 
 
 def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mesh]]) -> list[Mesh]:
-    """Faces of the frame that joins both faces of a thick extruded wall about an opening; those at floor and ceiling
-    become part of them."""
+    """Faces of the frame through a thick extruded wall about an opening; those at floor and ceiling join them."""
     first, second = lines
     if abs(float(second.distance(first.start + _reach(opening, first)[0] * first.along))) < SAME_LINE:
         return []
@@ -144,8 +142,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
 
 
 def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
-    """Triangles (T, 3, 2) [m] of the floors of all rooms of a plan; of the rectangle about all walls where no room is
-    drawn."""
+    """Triangles (T, 3, 2) [m] of the floors of a plan's rooms; without any, of the rectangle about all walls."""
     found = []
     for room in plan.rooms:
         triangles = triangulate(room, [])
@@ -162,8 +159,7 @@ def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
 
 
 def _line_name(line: Line, plan: FloorPlan) -> str:
-    """Name of an extruded wall: the drawn one if there is one, else `wall_north` where a room lies on one side only,
-    `partition` between two."""
+    """Name of an extruded wall: the drawn one, else `wall_north` with a room on one side only, or `partition`."""
     if line.name:
         return line.name
     low, high = line.spans[int(np.argmax([high - low for low, high in line.spans]))]

@@ -49,8 +49,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from a mesh, by its flat regions or the planes of a scan: reflectors with materials, and
-    occluders."""
+    """Draft of a room from a mesh, by its flat regions or a scan's planes: reflectors with materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
@@ -72,8 +71,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
 
 
 def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
-    """Surfaces of a mesh that an agent inside the room can see, and the area [m^2] of the others: outer skins, insides
-    of boards."""
+    """Surfaces of a mesh that an agent in the room can see, and the area [m^2] of the others, as outer skins."""
     triangles = np.concatenate([
         *(s.mesh.triangles for s in found.surfaces), *(c.triangles for c in found.clutter)
     ])  # fmt: skip
@@ -89,8 +87,7 @@ def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
 def _reflectors(
     surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: MaterialAssignment
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
-    """Reflectors of an imported mesh with names and materials: each wall of the room's shell by itself, each object as
-    one."""
+    """Reflectors of an imported mesh by name: each wall of the room's shell by itself, each object as one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
     corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])

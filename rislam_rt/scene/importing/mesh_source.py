@@ -1,5 +1,4 @@
-"""Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) read as triangles with the names of their node and
-material."""
+"""Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) as triangles with names of node and material."""
 
 import json
 import struct

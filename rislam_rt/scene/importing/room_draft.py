@@ -72,8 +72,7 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
 
 
 def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
-    """Propose a RIS panel like the paper's on what is above the middle of the agent's line, or else beside it: its
-    table (None if nothing fits), and a remark."""
+    """Propose a RIS panel like the paper's above or beside the agent's line: its table or None, and a remark."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.triangles for mesh, _ in draft.reflectors.values()])
     middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])

@@ -49,8 +49,7 @@ class Line(NamedTuple):
 
 
 def wall_lines(plan: FloorPlan) -> list[Line]:
-    """Lines of all walls of a floor plan, those along one line joined; walls drawn by themselves come before the edges
-    of rooms, which yield to them."""
+    """Lines of all walls of a floor plan, joined along one line; rooms' edges yield to walls drawn themselves."""
     drawn = [(line, material, name) for line, material, name in plan.walls]
     edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
     lines: list[Line] = []

@@ -21,8 +21,7 @@ OFFSET = 5.0
 
 
 def draw_plan(shape: str, *, rng: np.random.Generator) -> Floats:
-    """Draw the corners (E, 2) [m] of a random room's floor plan of one of `SHAPES`, of random size, turned and shifted
-    at random."""
+    """Draw a random room's floor plan (E, 2) [m] of one of `SHAPES`, its size, turn and shift at random."""
     long = float(np.exp(rng.uniform(*np.log(SIZE if shape == "convex" else SIZE_WITH_ARMS))))
     sides = np.array([long, long * rng.uniform(*ASPECT)])
     outline = {"convex": _convex, "l": _ell, "t": _tee, "u": _horseshoe}[shape](sides, rng)
@@ -66,8 +65,7 @@ def triangulate(outline: Floats) -> Integers:
 
 
 def halve(outline: Floats, point: Floats, normal: Floats) -> Floats:
-    """Corners of the part of a convex floor plan on one side of a line, where `normal . (x - point)` is not
-    negative."""
+    """Corners of the part of a convex floor plan where `normal . (x - point)` is not negative."""
     side = (outline - point) @ normal
     kept = []
     for a, b, near, far in zip(outline, np.roll(outline, -1, axis=0), side, np.roll(side, -1), strict=True):

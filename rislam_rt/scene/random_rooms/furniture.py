@@ -21,8 +21,7 @@ KINDS = {
 TABLE_TOP = 0.05
 """Thickness [m] of a table top."""
 OFF_WAY, OFF_WALLS, APART = 0.55, 0.1, 0.15
-"""Least distances [m] of a piece of furniture from the agent's path (where their heights meet), from the walls and from
-another piece."""
+"""Least distances [m] of furniture from the agent's path (where heights meet), from walls, from another piece."""
 HEADROOM = 0.4
 """[m] above and below the agent's path within which a piece counts as on its height, and below the ceiling."""
 _TRIES = 40
@@ -108,8 +107,7 @@ def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generato
 
 
 def fits(piece: FurniturePiece, ground: PlacementLimits, others: list[FurniturePiece]) -> bool:
-    """Whether a piece of furniture stands inside the floor plan, below the ceiling, off the agent's path and off all
-    others."""
+    """Whether a piece of furniture fits the floor plan, is below the ceiling, off the agent's path and other pieces."""
     rim = piece.rim()
     if depth_inside(ground.outline, rim).min() < OFF_WALLS or ground.roof.height(rim).min() < piece.top + HEADROOM:
         return False

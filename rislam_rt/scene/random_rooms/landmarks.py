@@ -1,5 +1,4 @@
-"""Random landmarks of a room, scatterers and RIS panel: open, below the agent, behind a screen; on any wall or in the
-ceiling."""
+"""Random landmarks of a room: scatterers in the open, below the agent or hidden; a RIS panel on wall or ceiling."""
 
 import numpy as np
 
@@ -43,8 +42,7 @@ _TRIES = 60
 def draw_scatterer(
     place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> tuple[Floats, list[FurniturePiece]] | None:
-    """Draw the position (3,) of a random scatterer, at one of `PLACES`, and the screen that hides it, if any; None
-    where nothing fits."""
+    """Draw a random scatterer's position (3,) at one of `PLACES`, and a screen if it has one; None if none fits."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
     for _ in range(_TRIES):
@@ -108,8 +106,7 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Draw the place of a RIS panel on a wall, longer ones more often, above the start and below its upper edge: host,
-    centre, normal and up; None where it does not fit."""
+    """Draw a RIS panel's host, centre, normal and up on a wall, above the start; None where it does not fit."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)

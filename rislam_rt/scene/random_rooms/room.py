@@ -95,8 +95,7 @@ def draw_room(seed: int) -> RandomRoom:
 
 
 def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
-    """One draw of a random room: floor plan, roof, motion, furniture, landmarks, materials; refused where nothing fits
-    in."""
+    """One draw of a random room, from floor plan to materials; refused where nothing fits in."""
     outline = draw_plan(shape, rng=rng)
     roof = draw_roof(outline, ceiling, rng=rng)
     agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)

@@ -12,11 +12,9 @@ from rislam_rt.scene.random_rooms.floor_plan import extent, halve, triangulate
 CEILINGS = ("flat", "shed", "gable")
 """Forms of a random room's ceiling: level, one slope, two slopes (over convex plans)."""
 LOWEST = (2.2, 6.0)
-"""Range [m] of the height at a random room's lowest wall, log-uniform; a small room is at most `SLENDER` times as high
-as wide."""
+"""Range [m] of a random room's lowest wall, log-uniform; at most `SLENDER` times the width of a small room."""
 SLENDER, RISE, STEEPEST = 1.3, (0.3, 5.0), 0.5
-"""Largest height of a small random room over its width; range [m] by which a sloped ceiling rises, log-uniform, and its
-largest slope."""
+"""Largest height over width of a small random room; range [m] of a ceiling's rise, log-uniform; largest slope."""
 
 
 class Roof(NamedTuple):
@@ -64,8 +62,7 @@ def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
 
 
 def build_shell(outline: Floats, roof: Roof) -> dict[str, Mesh]:
-    """Meshes of a random room's shell by name, normals inwards: `floor`, `ceiling` (a gable has `ceiling_a` and
-    `ceiling_b`), `wall_0`, ..."""
+    """Meshes of a random room's shell, normals inwards: `floor`, `ceiling` (a gable: `_a`, `_b`), `wall_0`, ..."""
     faces = triangulate(outline)
     meshes = {"floor": Mesh(_lifted(outline, np.zeros(len(outline))), faces)}
     if roof.form == "gable":
@@ -92,8 +89,7 @@ def ceiling_normal(roof: Roof, point: Floats) -> Floats:
 
 
 def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
-    """Mesh of one wall of a random room: a strip from the floor to the ceiling, with a corner more where a ridge meets
-    it."""
+    """Mesh of a random room's wall, from floor to ceiling, with a corner more where a ridge meets it."""
     feet = [a, b]
     near, far = ((p - roof.point) @ roof.axis for p in (a, b))
     if roof.form == "gable" and near * far < 0.0:

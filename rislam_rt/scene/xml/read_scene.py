@@ -125,8 +125,7 @@ class _XmlMaterials:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """Material of a shape of an XML scene file: its own, or the one it refers to; None where nothing is
-        reflected."""
+        """Material of a shape of an XML scene file: its own, or the one it refers to; None where nothing reflects."""
         for own in children(shape, "bsdf"):
             return self._noted(read_material(own)).material
         for reference in children(shape, "ref"):
@@ -159,13 +158,7 @@ def _root(path: Path) -> Element:
 
 
 def _shapes(parent: Element) -> Iterator[Element]:
-    """All shapes of an XML scene file in order, those within a `merge` too.
-
-    Raises
-    ------
-    Fault
-        An element that is neither a shape, nor a material, nor for cameras alone.
-    """
+    """All shapes of an XML scene file in order, those within a `merge` too; a Fault for an element of no meaning."""
     for element in parent:
         if element.tag == "shape" and element.get("type") == "merge":
             yield from _shapes(element)

@@ -41,8 +41,7 @@ class FlatRegions(NamedTuple):
     residual: Floats
     """(R,) [m] distance of a region's farthest corner from its plane."""
     component: Integers
-    """(R,) connected part of the mesh, by edges, that each region belongs to: a leg that stands on a corner of the
-    floor is none of it."""
+    """(R,) part of the mesh connected by edges that each region is in; one that touches at a corner is none of it."""
     edges: Edges
 
     def faces_of(self, regions: Integers) -> Integers:
@@ -77,8 +76,7 @@ def bounds_of(facets: FlatRegions, regions: Integers) -> Floats:
 
 
 def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float) -> Integers:
-    """Group number (R,) of each flat region of a mesh: chosen regions that hang together by edges at which they meet at
-    `low` to `high` [rad] have one."""
+    """Group (R,) of each flat region: chosen ones whose common edges turn by `low` to `high` [rad] have one."""
     edges, region = facets.edges, facets.region
     a, b = region[edges.a], region[edges.b]
     joined = (a != b) & (edges.turn >= low) & (edges.turn <= high) & chosen[a] & chosen[b]
@@ -104,8 +102,7 @@ def _largest(region: Integers, area: Floats, count: int) -> Integers:
 
 
 def _planes(triangles: Floats, area: Floats, region: Integers, side: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Least-squares plane of each flat region by its triangles' second moments, normals on the side of `side` (R, 3):
-    normal, offset, width and residual."""
+    """Least-squares normal (on the side of `side` (R, 3)), offset, width and residual of each flat region."""
     count = len(side)
     total = np.bincount(region, area, count)
     middle = triangles.mean(axis=1)

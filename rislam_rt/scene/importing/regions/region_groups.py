@@ -1,5 +1,4 @@
-"""Groups of a mesh's flat regions that belong together, and their names: the shell of the room, and each object in
-it."""
+"""Groups of a mesh's flat regions, and their names: the shell of the room, and each object in it."""
 
 import re
 from typing import NamedTuple
@@ -78,8 +77,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
 
 
 def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
-    """Whether an object is one flat region in the plane of a wall of the shell that it touches, as the wall above a
-    door."""
+    """Whether an object is a flat region in the plane of a shell's wall that it touches, as above a door."""
     if len(regions) != 1:
         return False
     normal, offset = facets.normal[regions[0]], facets.offset[regions[0]]
@@ -105,8 +103,7 @@ def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
 
 
 def plain_name(name: str) -> str:
-    """Plain name of an object from its node's name: `Office Chair.002` is `office_chair_002`; empty for a name that
-    says nothing."""
+    """Plain name of a node's object, `Office Chair.002`: `office_chair_002`; empty where the name says nothing."""
     if _NAMELESS.fullmatch(name):
         return ""
     plain = re.sub(r"[^\w.\-]+", "_", name.strip(), flags=re.UNICODE).strip("_.-").lower()
@@ -120,8 +117,7 @@ def place_free_name(name: str) -> str:
 
 
 def kind_by_shape(bounds: Floats, room: Floats) -> str:
-    """Name of an object of an imported room by its size and place (`table`, `cabinet`, ...); nothing that is computed
-    with."""
+    """Name of an object of an imported room by size and place (`table`, ...); nothing is computed with it."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])
     bottom, top = float(bounds[0, 2]) - floor, float(bounds[1, 2]) - floor
     longest, shortest = float(size[:2].max()), float(size[:2].min())
@@ -139,8 +135,7 @@ def kind_by_shape(bounds: Floats, room: Floats) -> str:
 
 
 def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
-    """Name of a wall by where in the shell of an imported room it is: `floor`, `ceiling`, `wall_north` (y to the
-    north)."""
+    """Name of a wall by its place in an imported room's shell: `floor`, `ceiling`, `wall_north` (along y)."""
     center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
     if abs(normal[2]) >= LEVEL:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
@@ -152,8 +147,7 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
 
 
 def numbered(names: list[str]) -> list[str]:
-    """Names of an imported room's reflectors or occluders made different: the second of one name gets `_2`, and so
-    on."""
+    """Names of an imported room's parts made different: the second of one name gets `_2`, and so on."""
     taken: set[str] = set()
     found = []
     for name in names:

@@ -10,8 +10,7 @@ from rislam_rt.geometry.connected_parts import connected
 from rislam_rt.geometry.triangles import triangle_heights
 
 WELD = 2e-5
-"""Distance [m] of corners below which they are one: what float32 leaves open in a file of 100 m, and no drawing means
-less."""
+"""Distance [m] of corners below which they are one: what float32 leaves open in a file of 100 m."""
 
 
 class Welded(NamedTuple):
@@ -26,8 +25,7 @@ class Welded(NamedTuple):
 
 
 def weld(triangles: list[Floats]) -> Welded:
-    """Weld the parts (T, 3, 3) [m] of a mesh at their common corners; triangles without area and doubles are left
-    out."""
+    """Weld parts (T, 3, 3) [m] of a mesh at common corners, without doubles and triangles without area."""
     corners = np.concatenate([t.reshape(-1, 3) for t in triangles])
     part = np.repeat(np.arange(len(triangles)), [len(t) for t in triangles])
     vertices, index = np.unique(corners, axis=0, return_inverse=True)

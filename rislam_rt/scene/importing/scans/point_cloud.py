@@ -62,8 +62,7 @@ def downsample_mesh(mesh: Welded) -> PointCloud:
 
 
 def _facing(mesh: Welded) -> tuple[Floats, Floats]:
-    """Normal (V, 3) of a scanned mesh at each corner, smoothed over its neighbours, and the area (V,) [m^2] that it
-    stands for."""
+    """Smoothed normal (V, 3) of a scanned mesh at each corner, and the area (V,) [m^2] that it stands for."""
     triangles = mesh.vertices[mesh.faces]
     cross = triangle_cross(triangles)
     share, facing = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 3))

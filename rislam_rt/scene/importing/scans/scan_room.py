@@ -16,8 +16,7 @@ from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_
 FLAT_SHARE = 0.3
 """Share of a mesh's area in wide flat regions below which it is a scan."""
 CLOSE = 0.05
-"""Distance [m] from a scanned plane up to which it explains what is there, whatever the noise: skirting boards, frames,
-sockets."""
+"""Distance [m] from a scanned plane up to which it explains what is there: skirting boards, frames, sockets."""
 
 
 def looks_scanned(facets: FlatRegions, options: ImportOptions) -> bool:
@@ -65,8 +64,7 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
 
 
 def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline], noise: float) -> bool:
-    """Whether a scanned plane is the back of what stands on a larger one: parallel, nearer than noise can tell, within
-    it."""
+    """Whether a scanned plane is the back of what stands on a larger one: parallel, within noise and outline."""
     (plane, outline), (wall, around) = pair, larger
     corners = outline.mesh.vertices
     if abs(float(plane.normal @ wall.normal)) < np.cos(np.radians(5.0)):
