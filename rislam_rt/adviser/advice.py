@@ -30,11 +30,8 @@ class Advice(NamedTuple):
                  "reason": link.reason[at]} for at in link.three
             ]  # fmt: skip
             words = {
-                "landmark": link.landmark,
-                "code": link.code,
-                "share": link.share,
-                "verdict": detection_label(link),
-            }
+                "landmark": link.landmark, "code": link.code, "share": link.share, "verdict": detection_label(link),
+            }  # fmt: skip
             links.append(words | dict(zip(("start", "middle", "end"), places, strict=True)))
         costs = [cost._asdict() for cost in self.costs]
         return {"threshold_db": self.threshold_db, "links": links, "remedies": self.remedies, "costs": costs}

@@ -23,27 +23,8 @@ from rislam_rt.evaluate.plane_matching import (
 from rislam_rt.evaluate.set_distances import gospa, match_points
 
 __all__ = [
-    "NEAR_ANGLE",
-    "NEAR_WALL",
-    "Interval",
-    "Surfaces",
-    "align",
-    "association_fractions",
-    "association_score",
-    "bootstrap",
-    "bootstrap_ratio",
-    "ghost_planes",
-    "gospa",
-    "label_switches",
-    "match_planes",
-    "match_points",
-    "median_over_runs",
-    "normalised_squares",
-    "plane_angle",
-    "plane_distance",
-    "position_errors",
-    "rms_over_runs",
-    "rmse",
-    "root_mean_square",
-    "share_interval",
-]
+    "NEAR_ANGLE", "NEAR_WALL", "Interval", "Surfaces", "align", "association_fractions", "association_score",
+    "bootstrap", "bootstrap_ratio", "ghost_planes", "gospa", "label_switches", "match_planes", "match_points",
+    "median_over_runs", "normalised_squares", "plane_angle", "plane_distance", "position_errors", "rms_over_runs",
+    "rmse", "root_mean_square", "share_interval",
+]  # fmt: skip

@@ -95,18 +95,12 @@ class Paths:
     def __post_init__(self) -> None:
         cycles, paths = np.shape(self.valid)
         for name, dtype, shape in (
-            ("kind", np.int64, (paths,)),
-            ("landmark", np.int64, (paths,)),
-            ("tx_walls", np.int64, (paths, None)),
-            ("rx_walls", np.int64, (paths, None)),
-            ("valid", np.bool_, (cycles, paths)),
-            ("tau", np.float64, (cycles, paths)),
-            ("departure", np.float64, (cycles, paths, 3)),
-            ("arrival", np.float64, (cycles, paths, 3)),
-            ("gain", np.complex128, (cycles, paths)),
-            ("vertices", np.float64, (cycles, paths, None, 3)),
-            ("num_vertices", np.int64, (paths,)),
-        ):
+            ("kind", np.int64, (paths,)), ("landmark", np.int64, (paths,)), ("tx_walls", np.int64, (paths, None)),
+            ("rx_walls", np.int64, (paths, None)), ("valid", np.bool_, (cycles, paths)),
+            ("tau", np.float64, (cycles, paths)), ("departure", np.float64, (cycles, paths, 3)),
+            ("arrival", np.float64, (cycles, paths, 3)), ("gain", np.complex128, (cycles, paths)),
+            ("vertices", np.float64, (cycles, paths, None, 3)), ("num_vertices", np.int64, (paths,)),
+        ):  # fmt: skip
             freeze(self, name, dtype, shape)
 
     def __repr__(self) -> str:

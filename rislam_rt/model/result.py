@@ -80,23 +80,15 @@ class SchemeResult:
     def __post_init__(self) -> None:
         cycles, held = np.shape(self.position)[0], len(np.asarray(self.ident))
         for name, dtype, shape in (
-            ("time", np.float64, (cycles,)),
-            ("position", np.float64, (cycles, 3)),
-            ("velocity", np.float64, (cycles, 3)),
-            ("heading", np.float64, (cycles,)),
-            ("covariance", np.float64, (cycles, 6, 6)),
-            ("sent", np.int64, (cycles, None, None)),
-            ("applied", np.int64, (cycles, None, None)),
-            ("gain", np.complex128, (cycles, None)),
-            ("component_path", np.int64, (cycles, None)),
-            ("component_landmark", np.int64, (cycles, None)),
-            ("ident", np.int64, (held,)),
-            ("parent", np.int64, (held,)),
-            ("held", np.bool_, (cycles, held)),
-            ("landmark_position", np.float64, (cycles, held, 3)),
-            ("ris_probability", np.float64, (cycles, held)),
+            ("time", np.float64, (cycles,)), ("position", np.float64, (cycles, 3)),
+            ("velocity", np.float64, (cycles, 3)), ("heading", np.float64, (cycles,)),
+            ("covariance", np.float64, (cycles, 6, 6)), ("sent", np.int64, (cycles, None, None)),
+            ("applied", np.int64, (cycles, None, None)), ("gain", np.complex128, (cycles, None)),
+            ("component_path", np.int64, (cycles, None)), ("component_landmark", np.int64, (cycles, None)),
+            ("ident", np.int64, (held,)), ("parent", np.int64, (held,)), ("held", np.bool_, (cycles, held)),
+            ("landmark_position", np.float64, (cycles, held, 3)), ("ris_probability", np.float64, (cycles, held)),
             ("seconds", np.float64, (cycles, len(STEPS))),
-        ):
+        ):  # fmt: skip
             freeze(self, name, dtype, shape)
         if self.panel is not None:
             freeze(self, "panel", np.int64, (cycles, held))

@@ -71,13 +71,10 @@ def path_table(paths: Paths) -> list[dict[str, Any]]:
         level = 20.0 * np.log10(np.maximum(np.abs(paths.gain[:, columns][valid]), 1e-20))
         rows.append(
             {
-                "class": kind.name,
-                "identities": len(columns),
-                "mean_per_cycle": float(valid.sum(axis=1).mean()),
-                "lowest_gain_db": float(level.min()),
-                "highest_gain_db": float(level.max()),
+                "class": kind.name, "identities": len(columns), "mean_per_cycle": float(valid.sum(axis=1).mean()),
+                "lowest_gain_db": float(level.min()), "highest_gain_db": float(level.max()),
             }
-        )
+        )  # fmt: skip
     return rows
 
 

@@ -150,15 +150,10 @@ def _material(section: MaterialSection) -> Material:
     """Material of a reflector from its section of the scene file."""
     given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
     return Material(
-        section.reflection,
-        section.itu,
-        permittivity=section.permittivity,
-        conductivity=section.conductivity_s_m or 0.0,
-        reflection_te=section.reflection_te,
-        reflection_tm=section.reflection_tm,
-        scattering=section.scattering,
-        **given,
-    )
+        section.reflection, section.itu, permittivity=section.permittivity,
+        conductivity=section.conductivity_s_m or 0.0, reflection_te=section.reflection_te,
+        reflection_tm=section.reflection_tm, scattering=section.scattering, **given,
+    )  # fmt: skip
 
 
 def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:

@@ -51,15 +51,9 @@ def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
     target = io.BytesIO()
     durations = [FRAME_MS] * (len(pictures) - 1) + [LAST_MS]
     pictures[0].save(
-        target,
-        format="GIF",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=durations,
-        loop=0,
-        optimize=True,
+        target, format="GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0, optimize=True,
         comment=MARK,
-    )
+    )  # fmt: skip
     return target.getvalue()
 
 

@@ -23,12 +23,9 @@ REFLECTION, SCATTERING = 1, 3
 """DeepMIMO's interaction codes: those of a path are the digits of one number, from the Tx on; a line of sight is 0."""
 NO_DIFFUSE = ("diffuse_reflections", "diffuse_diffractions", "diffuse_transmissions")
 NO_FLAGS = (
-    "diffuse_final_interaction_only",
-    "diffuse_random_phases",
-    "terrain_reflection",
-    "terrain_diffraction",
+    "diffuse_final_interaction_only", "diffuse_random_phases", "terrain_reflection", "terrain_diffraction",
     "terrain_scattering",
-)
+)  # fmt: skip
 NO_SCATTERING = ("cross_polarization_coefficient", "roughness", "vertical_attenuation", "horizontal_attenuation")
 """Settings that the format wants and that have no meaning here: paths are specular or run over a point."""
 METAL = 1e7
@@ -86,16 +83,11 @@ def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
     points = np.array(paths.vertices[cycle, found, :longest])
     points[np.arange(points.shape[1]) >= count[:, None]] = np.nan
     values = {
-        "power": 20.0 * np.log10(np.abs(gain)),
-        "phase": np.rad2deg(np.angle(gain)),
-        "delay": paths.tau[cycle, found],
-        "aod_az": np.rad2deg(phi_t),
-        "aod_el": np.rad2deg(theta_t),
-        "aoa_az": np.rad2deg(phi_r),
+        "power": 20.0 * np.log10(np.abs(gain)), "phase": np.rad2deg(np.angle(gain)), "delay": paths.tau[cycle, found],
+        "aod_az": np.rad2deg(phi_t), "aod_el": np.rad2deg(theta_t), "aoa_az": np.rad2deg(phi_r),
         "aoa_el": np.rad2deg(theta_r),
-        "inter": np.array([_interactions(paths, int(path)) for path in found], dtype=np.float64),
-        "inter_pos": points,
-    }
+        "inter": np.array([_interactions(paths, int(path)) for path in found], dtype=np.float64), "inter_pos": points,
+    }  # fmt: skip
     return {name: values[name][None] for name in PER_PATH}
 
 
@@ -139,30 +131,19 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
         },
         "txrx_sets": {
             f"txrx_set_{number}": {
-                "name": name,
-                "id_orig": number,
-                "id": number,
-                "is_tx": name == "tx",
-                "is_rx": name == "rx",
-                "num_points": 1,
-                "num_active_points": 1,
-                "num_ant": 1,
-                "dual_pol": False,
-                "ant_rel_positions": [[0, 0, 0]],
-                "array_orientation": [0, 0, 0],
+                "name": name, "id_orig": number, "id": number, "is_tx": name == "tx", "is_rx": name == "rx",
+                "num_points": 1, "num_active_points": 1, "num_ant": 1, "dual_pol": False,
+                "ant_rel_positions": [[0, 0, 0]], "array_orientation": [0, 0, 0],
             }
             for number, name in enumerate(("tx", "rx"))
         },
         "materials": {f"material_{n}": one for n, one in enumerate(_materials(scene, radio))},
         "scene": {
-            "num_scenes": paths.num_cycles,
-            "n_objects": len(scene.reflectors),
-            "n_vertices": sum(len(one.vertices) for one in scene.reflectors),
-            "n_faces": faces,
-            "n_triangular_faces": faces,
-            "representation": "mesh",
+            "num_scenes": paths.num_cycles, "n_objects": len(scene.reflectors),
+            "n_vertices": sum(len(one.vertices) for one in scene.reflectors), "n_faces": faces,
+            "n_triangular_faces": faces, "representation": "mesh",
         },
-    }
+    }  # fmt: skip
 
 
 def _distinct(scene: Scene) -> list[Material]:

@@ -26,14 +26,11 @@ def room_data(scene: Scene) -> dict[str, Any]:
     meshes = [*scene.occluders, *(s.shade for s in scene.scatterers if s.shade is not None)]
     occluders = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
     return {
-        "bounds": rounded(scene.bounds),
-        "walls": walls,
-        "left_out": left_out,
-        "shades": rounded(occluders[:MOST_TRIANGLES]),
-        "panels": [_panel(panel) for panel in scene.panels],
+        "bounds": rounded(scene.bounds), "walls": walls, "left_out": left_out,
+        "shades": rounded(occluders[:MOST_TRIANGLES]), "panels": [_panel(panel) for panel in scene.panels],
         "scatterers": [{"name": s.name, "position": rounded(s.position)} for s in scene.scatterers],
         "track": rounded(way[spread(len(way), WAY_POINTS)]),
-    }
+    }  # fmt: skip
 
 
 def spread(count: int, most: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
@@ -64,15 +61,12 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
         named.add(reflector)
         found.append(
             {
-                "name": walls.names[wall],
-                "label": label,
-                "normal": rounded(walls.normal[wall], 5),
+                "name": walls.names[wall], "label": label, "normal": rounded(walls.normal[wall], 5),
                 "offset": round(float(walls.offset[wall]), 5),
                 "center": rounded(np.average(own.mean(axis=1), axis=0, weights=area[walls.wall_of_triangle == wall])),
-                "triangles": rounded(_same_sense(own, walls.normal[wall])),
-                "edges": rounded(outline_edges(own)),
+                "triangles": rounded(_same_sense(own, walls.normal[wall])), "edges": rounded(outline_edges(own)),
             }
-        )
+        )  # fmt: skip
     return found, len(order) - len(shown)
 
 

@@ -17,20 +17,14 @@ def find_errors(scene: Scene, file: str) -> list[Finding]:
     """Find what makes a scene unusable. Damaged meshes hide the rest, which could not be computed."""
     room = build_triangle_array(scene, file)
     return [*name_errors(room), *face_errors(room), *occluder_face_errors(room)] or [
-        *scatterer_errors(room),
-        *occluder_errors(room),
-        *panel_errors(room),
-        *agent_errors(room),
-    ]
+        *scatterer_errors(room), *occluder_errors(room), *panel_errors(room), *agent_errors(room),
+    ]  # fmt: skip
 
 
 def find_warnings(scene: Scene, file: str, radio: RadioConfig) -> list[Finding]:
     """Find what may be meant but seldom is, and what is worth knowing, of a scene whose meshes are not damaged."""
     room = build_triangle_array(scene, file)
     return [
-        *mesh_warnings(room),
-        *wall_findings(room),
-        *panel_warnings(room, radio),
-        *cylinder_warnings(room, radio),
+        *mesh_warnings(room), *wall_findings(room), *panel_warnings(room, radio), *cylinder_warnings(room, radio),
         *agent_warnings(room, radio),
-    ]
+    ]  # fmt: skip
