@@ -49,12 +49,15 @@ class Reasons(NamedTuple):
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:
-        """Name of the mesh that stands between a landmark and Tx or Rx at one position; empty if none does."""
+        """Name of the mesh that hides a landmark from Tx or Rx at one position, its own left out; empty if none does."""
+        scatterer = self.scene.scatterers[number] if number < len(self.scene.scatterers) else None
+        own = (
+            scatterer.name if scatterer is not None and scatterer.shade is not None else ""
+        )  # hides all but its centre
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):
             last = point + CLEARANCE * (end - point)
             _, hit = crossings(end[None], last[None], self.triangles)
-            names = [self.owner[t] for t in hit]
-            names = [name for name in names if name != _occluder_name(self.scene, number)]
+            names = [self.owner[t] for t in hit if self.owner[t] != own]
             if names:
                 return names[0]
         return ""
@@ -68,11 +71,3 @@ def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
     triangles = np.concatenate([triangles for _, triangles in meshes])
     owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))
     return Reasons(scene, paths, settings, triangles, owner)
-
-
-def _occluder_name(scene: Scene, number: int) -> str:
-    """Name of a scatterer's own occluder, which does not hide the scatterer's centre; empty for landmarks without
-    one."""
-    if number < len(scene.scatterers) and scene.scatterers[number].shade is not None:
-        return scene.scatterers[number].name
-    return ""

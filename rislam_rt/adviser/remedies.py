@@ -97,11 +97,10 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
     panel = next(one for one in scene.panels if one.name == link.landmark)
     spec, grown = panel.spec, enough_elements(looked, panel, link)
     now = f"(now {spec.rows} x {spec.cols})"
-    yield (
-        f"or a panel of {grown.rows} x {grown.cols} elements {now}"
-        if grown
-        else (f"no panel of up to {LARGEST} elements a side would do {now}")
-    )
+    if grown:
+        yield f"or a panel of {grown.rows} x {grown.cols} elements {now}"
+    else:
+        yield f"no panel of up to {LARGEST} elements a side would do {now}"
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:

@@ -46,16 +46,9 @@ def association_fractions(labels: Integers, identities: Integers, counts: Intege
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[scipy.optimize.linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
-    total, answered, known = (
-        int(counts.sum()),
-        int(counts[labels != NONE].sum()),
-        int(counts[:, identities != NONE].sum()),
-    )
-    return (
-        (right + left_alone) / total if total else 1.0,
-        right / answered if answered else 1.0,
-        right / known if known else 1.0,
-    )
+    parts = (right + left_alone, counts), (right, counts[labels != NONE]), (right, counts[:, identities != NONE])
+    accuracy, precision, recall = (part / int(of.sum()) if of.sum() else 1.0 for part, of in parts)
+    return accuracy, precision, recall
 
 
 def label_switches(label: Integers, truth: Integers) -> int:

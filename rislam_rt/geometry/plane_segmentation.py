@@ -1,6 +1,5 @@
 """Plane segmentation of a triangle mesh: which triangles lie in one plane, and the plane that fits their corners."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +57,9 @@ def planar_regions(triangles: Floats, angle: float, offset: float) -> PlanarRegi
         return PlanarRegions(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
     order, mesh = _sorted_mesh(triangles, angle)
     group = np.full(len(triangles), -1, dtype=np.int64)
-    for count, seed in enumerate(_seeds(mesh.slack, group)):
-        group[_grown(mesh, seed, group < 0, angle, offset)] = count
+    for seed in np.argsort(mesh.slack, kind="stable"):  # the surest normal first
+        if group[seed] < 0:
+            group[_grown(mesh, int(seed), group < 0, angle, offset)] = group.max() + 1
     unsorted = np.empty_like(group)
     unsorted[order] = group
     _, first, number = np.unique(unsorted, return_index=True, return_inverse=True)
@@ -76,13 +76,6 @@ def fit_plane(points: Floats, side: Floats) -> tuple[Floats, float]:
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][-1]
     normal = np.copysign(1.0, normal @ side) * normal
     return normal, float(normal @ middle)
-
-
-def _seeds(slack: Floats, group: Integers) -> Iterator[int]:
-    """Rows of the triangles from which planes are grown: those without a group yet, the most accurate normal first."""
-    for seed in np.argsort(slack, kind="stable"):
-        if group[seed] < 0:
-            yield int(seed)
 
 
 def _sorted_mesh(triangles: Floats, angle: float) -> tuple[Integers, _Mesh]:

@@ -17,8 +17,7 @@ from rislam_rt.report.map_from_above import draw_above
 from rislam_rt.report.room_figures import draw_paths
 from rislam_rt.report.style import to_png
 from rislam_rt.report.terminal_tables import summary_rows
-from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels
-from rislam_rt.report.timing import draw_timing
+from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels, draw_timing
 from rislam_rt.report.view.page import view_fragment, view_script, view_style
 from rislam_rt.report.view.run_data import run_data
 from rislam_rt.storage.files import write_atomic

@@ -1,12 +1,15 @@
-"""Figures of curves against time: errors of agent and landmarks with the filter's own std, gains of path classes."""
+"""Figures of curves against time (errors, gains of path classes), and of the computing times of a cycle's steps."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
-from rislam_rt.model import PathKind, SchemeResult, SlamResult
+from rislam_rt.model import STEPS, PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.report.style import KIND, scheme_colour, styled
 
@@ -103,3 +106,30 @@ def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         level = 20.0 * np.log10(gain)
     return np.where(gain > 0.0, level, np.nan)
+
+
+def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
+    """Draw the computing times of the cycle's steps: median (bar), 99th percentile (whisker), and `budget` [s]."""
+    schemes = result.schemes
+    height = 0.8 / len(schemes)
+    with styled():
+        figure = Figure(figsize=(8.6, 1.4 + 0.45 * len(STEPS) * max(len(schemes), 2) / 2))
+        axis = figure.subplots()
+        for number, (name, scheme) in enumerate(schemes.items()):
+            at = np.arange(len(STEPS)) - 0.4 + (number + 0.5) * height
+            median, high = 1e3 * np.percentile(scheme.seconds, [50.0, 99.0], axis=0)
+            whisker = np.stack([np.zeros(len(STEPS)), high - median])
+            axis.barh(at, median, 0.9 * height, xerr=whisker, color=scheme_colour(name), label=name,
+                      error_kw={"lw": 1.0, "capsize": 2})  # fmt: skip
+        for step, limit in enumerate(budget):
+            axis.plot([1e3 * limit] * 2, [step - 0.45, step + 0.45], color="black", lw=2.0)
+        axis.set_yticks(np.arange(len(STEPS)), STEPS)
+        axis.invert_yaxis()
+        axis.set_xscale("log")
+        axis.set_xlabel("time of a step [ms]")
+        axis.grid(False, axis="y")
+        axis.set_title("Steps of a cycle against their budgets", weight="bold")
+        handles, _ = axis.get_legend_handles_labels()
+        budget_line = Line2D([], [], color="black", lw=2.0, label="budget")
+        figure.legend(handles=[*handles, budget_line], loc="outside lower center", ncols=5, fontsize=9)
+    return figure

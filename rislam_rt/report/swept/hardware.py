@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import NOTHING, ratio
+from rislam_rt.report.swept.table_cells import NOTHING, percent, ratio
 from rislam_rt.studies.swept import Group, HardwareSpec
 from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 
@@ -76,7 +76,7 @@ def hardware_body(content: Mapping[str, Any], spec: HardwareSpec, figure: str | 
     """Lines of the hardware study's page: tolerable levels, the picture, all numbers."""
     ideal = content["entries"][0]
     text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
-    hears it ({_share(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
+    hears it ({percent(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
     ({ratio(ideal["false"])}); {NOTHING} where it is so at none of the levels tried:"""
     lines = [*paragraph(LAW), "", *paragraph(text), ""]
     head = ["fault", *NAMES.values(), "levels tried"]
@@ -143,12 +143,7 @@ def _rows(content: Mapping[str, Any], scores: Sequence[str]) -> list[list[str]]:
         unit = content["about"].get(name, {}).get("unit", "")
         cells = [f"`{name}`", f"{level} {unit}".strip()]
         for score in scores:
-            show = _share if score == "panel" else ratio
+            show = percent if score == "panel" else ratio
             cells += [show(ways[way][score]) if way in ways else NOTHING for way in WAYS]
         rows.append(cells)
     return rows
-
-
-def _share(value: float | None) -> str:
-    """Table cell: a share in percent."""
-    return NOTHING if value is None else f"{100 * value:.0f} %"

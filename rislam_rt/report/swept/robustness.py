@@ -7,16 +7,9 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import (
-    interval_entry,
-    metres,
-    metres_between,
-    percent_between,
-    ratio,
-    rmse_change,
-    scheme_entry,
-)
+from rislam_rt.report.swept.entries import interval_entry, rmse_change, scheme_entry
 from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
+from rislam_rt.report.swept.table_cells import metres, metres_between, percent, percent_between, ratio
 from rislam_rt.studies.swept import Group, RobustnessSpec
 
 WORST = 3
@@ -122,10 +115,10 @@ def _row(content: Mapping[str, Any], entry: Mapping[str, Any]) -> list[str]:
     name = entry["mismatch"]
     note = f"`{name}`: {content['about'][name]['note']}" if name else "`reference`: nothing is wrong"
     level = _level(content, name, entry["level"]) + ("*" if entry["ordinary"] else "") if name else ""
-    found = "-" if entry["ris_found"] is None else f"{100 * entry['ris_found']:.0f} %"
     return [
         note, level, entry["scheme"], metres_between(entry), percent_between(entry, "change"), metres(entry["bound_m"]),
-        metres(entry["aligned_m"]), ratio(entry["nees_per_dof"]), metres(entry["ris_m"]), found,
+        metres(entry["aligned_m"]), ratio(entry["nees_per_dof"]), metres(entry["ris_m"]),
+        percent(entry["ris_found"]),
         ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
     ]  # fmt: skip
 

@@ -11,8 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.importing.obj import read_obj
-from rislam_rt.scene.mesh_file_checks import check_glb
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, node_mesh, sound_mesh, unfold
+from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, check_glb, node_mesh, sound_mesh, unfold
 from rislam_rt.scene.read_inside_folder import read_inside
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")

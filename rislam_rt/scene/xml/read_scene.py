@@ -15,9 +15,8 @@ from rislam_rt.model import Material
 from rislam_rt.scene.check.triangle_array import without_area
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
-from rislam_rt.scene.xml.clip import clip_mesh
 from rislam_rt.scene.xml.materials import XmlMaterial, read_material
-from rislam_rt.scene.xml.shapes import shape_mesh
+from rislam_rt.scene.xml.shapes import clip_mesh, shape_mesh
 from rislam_rt.scene.xml.untrusted_xml import MAX_XML_BYTES, children, parse_xml
 
 SIONNA = "sionna:"
