@@ -49,11 +49,9 @@ class Reasons(NamedTuple):
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:
-        """Name of the mesh that hides a landmark from Tx or Rx at one position, its own left out; empty if none does."""
-        scatterer = self.scene.scatterers[number] if number < len(self.scene.scatterers) else None
-        own = (
-            scatterer.name if scatterer is not None and scatterer.shade is not None else ""
-        )  # hides all but its centre
+        """Name of the mesh, not its own, that hides a landmark from Tx or Rx at a position; empty if none does."""
+        scatterers = self.scene.scatterers
+        own = scatterers[number].name if number < len(scatterers) and scatterers[number].shade is not None else ""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):
             last = point + CLEARANCE * (end - point)
             _, hit = crossings(end[None], last[None], self.triangles)

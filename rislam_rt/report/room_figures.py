@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.report.drawing_geometry import wall_edges
@@ -117,8 +117,3 @@ def path_points(scene: Scene, paths: Paths, cycle: int, path: int) -> Floats:
     count = int(paths.num_vertices[path])
     inner = paths.vertices[cycle, path, :count]
     return np.concatenate([scene.agent.tx[cycle][None], inner, scene.agent.rx[cycle][None]])
-
-
-def middle_cycles(count: int, number: int) -> Integers:
-    """Cycles to be shown in a figure: the middles of `number` equal parts of `count` cycles."""
-    return ((np.arange(number) + 0.5) / number * count).astype(np.int64)

@@ -117,17 +117,17 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
                 findings.append(fault.at(str(file), field))
         return found
 
-    reflectors = made(
-        "reflector",
-        spec.reflector,
-        lambda one: Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material)),
-    )
+    def reflector(one: Any) -> Reflector:
+        return Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material))
+
+    reflectors = made("reflector", spec.reflector, reflector)
     scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, mesh_files))
     occluders = made("shade", spec.shade, lambda one: Occluder(*mesh_files.mesh(one.mesh, one), one.name))
     panels = made("ris", spec.ris, build_panel)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
-            surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
+            meshes = [*reflectors, *occluders, *(s.shade for s in scatterers if s.shade)]
+            surfaces = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
             agent, mesh_files.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
@@ -139,11 +139,6 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     digest = _digest(content, mesh_files.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
     return SceneDraft(str(file), scene, [], bounds)
-
-
-def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
-    """Triangles (T, 3, 3) [m] of all reflectors and occluders of a scene, from which a random walk keeps away."""
-    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
 
 
 def _material(section: MaterialSection) -> Material:

@@ -153,9 +153,8 @@ def _heading(q: Floats) -> Floats:
     """Headings (K,) [rad] of recorded unit quaternions (K, 4), which must be turns about z."""
     length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
     if (np.abs(length - 1.0) > 1e-3).any():
-        raise Fault(
-            f"quaternion of pose {int(np.argmax(np.abs(length - 1.0) > 1e-3))} has not length 1", "normalise it"
-        )
+        pose = int(np.argmax(np.abs(length - 1.0) > 1e-3))
+        raise Fault(f"quaternion of pose {pose} has not length 1", "normalise it")
     x, y, z, w = (q / length[:, None]).T
     tilt = 2.0 * np.hypot(x, y)
     if (tilt > MAX_TILT).any():

@@ -230,11 +230,6 @@ class LimitsSection(SceneSection):
     """Most point scatterers: each is traced on its own, with every wall on both legs."""
 
 
-def _listed(value: Any) -> Any:
-    """Make the scene file's one table `[ris]` a list of one."""
-    return [value] if isinstance(value, dict) else value
-
-
 class SceneSpec(SceneSection):
     """Validated content of a whole scene file."""
 
@@ -243,7 +238,9 @@ class SceneSpec(SceneSection):
     scatterer: list[ScattererSection] = []
     shade: Annotated[list[OccluderSection], Field(max_length=10_000)] = []
     meshes: MeshesSection = MeshesSection()
-    ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
+    ris: Annotated[
+        list[RisSection], BeforeValidator(lambda ris: [ris] if isinstance(ris, dict) else ris), Field(max_length=100)
+    ] = []
     """`[ris]` for one panel, `[[ris]]` for several."""
     agent: AgentSection
     limits: LimitsSection = LimitsSection()

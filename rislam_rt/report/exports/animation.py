@@ -1,7 +1,7 @@
 """Animation of a run as a GIF: the room from above, and beside it a close-up of the agent."""
 
 import io
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -19,9 +19,6 @@ from rislam_rt.report.view.room_data import spread
 from rislam_rt.report.view.run_data import KNOWN
 from rislam_rt.storage.files import MARK
 
-if TYPE_CHECKING:
-    from PIL.Image import Image
-
 FRAMES = 80
 """Number of frames of an animation."""
 FRAME_MS, LAST_MS = 100, 2500
@@ -36,15 +33,18 @@ HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
     """Draw the animation of a run and encode it as GIF; `tell` reports progress after every frame."""
+    from PIL import Image
+
     rows = spread(len(result.scene.agent), FRAMES)
-    pictures: list[Image] = []
+    pictures = []
     with styled():
         figure, room, near = _empty_frame(result)
         canvas: Any = FigureCanvasAgg(figure)
         for number, cycle in enumerate(rows):
             moving = _draw_moment(room, near, result, int(cycle))
             canvas.draw()
-            pictures.append(_picture(canvas))
+            pixels = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+            pictures.append(Image.fromarray(pixels).quantize(64))
             for artist in moving:
                 artist.remove()
             tell("frames", number + 1, len(rows))
@@ -120,10 +120,3 @@ def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> li
         place: Floats = scheme.landmark_position[cycle, shown, :2]
         moving += room.plot(*place.T, marker, color=colour, mfc="none", ms=8, mew=1.8, zorder=7)
     return moving
-
-
-def _picture(canvas: Any) -> "Image":
-    """Convert a drawn frame of the animation to an image of 64 colours."""
-    from PIL import Image
-
-    return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()).quantize(64)

@@ -56,6 +56,8 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
     found = []
     for wall in shown:
         own = corners[walls.wall_of_triangle == wall]
+        clockwise = triangle_cross(own) @ walls.normal[wall] < 0.0
+        turned = np.where(clockwise[:, None, None], own[:, ::-1], own)
         reflector = walls.names[wall].partition("#")[0]
         label = reflector if reflector not in named and len(named) < MOST_NAMES else ""
         named.add(reflector)
@@ -64,16 +66,10 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
                 "name": walls.names[wall], "label": label, "normal": rounded(walls.normal[wall], 5),
                 "offset": round(float(walls.offset[wall]), 5),
                 "center": rounded(np.average(own.mean(axis=1), axis=0, weights=area[walls.wall_of_triangle == wall])),
-                "triangles": rounded(_same_sense(own, walls.normal[wall])), "edges": rounded(outline_edges(own)),
+                "triangles": rounded(turned), "edges": rounded(outline_edges(own)),
             }
         )  # fmt: skip
     return found, len(order) - len(shown)
-
-
-def _same_sense(triangles: Floats, normal: Floats) -> Floats:
-    """Triangles (T, 3, 3) of a wall with their corners all counter-clockwise about its normal."""
-    sense = triangle_cross(triangles) @ normal
-    return np.where((sense < 0.0)[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _panel(panel: RisPanel) -> dict[str, Any]:

@@ -49,9 +49,8 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
-            yield room.warning(
-                field, "it lies below the array, which hears from above only", "raise it above the agent"
-            )
+            message = "it lies below the array, which hears from above only"
+            yield room.warning(field, message, "raise it above the agent")
         name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
             yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")

@@ -44,23 +44,11 @@ def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: warnings of meshes with a size in wrong units, and of doubled faces."""
-    yield from _size(room)
-    yield from _coincident(room)
-
-
-def _size(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: warning of a room so large or so small that it is in wrong units."""
+    """Scene check: warnings of a room with a size in wrong units, and of doubled faces of one mesh."""
     diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
-        guess = "millimetres" if diagonal > 200.0 else "kilometres"
-        yield room.warning(
-            "reflector", f"the room measures {diagonal:.3g} m across", f"metres wanted: is it in {guess}?"
-        )
-
-
-def _coincident(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: warning of doubled faces of one mesh; those of two meshes are for the check of walls."""
+        mend = f"metres wanted: is it in {'millimetres' if diagonal > 200.0 else 'kilometres'}?"
+        yield room.warning("reflector", f"the room measures {diagonal:.3g} m across", mend)
     corners = np.round(room.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)

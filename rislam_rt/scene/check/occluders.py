@@ -48,9 +48,8 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
         nearest = min(float(np.linalg.norm(p - scatterer.position, axis=-1).min()) for p in (motion.tx, motion.rx))
         if nearest < limit:
             message = f"the agent comes within {nearest:.3g} m, its far field begins at 2 h^2 / lambda = {limit:.3g} m"
-            yield room.warning(
-                f"scatterer[{number}].height_m ({scatterer.name})", message, "take a shorter one, or give 'rcs_m2'"
-            )
+            field = f"scatterer[{number}].height_m ({scatterer.name})"
+            yield room.warning(field, message, "take a shorter one, or give 'rcs_m2'")
 
 
 def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:

@@ -41,9 +41,8 @@ def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     for panel, key in _keyed(room):
         spec, motion = panel.spec, room.scene.agent
         if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
-            yield room.warning(
-                f"{key}.normal", "the agent is never in front of the panel", "turn the panel or the path"
-            )
+            message = "the agent is never in front of the panel"
+            yield room.warning(f"{key}.normal", message, "turn the panel or the path")
         yield from _implausible(room, panel, key, radio)
         yield from _beyond_room(room, panel, key)
         spread = _delay_spread(room, panel)
@@ -64,10 +63,8 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
     gap = other.center - one.center
     if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > MIN_CLEARANCE:
         return False
-    halves = [
-        0.5 * spec.spacing * [spec.cols, spec.rows] * np.stack([spec.right, spec.up]).T
-        for spec in (one.spec, other.spec)
-    ]
+    specs = (one.spec, other.spec)
+    halves = [0.5 * spec.spacing * [spec.cols, spec.rows] * np.stack([spec.right, spec.up]).T for spec in specs]
     axes = [one.spec.right, one.spec.up, other.spec.right, other.spec.up]
     return all(abs(gap @ axis) < sum(np.abs(axis @ half).sum() for half in halves) - MIN_CLEARANCE for axis in axes)
 
@@ -108,9 +105,8 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
     behind = sorted({room.name(int(t)) for t in near})
     if panel.host is None:
         if behind:
-            yield room.error(
-                f"{key}.host", f"missing, and the panel lies on '{behind[0]}'", f'add host = "{behind[0]}"'
-            )
+            message = f"missing, and the panel lies on '{behind[0]}'"
+            yield room.error(f"{key}.host", message, f'add host = "{behind[0]}"')
         return
     if panel.host not in names:
         yield room.error(f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
@@ -126,9 +122,8 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
     turn = np.linalg.norm(np.cross(normal, panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
-        yield room.error(
-            f"{key}.normal", f"{angle:.2f} degrees from the normal of '{panel.host}'", "lay it flat on its host"
-        )
+        message = f"{angle:.2f} degrees from the normal of '{panel.host}'"
+        yield room.error(f"{key}.normal", message, "lay it flat on its host")
 
 
 def _gap(room: TriangleArray, panel: RisPanel) -> float:

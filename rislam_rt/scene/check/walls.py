@@ -54,9 +54,8 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
         angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
-            yield room.warning(
-                field, message, f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
-            )
+            mend = f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
+            yield room.warning(field, message, mend)
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:

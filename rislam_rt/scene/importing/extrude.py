@@ -10,7 +10,7 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
+from rislam_rt.scene.importing.regions.region_groups import compass_side, numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.meshes import Mesh, as_mesh
@@ -22,7 +22,6 @@ THICKEST = 0.6
 """Thickest wall [m]: an opening goes through all parallel walls this near, as both faces of a thick wall are."""
 ALONG = np.radians(5.0)
 """Largest angle [rad] between an opening of a floor plan and the wall that it goes through."""
-_SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 
 Entry = tuple[str, Mesh, dict[str, Any] | None]
 """Name, mesh and own material of a reflector that was extruded."""
@@ -168,4 +167,4 @@ def _line_name(line: Line, plan: FloorPlan) -> str:
     if sides[0] == sides[1]:
         return "partition"
     outward = -line.across if sides[0] else line.across
-    return f"wall_{_SIDES[int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8]}"
+    return f"wall_{compass_side(outward)}"

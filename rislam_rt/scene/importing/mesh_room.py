@@ -59,9 +59,8 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
         pieces, about = find_pieces(facets, [part.node for part in parts]), []
         found = sort_regions(facets, pieces, find_round(facets), options)
     if not found.surfaces:
-        raise Fault(
-            f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
-        )
+        what = f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm"
+        raise Fault(what, "check --units, or lower --detail")
     surfaces, unseen = _visible_surfaces(found)
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
@@ -106,11 +105,10 @@ def _reflectors(
         for part in sorted({s.part for s in mine}):
             entries.append((piece.name, joined([s.mesh for s in mine if s.part == part]), part))
     names = numbered([name for name, _, _ in entries])
-    found = {}
-    for name, (_, mesh, number) in zip(names, entries, strict=True):
-        material = palette.material(name, parts[number].node, parts[number].material)
-        found[name] = (mesh, material)
-    return found
+    return {
+        name: (mesh, palette.material(name, parts[number].node, parts[number].material))
+        for name, (_, mesh, number) in zip(names, entries, strict=True)
+    }
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:

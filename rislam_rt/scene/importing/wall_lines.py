@@ -9,16 +9,10 @@ from rislam_rt.scene.importing.floor_plan import FloorPlan
 
 SAME_LINE = 5e-3
 """Distance [m] of two walls' lines below which they are one."""
-
-
 PARALLEL = np.radians(0.2)
 """Angle [rad] of two walls below which they are parallel."""
-
-
 SNAP = 0.05
 """Distance [m] of a wall's end from another wall up to which it is brought to it."""
-
-
 Spans = list[tuple[float, float]]
 
 

@@ -64,13 +64,13 @@ def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
 def build_shell(outline: Floats, roof: Roof) -> dict[str, Mesh]:
     """Meshes of a random room's shell, normals inwards: `floor`, `ceiling` (a gable: `_a`, `_b`), `wall_0`, ..."""
     faces = triangulate(outline)
-    meshes = {"floor": Mesh(_lifted(outline, np.zeros(len(outline))), faces)}
+    meshes = {"floor": Mesh(np.column_stack([outline, np.zeros(len(outline))]), faces)}
     if roof.form == "gable":
         for name, side in (("ceiling_a", 1.0), ("ceiling_b", -1.0)):
             part = halve(outline, roof.point, side * roof.axis)
-            meshes[name] = Mesh(_lifted(part, roof.height(part)), triangulate(part)[:, ::-1])
+            meshes[name] = Mesh(np.column_stack([part, roof.height(part)]), triangulate(part)[:, ::-1])
     else:
-        meshes["ceiling"] = Mesh(_lifted(outline, roof.height(outline)), faces[:, ::-1])
+        meshes["ceiling"] = Mesh(np.column_stack([outline, roof.height(outline)]), faces[:, ::-1])
     for number, (a, b) in enumerate(zip(outline, np.roll(outline, -1, axis=0), strict=True)):
         meshes[f"wall_{number}"] = _wall(a, b, roof)
     return meshes
@@ -96,13 +96,8 @@ def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
         feet.insert(1, a + near / (near - far) * (b - a))
     foot = np.array(feet)
     count = len(foot)
-    vertices = np.concatenate([_lifted(foot, np.zeros(count)), _lifted(foot, roof.height(foot))])
+    vertices = np.concatenate([np.column_stack([foot, np.zeros(count)]), np.column_stack([foot, roof.height(foot)])])
     k = np.arange(count - 1)
     low = np.stack([k + 1, k, k + count], axis=-1)
     high = np.stack([k + 1, k + count, k + count + 1], axis=-1)
     return Mesh(vertices, np.concatenate([low, high]))
-
-
-def _lifted(points: Floats, height: Floats) -> Floats:
-    """Points (n, 3) of a random room's shell: points (n, 2) of its floor plan at heights (n,)."""
-    return np.column_stack([points, height])

@@ -102,7 +102,9 @@ def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = Non
             mesh = shape_mesh(shape, path.parent, max_faces)
             count += len(mesh.faces)
             if count > max_faces:
-                raise _too_many(root, number, max_faces)
+                part = f"the first {number + 1} of {sum(1 for _ in _shapes(root))} shapes"
+                mend = "take a part: --within x0,y0,x1,y1 keeps what lies in that window of the plan [m]"
+                raise Fault(f"more than {max_faces} faces in {part}", mend)
             _take(found, identity, mesh if window is None else clip_mesh(mesh, window), materials.of(shape))
         where = ""
         if not found.parts:
@@ -169,14 +171,6 @@ def _shapes(parent: Element) -> Iterator[Element]:
         elif element.tag not in (*PICTURE_ONLY, "bsdf", "alias"):
             name = one_line(str(element.tag))[:40]
             raise Fault(f"an element <{name}>, which means nothing here", "delete it, or make it shapes and bsdfs")
-
-
-def _too_many(root: Element, number: int, max_faces: int) -> Fault:
-    """Error for an XML scene file with too many faces: how far it was read, and what to do."""
-    return Fault(
-        f"more than {max_faces} faces in the first {number + 1} of {sum(1 for _ in _shapes(root))} shapes",
-        "take a part: --within x0,y0,x1,y1 keeps what lies in that window of the plan [m]",
-    )
 
 
 def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None) -> None:

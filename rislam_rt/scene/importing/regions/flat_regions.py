@@ -58,7 +58,8 @@ def find_facets(mesh: Welded) -> FlatRegions:
     flat = (edges.turn < FLAT_ANGLE) & (mesh.part[edges.a] == mesh.part[edges.b])
     region = connected(np.stack([edges.a[flat], edges.b[flat]], axis=-1), len(mesh.faces))
     count = int(region.max(initial=-1)) + 1
-    biggest = _largest(region, area, count)
+    order = np.lexsort((-area, region))
+    biggest = order[np.searchsorted(region[order], np.arange(count))]
     side = np.sign(np.einsum("fi,fi->f", normal, normal[biggest][region]))
     faces = np.where((side < 0.0)[:, None], mesh.faces[:, ::-1], mesh.faces)
     plane, offset, width, residual = _planes(triangles, area, region, normal[biggest])
@@ -93,12 +94,6 @@ def _edges(faces: Integers, normal: Floats) -> Edges:
     cosine = np.abs(np.einsum("ei,ei->e", normal[a], normal[b]))
     sine = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1)
     return Edges(a, b, np.arctan2(sine, cosine))
-
-
-def _largest(region: Integers, area: Floats, count: int) -> Integers:
-    """Index (R,) of the largest triangle of each flat region."""
-    order = np.lexsort((-area, region))
-    return order[np.searchsorted(region[order], np.arange(count))]
 
 
 def _planes(triangles: Floats, area: Floats, region: Integers, side: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -16,7 +16,7 @@ TOUCH = 5e-3
 """Distance [m] of two objects' boxes below which they are one object."""
 UPRIGHT, LEVEL = np.sin(np.radians(15.0)), np.cos(np.radians(15.0))
 """Largest and smallest vertical component of the normals of a wall and of a floor."""
-
+_SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 _NAMELESS = re.compile(
     r"(?i)(mesh|object|obj|node|geometry|geom|cube|plane|cylinder|sphere|circle|default|group|scene|root|world|solid|"
     r"polygon|shape|model|untitled|material|mat|surface|part|element|layer|g|o)?[\W_\d]*"
@@ -141,9 +141,12 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
         return "floor" if share < 0.2 else "ceiling" if share > 0.8 else "table_top" if share < 0.5 else "level"
     outward = normal * (1.0 if (middle - center) @ normal >= 0.0 else -1.0)
-    eighth = int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8
-    side = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")[eighth]
-    return f"wall_{side}" if abs(normal[2]) <= UPRIGHT else f"slope_{side}"
+    return f"{'wall' if abs(normal[2]) <= UPRIGHT else 'slope'}_{compass_side(outward)}"
+
+
+def compass_side(direction: Floats) -> str:
+    """Side of the compass that a horizontal direction points to, `east` along x, in eighths."""
+    return _SIDES[int(np.round(np.degrees(np.arctan2(direction[1], direction[0])) / 45.0)) % 8]
 
 
 def numbered(names: list[str]) -> list[str]:

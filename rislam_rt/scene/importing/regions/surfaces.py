@@ -170,7 +170,8 @@ def _with_clutter(
         else:
             prisms.append(ClutterMesh(thing, mesh.triangles))
     gone = float(facets.area[resting].sum())
-    raw, planes = [], _shell_planes(surfaces)
+    shell = [s for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200]
+    raw, planes = [], [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in shell]
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
         triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
@@ -195,13 +196,6 @@ def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], fl
         cell *= np.sqrt(2.0)
     error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
     return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
-
-
-def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
-    """Planes (normal, offset) of the reflecting walls of an imported room's shell."""
-    return [
-        (s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200
-    ]
 
 
 def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:

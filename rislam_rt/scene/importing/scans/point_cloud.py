@@ -13,12 +13,8 @@ from rislam_rt.scene.importing.regions.welded_mesh import Welded
 
 SPACING = 0.04
 """Side [m] of the cubes in each of which one point of a scanned mesh is kept."""
-
-
 NEIGHBOURS = 30
 """Neighbouring points of a scan for the normal at each: a patch some 12 cm wide."""
-
-
 SMOOTHING = 3
 """Times that the normals at a scanned mesh's corners are averaged over their neighbours."""
 

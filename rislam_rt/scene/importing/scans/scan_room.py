@@ -50,16 +50,9 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     walls = [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces]
     clutter, error, cell = in_cells([ClutterMesh(0, triangles)] if len(triangles) else [], 2.0 * options.wavelength)
     clutter = [ClutterMesh(0, off_planes(c.triangles, walls)) for c in clutter]
-    found = SortedSurfaces(
-        surfaces,
-        [c for c in clutter if len(c.triangles)],
-        error,
-        cell,
-        options.narrow,
-        float(triangle_areas(triangles).sum()),
-        0.0,
-        [],
-    )
+    clutter = [c for c in clutter if len(c.triangles)]
+    shading = float(triangle_areas(triangles).sum())
+    found = SortedSurfaces(surfaces, clutter, error, cell, options.narrow, shading, 0.0, [])
     return found, _remarks(kept, cloud.noise)
 
 
