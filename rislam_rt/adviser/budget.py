@@ -91,9 +91,8 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
 def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
     """Detection forecast of all landmarks under one RIS code, at each position of the link budget."""
     heading = looked.scene.agent.heading
-    return [
-        forecast_detection(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)
-    ]
+    places = range(paths.num_cycles)
+    return [forecast_detection(paths, place, float(heading[place]), looked.settings) for place in places]
 
 
 def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:

@@ -60,7 +60,7 @@ def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floa
         (T, 3, 3) [m] and the wall (T,) of each.
     """
     count = len(normal)
-    area = np.bincount(owner, triangle_areas(triangles), count)
+    area = np.asarray(np.bincount(owner, triangle_areas(triangles), count), dtype=np.float64)
     order = np.argsort(owner, kind="stable")
     members = np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
     corner = np.array([triangles[m[0], 0] for m in members]).reshape(-1, 3)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from rislam_rt.model import PathKind, Paths, Scene
 
@@ -18,12 +18,8 @@ if TYPE_CHECKING:
 
 def print_summary(summary: Mapping[str, Any]) -> None:
     """Print the scores of a run as a table, a column for each scheme: RMSE of agent, landmarks and walls, bound."""
-    schemes = summary["schemes"]
     title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
-    table = Table()
-    table.add_column("RMSE")
-    for name in schemes:
-        table.add_column(name, justify="right")
+    table = Table("RMSE", *(Column(name, justify="right") for name in summary["schemes"]))
     for row in summary_rows(summary):
         table.add_row(*row)
     _show(title, table)
@@ -110,9 +106,8 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
     ):
         table.add_row(f"largest {label} error", *(f"{content[key]:.2g} {unit}" for content in contents))
     for quantity in contents[0]["limits"]:
-        table.add_row(
-            f"{quantity.split(' [')[0]}: nearest to its limit", *(_nearest(c["limits"][quantity]) for c in contents)
-        )
+        label = f"{quantity.split(' [')[0]}: nearest to its limit"
+        table.add_row(label, *(_nearest(content["limits"][quantity]) for content in contents))
     _show(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
         _print_faults(report, numbers, "cycle")
@@ -178,9 +173,7 @@ def print_scene(scene: Scene) -> None:
     low, high = scene.bounds
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
-        material = reflector.material
-        kind = material.words
-        table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {kind}")
+        table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {reflector.material.words}")
     for scatterer in scene.scatterers:
         table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2")
     for panel in scene.panels:

@@ -129,8 +129,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
     first, second = lines
     if abs(float(second.distance(first.start + _reach(opening, first)[0] * first.along))) < SAME_LINE:
         return []
-    places = [opening.ends[n] for n in (0, 1)]
-    edges = [[line.start + float((p - line.start) @ line.along) * line.along for line in lines] for p in places]
+    edges = [[line.start + float((p - line.start) @ line.along) * line.along for line in lines] for p in opening.ends]
     bottom, top = opening.bottom, opening.top
     found = [quad([np.append(p, z) for p, z in ((a, bottom), (b, bottom), (b, top), (a, top))]) for a, b in edges]
     (a, b), (c, d) = edges

@@ -16,13 +16,7 @@ from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets
-from rislam_rt.scene.importing.regions.region_groups import (
-    RegionGroup,
-    find_pieces,
-    numbered,
-    place_free_name,
-    wall_name,
-)
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, numbered, own_name, wall_name
 from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.regions.welded_mesh import weld
@@ -92,7 +86,7 @@ def _reflectors(
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
     corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
-    uses = [place_free_name(parts[s.part].node) for s in shell]
+    uses = [own_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
     for surface, node in zip(shell, uses, strict=True):
         middle = surface.mesh.triangles.mean(axis=(0, 1))

@@ -44,10 +44,9 @@ class Line(NamedTuple):
 
 def wall_lines(plan: FloorPlan) -> list[Line]:
     """Lines of all walls of a floor plan, joined along one line; rooms' edges yield to walls drawn themselves."""
-    drawn = [(line, material, name) for line, material, name in plan.walls]
     edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
     lines: list[Line] = []
-    for ends, material, name in [*drawn, *((edge, None, "") for edge in edges)]:
+    for ends, material, name in [*plan.walls, *((edge, None, "") for edge in edges)]:
         length = float(np.linalg.norm(ends[1] - ends[0]))
         if length < 1e-3:
             continue

@@ -4,14 +4,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import RisPanel, RisSpec, Scatterer
+from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.random_rooms.floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
-RADIUS = (0.03, 0.25)
-"""Range [m] of the random scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
 PLACES = ("open", "below", "hidden")
 """Where a random scatterer is: anywhere, below the whole motion, or behind a screen for most of it."""
 SHARES = (0.6, 0.2, 0.2)
@@ -73,12 +71,6 @@ def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> fl
         return 0.0
     cycles, _ = crossings(seen_from, np.broadcast_to(point, seen_from.shape), np.concatenate(triangles))
     return len(np.unique(cycles)) / len(seen_from)
-
-
-def make_scatterer(number: int, position: Floats, *, rng: np.random.Generator) -> Scatterer:
-    """Make a spherical scatterer of random radius at a position (3,) [m]."""
-    radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
-    return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
 
 
 def draw_panel(

@@ -110,7 +110,7 @@ def plain_name(name: str) -> str:
     return re.sub(r"_+", "_", plain.replace(".", "_"))[:48]
 
 
-def place_free_name(name: str) -> str:
+def own_name(name: str) -> str:
     """Plain name of a wall from its node's name; empty too where that says no more than wall, floor or ceiling."""
     plain = plain_name(name)
     return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
