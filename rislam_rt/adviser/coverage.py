@@ -48,9 +48,8 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
     size = np.maximum(high - low, 4.0 * INSIDE)[:2]
     most = min(POINTS, ELEMENTS // scene.ris.spec.num_elements)
     step = float(np.sqrt(size[0] * size[1] / max(most, 16)))
-    x, y = (
-        np.linspace(low[axis] + INSIDE, high[axis] - INSIDE, max(int(size[axis] / step), 2) + 1) for axis in range(2)
-    )
+    count = np.maximum((size / step).astype(int), 2) + 1
+    x, y = (np.linspace(low[axis] + INSIDE, high[axis] - INSIDE, count[axis]) for axis in range(2))
     height = float(np.median(scene.agent.position[:, 2]))
     xx, yy = np.meshgrid(x, y)
     points = np.column_stack([xx.ravel(), yy.ravel(), np.full(xx.size, height)])
@@ -65,9 +64,8 @@ def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
     """Margin (panels, N) [dB] of each RIS panel's direct path under the best code, for agents (N, 3) [m]."""
     assert scene.ris is not None
     count = len(points)
-    still = Trajectory(
-        np.arange(count, dtype=np.float64), points, np.zeros((count, 3)), np.zeros(count), scene.agent.body
-    )
+    time = np.arange(count, dtype=np.float64)
+    still = Trajectory(time, points, np.zeros((count, 3)), np.zeros(count), scene.agent.body)
     alone = replace(scene, scatterers=tuple(s for s in scene.scatterers if s.shade is not None), agent=still)
     paths = ImageSourceChannel(alone, settings.radio, 0).paths(still)
     paths = aimed_paths(paths, scene.ris.spec, settings.radio)

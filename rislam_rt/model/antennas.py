@@ -27,10 +27,9 @@ class Antennas:
 
     def __post_init__(self) -> None:
         for name in ("tx", "rx"):
-            if getattr(self, name) not in PATTERNS:
-                raise ConfigError(
-                    f"antennas.{name}: '{getattr(self, name)}' received; give one of {', '.join(PATTERNS)}"
-                )
+            pattern = getattr(self, name)
+            if pattern not in PATTERNS:
+                raise ConfigError(f"antennas.{name}: '{pattern}' received; give one of {', '.join(PATTERNS)}")
         if self.polarization not in ("V", "H"):
             raise ConfigError(f"antennas.polarization: '{self.polarization}' received; give 'V' or 'H'")
         if self.rx_polarization not in ("", "V", "H"):

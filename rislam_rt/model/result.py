@@ -130,9 +130,8 @@ class SlamResult:
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {self._rmse(scheme):.3g} m" for name, scheme in self.schemes.items())
         seed = "no seed" if self.seed is None else f"seed {self.seed}"
-        return (
-            f"SlamResult '{self.name}' in '{self.scene.name}', {seed}, {len(self.scene.agent)} cycles; RMSE: {errors}"
-        )
+        about = f"SlamResult '{self.name}' in '{self.scene.name}', {seed}, {len(self.scene.agent)} cycles"
+        return f"{about}; RMSE: {errors}"
 
     def _repr_html_(self) -> str:
         ways = ((name, scheme.position) for name, scheme in self.schemes.items())

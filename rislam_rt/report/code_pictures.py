@@ -62,8 +62,7 @@ def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataShe
     if isinstance(sheet, RisSpecs):
         index = _side_by_side([part.index for part in sheet.parts(RisCode(index, levels))])
     axis.imshow(index, cmap=_colours(levels), vmin=-0.5, vmax=levels - 0.5, origin="lower", interpolation="nearest")
-    axis.set_xticks([])
-    axis.set_yticks([])
+    axis.set(xticks=[], yticks=[])
     axis.grid(False)
     if max(index.shape) <= MAX_LABELLED and np.isfinite(index).all():
         for (row, col), level in np.ndenumerate(index):

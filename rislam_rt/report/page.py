@@ -102,9 +102,8 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     about += f"{summary['trace_seconds']:.1f} s."
     names = list(summary["schemes"])
     head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
-    rows = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in summary_rows(summary)
-    )
+    cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in summary_rows(summary))
+    rows = "".join(f"<tr>{row}</tr>" for row in cells)
     said = judge_run(result, summary)
     sentences = "".join(
         f"<li>{html.escape(text)}{_bullets(said.missing[name])}</li>" for name, text in said.schemes.items()

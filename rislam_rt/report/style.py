@@ -51,11 +51,8 @@ def styled() -> Iterator[None]:
 
 def close_up(axis: Any, middle: Floats, half: float) -> None:
     """Make an axis a close-up of a map: a framed square about a point (2,), `half` [m] to each side, without ticks."""
-    axis.set_xlim(middle[0] - half, middle[0] + half)
-    axis.set_ylim(middle[1] - half, middle[1] + half)
-    axis.set_aspect("equal")
-    axis.set_xticks([])
-    axis.set_yticks([])
+    axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal")
+    axis.set(xticks=[], yticks=[])
     for spine in axis.spines.values():
         spine.set_visible(True)
 

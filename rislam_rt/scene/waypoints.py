@@ -60,9 +60,8 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
         pair = int(np.argmax(length < 1e-6))
         raise Fault(f"waypoints {pair} and {pair + 1} are the same point", "leave one out")
     along = legs / length[:, None]
-    turn = np.arctan2(
-        np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), np.einsum("ij,ij->i", along[:-1], along[1:])
-    )
+    before, after = along[:-1], along[1:]
+    turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
     if (turn > SHARPEST).any():
         raise Fault(
             f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {int(np.argmax(turn)) + 1}",

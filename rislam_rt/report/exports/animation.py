@@ -64,8 +64,7 @@ def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     figure = Figure(figsize=(WIDTH, 0.6 * WIDTH * aspect + 0.9), dpi=DPI)
     room, near = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
     draw_plan(room, result.scene)
-    room.set_xlabel("x [m]")
-    room.set_ylabel("y [m]")
+    room.set(xlabel="x [m]", ylabel="y [m]")
     room.set_title(" ", weight="bold")
     for scheme in result.schemes:
         near.plot([], [], color=scheme_colour(scheme), lw=2.0, label=scheme)
@@ -99,8 +98,7 @@ def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list
         moving += axis.plot(*truth, "o", color=TRUTH, ms=6, zorder=8)
     for scheme in result.schemes.values():
         moving += _draw_belief(room, near, scheme, cycle)
-    near.set_xlim(truth[0] - half, truth[0] + half)
-    near.set_ylim(truth[1] - half, truth[1] + half)
+    near.set(xlim=(truth[0] - half, truth[0] + half), ylim=(truth[1] - half, truth[1] + half))
     room.set_title(f"{scene.name}, t = {scene.agent.elapsed[cycle]:.1f} s", weight="bold")
     return moving
 

@@ -46,8 +46,7 @@ def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
         label_ends(panel, curves, "panel_m")
         for axis, what in ((agent, "agent's position"), (panel, "panel's position at the end")):
             axis.set_xticks(sizes, [f"{size} x {size}" for size in sizes], fontsize=9)
-            axis.set_xlabel("elements of the panel")
-            axis.set_ylabel(f"RMSE of the {what} [m]")
+            axis.set(xlabel="elements of the panel", ylabel=f"RMSE of the {what} [m]")
     return figure
 
 

@@ -72,8 +72,7 @@ def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
                 edge = "black" if entry["ordinary"] else colour
                 draw_rmse(axis, place, entry, colour, ms=5.5, mec=edge, mew=1.0)
         axis.set_yticks(range(len(rows)), [_label(content, name) for name in rows], fontsize=8)
-        axis.set_ylim(len(rows) - 0.4, -0.6)
-        axis.set_xscale("log")
+        axis.set(ylim=(len(rows) - 0.4, -0.6), xscale="log")
         mark_metres(axis.xaxis)
         axis.set_xlabel(f"RMSE of the agent's position [m], {scheme}; dotted: nothing wrong")
         axis.set_title("Levels from light to dark; ring: ordinary equipment", fontsize=10)

@@ -56,9 +56,8 @@ def parse_material(text: str) -> dict[str, Any]:
         pass
     if kind == "itu" and name not in known:
         raise ConfigError(f"--material: '{name[:40]}' is no ITU material; give one of {', '.join(known)}")
-    raise ConfigError(
-        f"--material: '{text[:60]}' received; give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
-    )
+    wanted = "give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
+    raise ConfigError(f"--material: '{text[:60]}' received; {wanted}")
 
 
 def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:

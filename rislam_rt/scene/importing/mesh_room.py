@@ -67,9 +67,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
 
 def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
     """Surfaces of a mesh that an agent in the room can see, and the area [m^2] of the others, as outer skins."""
-    triangles = np.concatenate([
-        *(s.mesh.triangles for s in found.surfaces), *(c.triangles for c in found.clutter)
-    ])  # fmt: skip
+    triangles = np.concatenate([s.mesh.triangles for s in found.surfaces] + [c.triangles for c in found.clutter])
     free = find_free(triangles, float(triangles[..., 2].min()))
     if free is None:
         return found.surfaces, 0.0
@@ -120,9 +118,8 @@ def _summary(
     occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
     """Report of an import: numbers, areas and errors of what became of a mesh, one line each."""
-    walls = sum(
-        len(planar_regions(mesh.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET).offset) for mesh, _ in reflectors.values()
-    )
+    parted = (planar_regions(mesh.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for mesh, _ in reflectors.values())
+    walls = sum(len(regions.offset) for regions in parted)
     total, waves = float(facets.area.sum()), found.narrow / options.wavelength
     triangles = sum(len(mesh.faces) for mesh in occluders.values())
     mirror = sum(s.area for s in surfaces)

@@ -96,18 +96,16 @@ def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
     (a, b), (u, v) = sides, rng.uniform(*ARM, size=2) * sides
     left = rng.uniform(0.3, 0.7) * (a - u)
     right = left + u
-    return np.array(
-        [[left, 0], [right, 0], [right, b - v], [a, b - v], [a, b], [0, b], [0, b - v], [left, b - v]], dtype=np.float64
-    )
+    stem = [[left, b - v], [left, 0], [right, 0], [right, b - v]]
+    return np.array([*stem[1:], [a, b - v], [a, b], [0, b], [0, b - v], stem[0]], dtype=np.float64)
 
 
 def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
     """Draw the corners of a random U-shaped floor plan of given sides."""
     (a, b), floor = sides, rng.uniform(*ARM) * sides[1]
     left, right = rng.uniform(ARM[0], 0.38, size=2) * a
-    return np.array(
-        [[0, 0], [a, 0], [a, b], [a - right, b], [a - right, floor], [left, floor], [left, b], [0, b]], dtype=np.float64
-    )
+    arms = [[a - right, b], [a - right, floor], [left, floor], [left, b]]
+    return np.array([[0, 0], [a, 0], [a, b], *arms, [0, b]], dtype=np.float64)
 
 
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:

@@ -51,9 +51,8 @@ class FurniturePiece(NamedTuple):
         """Points (16, 2) [m] around the outline of a piece of furniture."""
         share = np.array([-1.0, -0.5, 0.0, 0.5])
         one = np.ones(4)
-        square = np.concatenate(
-            [np.stack(side, axis=-1) for side in ((share, -one), (one, share), (-share, one), (-one, -share))]
-        )
+        sides = ((share, -one), (one, share), (-share, one), (-one, -share))
+        square = np.concatenate([np.stack(side, axis=-1) for side in sides])
         return np.asarray(self.center + (square * self.half) @ self.turn.T)
 
     def distance(self, points: Floats) -> Floats:
@@ -68,9 +67,8 @@ class FurniturePiece(NamedTuple):
 
     def mesh(self) -> Mesh:
         """Mesh of a piece of furniture without the face on the floor, so that no two faces coincide."""
-        size = [*self.half.tolist()]
         without = ("floor",) if self.bottom == 0.0 else ()
-        solid = block([-size[0], -size[1], self.bottom], [*size, self.top], without=without)
+        solid = block([*-self.half, self.bottom], [*self.half, self.top], without=without)
         vertices = solid.vertices.copy()
         vertices[:, :2] = vertices[:, :2] @ self.turn.T + self.center
         return Mesh(vertices, solid.faces)

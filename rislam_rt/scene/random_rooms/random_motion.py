@@ -82,9 +82,8 @@ def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.r
             if height is not None and depth_inside(outline, place[number]).min() >= OFF_WALLS:
                 position = np.column_stack([place[number], height + rise])
                 angle = np.asarray(wrap(yaw[number] + heading))
-                velocity = np.column_stack(
-                    [speed * course.pace[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1), course.climb]
-                )
+                ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+                velocity = np.column_stack([speed * course.pace[:, None] * ahead, course.climb])
                 return Trajectory(_times(), position, velocity, angle, Body())
         speed *= _SLOWER
     raise SceneError("no room for a motion; draw another plan")

@@ -110,10 +110,8 @@ def _panel(
     reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory
 ) -> tuple[RisPanel | None, str]:
     """Propose a RIS panel for an XML scene above or beside the agent's path, if there is a place; and a remark."""
-    draft = RoomDraft(
-        {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
-        {s.name: Mesh(s.vertices, s.faces) for s in occluders},
-    )
+    hiding = {s.name: Mesh(s.vertices, s.faces) for s in occluders}
+    draft = RoomDraft({r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors}, hiding)
     way = agent.position[[0, -1]]
     table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0))
     return (build_panel(RisSection(**table)) if table else None), about

@@ -75,9 +75,8 @@ def left_behind(scene: Scene) -> list[str]:
     notes = []
     if constant:
         few = ", ".join(constant[:6]) + (f" and {len(constant) - 6} more" if len(constant) > 6 else "")
-        notes.append(
-            f"the constant R of {few}: as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
-        )
+        body = "as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
+        notes.append(f"the constant R of {few}: {body}")
     if scene.scatterers:
         notes.append(f"{len(scene.scatterers)} scatterers (of shadows: a shape of air, which hides their centre too)")
     notes += [f"the panel '{panel.name}'" for panel in scene.panels]

@@ -82,9 +82,8 @@ def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
         return False
     normal, offset = facets.normal[regions[0]], facets.offset[regions[0]]
     along = facets.normal[shell] @ normal
-    near = shell[
-        (np.abs(along) > np.cos(FLAT_ANGLE)) & (np.abs(along * facets.offset[shell] - offset) < COPLANAR_OFFSET)
-    ]
+    apart = np.abs(along * facets.offset[shell] - offset)
+    near = shell[(np.abs(along) > np.cos(FLAT_ANGLE)) & (apart < COPLANAR_OFFSET)]
     low, high = bounds_of(facets, regions)
     boxes = (bounds_of(facets, near[k : k + 1]) for k in range(len(near)))
     return any(bool(((box[0] <= high + TOUCH) & (box[1] >= low - TOUCH)).all()) for box in boxes)
@@ -97,9 +96,8 @@ def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
     low, high = np.stack([bounds_of(facets, regions) for regions in things], axis=1)
     near = ((low[:, None] <= high + TOUCH) & (high[:, None] >= low - TOUCH)).all(axis=-1)
     group = connected(np.argwhere(near), len(things))
-    return [
-        np.concatenate([things[i] for i in np.flatnonzero(group == number)]) for number in range(int(group.max()) + 1)
-    ]
+    members = [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+    return [np.concatenate([things[i] for i in own]) for own in members]
 
 
 def plain_name(name: str) -> str:
