@@ -1,11 +1,10 @@
 """Floor 2: frozen dataclasses of scene, radio, paths, measurement, estimate and result, checked once on construction.
 No behaviour beyond what a field's name promises."""
 
-from rislam_rt.model.antennas import Antennas
 from rislam_rt.model.estimate import MapEstimate, PanelCandidate, SlamEstimate, empty_map, pose_estimate
 from rislam_rt.model.measurement import Measurement, PathTruth
 from rislam_rt.model.paths import PathKind, Paths, RisLegs
-from rislam_rt.model.radio import RadioConfig, RxArray
+from rislam_rt.model.radio import Antennas, RadioConfig, RxArray
 from rislam_rt.model.result import NOTHING, STEPS, SchemeResult, SlamResult
 from rislam_rt.model.ris import (
     DataSheet,

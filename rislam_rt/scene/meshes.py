@@ -67,14 +67,9 @@ class MeshReader:
         self._loaded: Any = None
 
     def parse(
-        self,
-        content: bytes,
-        name: str,
-        node: str | None = None,
-        max_faces: int = MAX_FACES,
-        max_nodes: int = MAX_NODES,
-        reach: float = MAX_COORDINATE,
-    ) -> Mesh:
+        self, content: bytes, name: str, node: str | None = None, max_faces: int = MAX_FACES,
+        max_nodes: int = MAX_NODES, reach: float = MAX_COORDINATE,
+    ) -> Mesh:  # fmt: skip
         """Parse a mesh file's content into triangles; `node` picks one named node of a GLB file.
 
         What is too large is refused before it is unfolded: a GLB file may name one mesh in thousands of nodes. `reach`
@@ -155,9 +150,11 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 @contextmanager
 def _errors_as_faults(file_type: str) -> Iterator[None]:
-    """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep numpy's warnings back."""
+    """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep warnings and logs back."""
+    logged = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             yield
     except Fault:
@@ -165,17 +162,8 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
     except Exception as error:
         cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
         raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Keep libraries from logging while a mesh file is parsed: their failures have an answer here."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        yield
     finally:
-        logging.disable(before)
+        logging.disable(logged)
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:
@@ -242,10 +230,8 @@ def without_comments(content: bytes) -> bytes:
 
 def too_many_faces(count: int, limit: int) -> Fault:
     """Error for a mesh with more faces than the scene file's limit."""
-    return Fault(
-        f"{count} faces, and check and trace take time in proportion to them",
-        f"simplify the mesh, or raise limits.faces = {limit} in the scene file",
-    )
+    mend = f"simplify the mesh, or raise limits.faces = {limit} in the scene file"
+    return Fault(f"{count} faces, and check and trace take time in proportion to them", mend)
 
 
 def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
@@ -267,10 +253,8 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
     except (TypeError, KeyError, IndexError, AttributeError, ValueError, OverflowError):
         return
     if len(nodes) > max_nodes:
-        raise Fault(
-            f"{len(nodes)} nodes, and reading takes time in proportion to their square",
-            f"join them, or raise limits.nodes = {max_nodes} in the scene file",
-        )
+        mend = f"join them, or raise limits.nodes = {max_nodes} in the scene file"
+        raise Fault(f"{len(nodes)} nodes, and reading takes time in proportion to their square", mend)
     if faces > max_faces:
         raise too_many_faces(faces, max_faces)
 

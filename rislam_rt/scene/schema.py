@@ -246,16 +246,10 @@ class SceneSpec(SceneSection):
     limits: LimitsSection = LimitsSection()
 
     @model_validator(mode="after")
-    def _not_too_many(self) -> "SceneSpec":
+    def _not_too_many_and_distinct(self) -> "SceneSpec":
         if len(self.scatterer) > self.limits.scatterers:
-            raise ValueError(
-                f"{len(self.scatterer)} scatterers, of which each is traced on its own; "
-                f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _panels_distinct(self) -> "SceneSpec":
+            mend = f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
+            raise ValueError(f"{len(self.scatterer)} scatterers, of which each is traced on its own; {mend}")
         names = [panel.name for panel in self.ris]
         if len(set(names)) < len(names):
             raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")

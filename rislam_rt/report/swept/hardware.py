@@ -112,17 +112,12 @@ def _limit(
     limit = None
     for entry in entries:
         if entry["fault"] == fault.name and entry["way"] == way:
-            if not _matters(entry, ideal):
+            if any(one.get("panel") is None for one in (entry, ideal)):
+                break
+            if entry["panel"] < HEARD * ideal["panel"] or entry["false"] > ideal["false"] + MORE_FALSE:
                 break
             limit = str(entry["level"])
     return limit
-
-
-def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
-    """Whether an impairment is tolerable: panel detections and false components near those of an ideal front end."""
-    if any(one.get("panel") is None for one in (scores, ideal)):
-        return False
-    return bool(scores["panel"] >= HEARD * ideal["panel"] and scores["false"] <= ideal["false"] + MORE_FALSE)
 
 
 def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:

@@ -103,9 +103,7 @@ def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
 def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
     """Lines on the runs that failed."""
     found = [(name, run) for name, members in runs.items() for run in members if run.failed]
-    if not found:
-        return ["None."]
-    return [f"- room {run.room}, {name}: {run.failed}" for name, run in found]
+    return [f"- room {run.room}, {name}: {run.failed}" for name, run in found] or ["None."]
 
 
 def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:

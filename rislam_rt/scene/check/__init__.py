@@ -2,8 +2,7 @@
 
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
-from rislam_rt.scene.check.materials import material_errors
-from rislam_rt.scene.check.meshes import face_errors, mesh_warnings, name_errors, scatterer_errors
+from rislam_rt.scene.check.meshes import face_errors, material_errors, mesh_warnings, name_errors, scatterer_errors
 from rislam_rt.scene.check.occluders import cylinder_warnings, occluder_errors, occluder_face_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
 from rislam_rt.scene.check.triangle_array import build_triangle_array

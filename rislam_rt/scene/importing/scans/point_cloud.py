@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_cross
-from rislam_rt.scene.importing.regions.welded_mesh import Welded
+from rislam_rt.scene.importing.regions.flat_regions import Welded
 
 SPACING = 0.04
 """Side [m] of the cubes in each of which one point of a scanned mesh is kept."""
