@@ -29,8 +29,7 @@ def detection_label(link: LandmarkLink) -> str:
 
 
 def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
-    """Lines that say what would help: one for each landmark that is not detected on half of the trajectory under the
-    best code, and one for each RIS panel that the beam sweep would hardly find."""
+    """Lines on what would help each landmark heard on less than half of the way, and panels hardly found by a sweep."""
     lines = []
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:

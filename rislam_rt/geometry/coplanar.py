@@ -106,10 +106,7 @@ def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
 
 
 def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) -> list[tuple[int, int]]:
-    """Pairs of walls that may be coplanar: nearly one normal, one corner (W, 3) near the other's plane.
-
-    Walls sorted by their normal's component in a generic direction are compared with their neighbours in that order.
-    """
+    """Pairs of walls of nearly one normal, one corner (W, 3) near the other's plane, found by sorted normals."""
     key = np.abs(normal @ np.array([0.36, 0.48, 0.80]))
     order = np.argsort(key, kind="stable")
     found: list[tuple[int, int]] = []

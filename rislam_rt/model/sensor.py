@@ -56,8 +56,7 @@ class SensorModel:
 
     @property
     def cell(self) -> Floats:
-        """Widths (3,) of the receiver's resolution cell: 1/B [s] in delay, and the array's beam in either direction
-        cosine (2, all directions, without an aperture)."""
+        """Widths (3,) of the resolution cell: 1/B [s], and the beam in either direction cosine (2 without aperture)."""
         array = self.radio.array
         beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
         return np.array([1.0 / self.radio.bandwidth, *beams])

@@ -100,10 +100,7 @@ def panels_of(group: Group, scheme: str) -> list[str]:
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """RMS errors of panel and scatterers at the end of the runs with their bounds, and the share that was mapped then.
-
-    None where there is nothing to be found.
-    """
+    """RMS errors and bounds of panel and scatterers at the end of the runs, and the share mapped; None of nothing."""
     panels = panels_of(group, scheme)
     names = group.parts(scheme, "landmarks")
     own = panels if SCHEMES[scheme].panel else []
@@ -116,10 +113,7 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """RMS angle and distance errors of the walls found at the end of the runs, with bounds and the map's own std.
-
-    The share found is that among walls with a path above the detection threshold for `HEARD` s in all.
-    """
+    """RMS errors, bounds and own std of walls found at the end; the share is of those heard for `HEARD` s in all."""
     names = group.parts(scheme, "walls")
     angle, offset, own, least, near, audible = (
         _pooled(group, scheme, "walls", names, part)

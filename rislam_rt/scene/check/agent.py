@@ -89,11 +89,7 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Name of the reflector of an object around a point (3,); empty if there is none.
-
-    An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger
-    building is none, has none of the points `holding` (H, 3) in it.
-    """
+    """Name of the reflector with a small piece around a point (3,) that holds no mark (H, 3); empty without one."""
     scene_box = np.prod(room.bounds[1] - room.bounds[0])
     for number, reflector in enumerate(room.scene.reflectors):
         mine = room.triangles[room.owner == number]
@@ -103,6 +99,7 @@ def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
         label = connected_triangles(mine)
         for piece in range(label.max() + 1):
             solid = mine[label == piece]
+            # more than a tenth of the scene's box is no object, nor is what holds a mark: a room of a larger building
             if np.prod(np.ptp(solid.reshape(-1, 3), axis=0)) > 0.1 * scene_box or abs(winding(point, solid)) < 0.5:
                 continue
             if not any(abs(winding(mark, solid)) > 0.25 for mark in holding):

@@ -36,8 +36,7 @@ def panel_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of a RIS panel that the agent is never in front of, that reflects more than a plate, whose
-    beams are ambiguous, or with a delay spread above 1 / B."""
+    """Scene check: warnings of a RIS panel never in front, implausible, beyond the room, or of a long delay spread."""
     for panel, key in _keyed(room):
         spec, motion = panel.spec, room.scene.agent
         if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
@@ -134,11 +133,7 @@ def _gap(room: TriangleArray, panel: RisPanel) -> float:
 
 
 def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """Scene check: error of a RIS panel that faces out of the room.
-
-    The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
-    agent is before it, in a room that is open there (a street).
-    """
+    """Scene check: error of a RIS panel with nothing before it but something behind, unless the agent is before it."""
     ahead, behind = (
         ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
                  room.triangles)[0] >= 0

@@ -85,12 +85,7 @@ def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats,
 def _meeting_cells(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats, low: Floats, shape: tuple[int, ...]
 ) -> Booleans:
-    """Cells of a scanned plane along the lines where other planes meet it: a hole of the scan that reaches there ends
-    there.
-
-    A line counts from the first to the last of its places where the other plane has points, breaks of up to a metre
-    bridged.
-    """
+    """Cells of a scanned plane along its lines with other planes, where those have points: holes end there."""
     plane, found = planes[number], np.zeros(shape, dtype=np.bool_)
     reach = float(np.hypot(shape[0], shape[1])) * CELL
     ends: list[tuple[Floats, Booleans]] = []
