@@ -7,8 +7,8 @@ from rislam_rt.cli.options import StudyOptions
 from rislam_rt.cli.output_files import page_files, study_folder
 from rislam_rt.cli.study import refuse_scene, run_cells
 from rislam_rt.pipeline.run import prepare_channel
+from rislam_rt.report.terminal_tables import print_cards
 from rislam_rt.report.unseen import write_unseen
-from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.studies import UnseenSpec
 from rislam_rt.studies.unseen import build_unseen, count_tests
 from rislam_rt.studies.unseen.sweep import unseen_record

@@ -1,10 +1,11 @@
-"""Tables for the terminal: scores of runs, path classes, channel comparisons, code designs, sweeps, scenes."""
+"""Tables for the terminal: scores of runs and studies, path classes, channel comparisons, designs, sweeps, scenes."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Column, Table
 
 from rislam_rt.model import PathKind, Paths, Scene
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from rislam_rt.channel.compare import PathReport, Validation
     from rislam_rt.design import Design
     from rislam_rt.studies.pipeline_sweep import SchemeScore
+    from rislam_rt.sweeps import Row
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
@@ -166,6 +168,20 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
         point = (str(value) for key, value in score.point.items() if key != "schemes")
         table.add_row(*point, score.scheme, overall, interval, *counts)
     _show("sweep", table)
+
+
+def print_cards(rows: Sequence["Row"], timings: Sequence[Mapping[str, Any]]) -> None:
+    """Print the score cards of a study in unseen rooms as a table, a column for each series."""
+    from rislam_rt.report.unseen.files import unseen_content
+    from rislam_rt.report.unseen.page import ROWS
+    from rislam_rt.report.unseen.score_cards import by_series, read_runs
+
+    cards = unseen_content(by_series(read_runs(rows)), timings)["cards"]
+    columns = (Column(name, justify="right") for name in cards)
+    table = Table("score", *columns, title="median (95 % interval); 95th percentile")
+    for label, show in ROWS.items():
+        table.add_row(escape(label), *(show(entry) for entry in cards.values()))
+    Console().print(table, highlight=False)
 
 
 def print_scene(scene: Scene) -> None:
