@@ -18,7 +18,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.mirror_chain import mirror_chain
+from rislam_rt.geometry.planes import mirror_chain
 from rislam_rt.information import (
     LinearMeasurements,
     MotionPrior,

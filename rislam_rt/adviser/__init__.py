@@ -1,2 +1,1 @@
-"""Forecast of a run in a room before it is run: link budget of each landmark, remedies for those not detected, the RIS
-panel's coverage, and the cost of tracing."""
+"""Forecast of a run in a room: link budgets of landmarks, remedies, the RIS panel's coverage, cost of tracing."""

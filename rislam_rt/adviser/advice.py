@@ -1,5 +1,4 @@
-"""Advice on a room before a run: link budgets of its landmarks, remedies for those not detected, and the cost of
-tracing."""
+"""Advice on a room before a run: link budgets of its landmarks, remedies, and the cost of tracing."""
 
 from typing import Any, NamedTuple
 
@@ -31,11 +30,8 @@ class Advice(NamedTuple):
                  "reason": link.reason[at]} for at in link.three
             ]  # fmt: skip
             words = {
-                "landmark": link.landmark,
-                "code": link.code,
-                "share": link.share,
-                "verdict": detection_label(link),
-            }
+                "landmark": link.landmark, "code": link.code, "share": link.share, "verdict": detection_label(link),
+            }  # fmt: skip
             links.append(words | dict(zip(("start", "middle", "end"), places, strict=True)))
         costs = [cost._asdict() for cost in self.costs]
         return {"threshold_db": self.threshold_db, "links": links, "remedies": self.remedies, "costs": costs}

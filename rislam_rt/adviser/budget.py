@@ -1,5 +1,4 @@
-"""Link budget of each landmark along the agent's trajectory: SNR over the detection threshold, detection probability,
-and why it is not detected."""
+"""Link budget of each landmark along the trajectory: SNR margin, detection probability, why it is not detected."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,8 +14,7 @@ from rislam_rt.model import Paths, Scene
 from rislam_rt.pipeline.specification.spec import Settings
 
 PLACES = 15
-"""Number of positions along the trajectory at which the link budget is worked out, spread evenly; the first, the middle
-and the last are its three columns."""
+"""Number of positions of a link budget, evenly along the trajectory; first, middle and last are its columns."""
 DEPTHS = ((500, 2), (2000, 1))
 """Most triangles of a room, and the wall bounces that its link budget then counts; with more triangles direct paths
 alone: the check is to take seconds. More bounces are seldom the strongest; they cover weaker paths."""
@@ -41,8 +39,7 @@ class LandmarkLink(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Share of the trajectory on which a landmark is detected: the mean detection probability of its link
-        budget."""
+        """Share of the trajectory on which a landmark is detected: the mean of its detection probability."""
         return float(np.mean(self.probability))
 
     @property
@@ -64,8 +61,7 @@ class Survey(NamedTuple):
 
 
 def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
-    """Find the propagation paths at `places` positions along a scene's trajectory by exact image sources, for its link
-    budget."""
+    """Find the paths at `places` positions along a scene's trajectory, by image sources, for its link budget."""
     rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
     scene = replace(scene, agent=scene.agent[rows])
     faces = sum(len(reflector.faces) for reflector in scene.reflectors)
@@ -75,8 +71,7 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
 
 
 def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:
-    """Link budgets of a room: one for each scatterer, and one for each RIS panel and kind of codes. `rng` draws the
-    random codes."""
+    """Link budgets of scatterers, and of each RIS panel under each kind of codes (`rng` draws the random ones)."""
     scene, paths, settings = looked.scene, looked.paths, looked.settings
     reasons = build_reasons(scene, paths, settings)
     if scene.ris is None:
@@ -96,14 +91,12 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
 def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
     """Detection forecast of all landmarks under one RIS code, at each position of the link budget."""
     heading = looked.scene.agent.heading
-    return [
-        forecast_detection(paths, place, float(heading[place]), looked.settings) for place in range(paths.num_cycles)
-    ]
+    places = range(paths.num_cycles)
+    return [forecast_detection(paths, place, float(heading[place]), looked.settings) for place in places]
 
 
 def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:
-    """Link budget of one landmark from forecasts under C RIS codes: the mean of their detection probabilities, and of
-    their SNRs, but of swept codes the best beam's SNR."""
+    """Link budget of a landmark over C RIS codes: mean probability and SNR, but the best beam's of swept ones."""
     snr = np.array([[place.snr[number] for place in places] for places in heard])
     chance = np.array([[place.probability[number] for place in places] for places in heard]).mean(axis=0)
     level = snr.max(axis=0) if code == "swept" else snr.mean(axis=0)

@@ -13,8 +13,7 @@ from rislam_rt.model.ris import DataSheet, join_codes
 from rislam_rt.ris import rephase
 
 RANDOM_CODES = 16
-"""Number of random RIS codes over which detection is averaged: a share of one half is known to an eighth, at each
-position anew."""
+"""Number of random RIS codes over which detection is averaged: a share of one half is known to an eighth."""
 
 
 class Codes(NamedTuple):
@@ -43,8 +42,7 @@ def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.rando
 
 
 def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
-    """Phase levels (K, N, M) of the RIS code that is best for one path over each panel: among those that the array
-    receives, the one that it makes strongest."""
+    """Phase levels (K, N, M) of the RIS code best for each panel's strongest path that the array receives."""
     assert paths.ris is not None
     index = np.zeros((paths.num_cycles, spec.num_elements), dtype=np.int64)
     best = np.zeros((len(spec.panels), paths.num_cycles))

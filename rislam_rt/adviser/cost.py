@@ -1,5 +1,4 @@
-"""Forecast cost of tracing a room: wall sequences, paths, and seconds at measured rates, for one to three wall
-bounces."""
+"""Forecast cost of tracing a room with one to three wall bounces: wall sequences, paths, and seconds."""
 
 from typing import NamedTuple
 
@@ -63,8 +62,7 @@ def cost_words(cost: TraceCost) -> str:
 
 
 def _count_sequences(channel: ImageSourceChannel, depth: int) -> int:
-    """Number of wall sequences that tracing has to test: of all legs at the middle of the trajectory, those that the
-    walls' sides leave possible, the empty sequence of each leg included."""
+    """Number of wall sequences, empty ones included, that tracing has to test at the trajectory's middle."""
     scene, facets, row = channel.scene, channel.sequence_search.facets, len(channel.scene.agent) // 2
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]

@@ -1,5 +1,4 @@
-"""Coverage of a RIS panel: SNR of its direct path under the best code, at positions all over the plan at the agent's
-height."""
+"""Coverage of a RIS panel: SNR of its direct path under the best code all over the plan at the agent's height."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -36,8 +35,7 @@ class Coverage(NamedTuple):
 
     @property
     def heard(self) -> float:
-        """Share of a coverage map's positions with a direct path at which its SNR exceeds the detection threshold; zero
-        if there are none."""
+        """Share of a coverage map's positions with a direct path where it exceeds the threshold; 0 without any."""
         seen = np.isfinite(self.margin_db)
         return float(np.mean(self.margin_db[seen] >= 0.0)) if seen.any() else 0.0
 
@@ -50,9 +48,8 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
     size = np.maximum(high - low, 4.0 * INSIDE)[:2]
     most = min(POINTS, ELEMENTS // scene.ris.spec.num_elements)
     step = float(np.sqrt(size[0] * size[1] / max(most, 16)))
-    x, y = (
-        np.linspace(low[axis] + INSIDE, high[axis] - INSIDE, max(int(size[axis] / step), 2) + 1) for axis in range(2)
-    )
+    count = np.maximum((size / step).astype(int), 2) + 1
+    x, y = (np.linspace(low[axis] + INSIDE, high[axis] - INSIDE, count[axis]) for axis in range(2))
     height = float(np.median(scene.agent.position[:, 2]))
     xx, yy = np.meshgrid(x, y)
     points = np.column_stack([xx.ravel(), yy.ravel(), np.full(xx.size, height)])
@@ -64,13 +61,11 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
 
 
 def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """SNR over the detection threshold (panels, N) [dB] of each RIS panel's direct path under the best code, for agent
-    positions (N, 3) [m], headed along x."""
+    """Margin (panels, N) [dB] of each RIS panel's direct path under the best code, for agents (N, 3) [m]."""
     assert scene.ris is not None
     count = len(points)
-    still = Trajectory(
-        np.arange(count, dtype=np.float64), points, np.zeros((count, 3)), np.zeros(count), scene.agent.body
-    )
+    time = np.arange(count, dtype=np.float64)
+    still = Trajectory(time, points, np.zeros((count, 3)), np.zeros(count), scene.agent.body)
     alone = replace(scene, scatterers=tuple(s for s in scene.scatterers if s.shade is not None), agent=still)
     paths = ImageSourceChannel(alone, settings.radio, 0).paths(still)
     paths = aimed_paths(paths, scene.ris.spec, settings.radio)

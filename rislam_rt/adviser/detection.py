@@ -1,5 +1,4 @@
-"""Forecast of detection at one position of the agent: probability that the receiver reports each landmark, without
-noise being drawn."""
+"""Forecast of detection at one position: probability that the receiver reports each landmark, no noise drawn."""
 
 from typing import NamedTuple
 
@@ -20,11 +19,9 @@ class DetectionForecast(NamedTuple):
     probability: Floats
     """(L,) probability that at least one component comes from the landmark."""
     snr: Floats
-    """(L,) SNR of the landmark's strongest path on the side that the array receives, linear, over all antennas; 0
-    without one."""
+    """(L,) SNR of the landmark's strongest path that the array receives, linear, over all antennas; 0 without one."""
     covered: Integers
-    """(L,) column of the stronger path in whose component the landmark's strongest one is merged; -1 if it has a
-    component of its own."""
+    """(L,) column of the path in whose component the landmark's strongest one is merged; -1 if it has its own."""
 
 
 def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Settings) -> DetectionForecast:
@@ -56,8 +53,7 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
 
 
 def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
-    """Column of the strongest path in whose component a path that cannot be resolved from it is merged; -1 if the path
-    has a component of its own, or is too weak to matter."""
+    """Column of the strongest path in whose component a path is merged; -1 if it has its own or is too weak."""
     row = np.flatnonzero(loud.path == path)
     if path in parts.path or not len(row):
         return -1

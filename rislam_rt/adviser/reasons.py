@@ -1,5 +1,4 @@
-"""Reasons why a landmark is not detected at a position: occluded, behind the panel, below the array, not resolved, too
-weak, or no path."""
+"""Reasons why a landmark is not detected: occluded, behind the panel, below the array, not resolved, too weak."""
 
 from typing import NamedTuple
 
@@ -18,8 +17,7 @@ CLEARANCE = 1e-6
 
 
 class Reasons(NamedTuple):
-    """Room with its paths at K positions of the agent and all surfaces that hide, from which reasons for missed
-    detections of landmarks are found."""
+    """Room with its paths at K positions and all surfaces that hide, to find why landmarks are not detected."""
 
     scene: Scene
     paths: Paths
@@ -51,13 +49,13 @@ class Reasons(NamedTuple):
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:
-        """Name of the reflector or occluder that stands between a landmark and Tx or Rx at one position; empty if none
-        does."""
+        """Name of the mesh, not its own, that hides a landmark from Tx or Rx at a position; empty if none does."""
+        scatterers = self.scene.scatterers
+        own = scatterers[number].name if number < len(scatterers) and scatterers[number].shade is not None else ""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):
             last = point + CLEARANCE * (end - point)
             _, hit = crossings(end[None], last[None], self.triangles)
-            names = [self.owner[t] for t in hit]
-            names = [name for name in names if name != _occluder_name(self.scene, number)]
+            names = [self.owner[t] for t in hit if self.owner[t] != own]
             if names:
                 return names[0]
         return ""
@@ -71,11 +69,3 @@ def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
     triangles = np.concatenate([triangles for _, triangles in meshes])
     owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))
     return Reasons(scene, paths, settings, triangles, owner)
-
-
-def _occluder_name(scene: Scene, number: int) -> str:
-    """Name of a scatterer's own occluder, which does not hide the scatterer's centre; empty for landmarks without
-    one."""
-    if number < len(scene.scatterers) and scene.scatterers[number].shade is not None:
-        return scene.scatterers[number].name
-    return ""

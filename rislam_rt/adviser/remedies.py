@@ -16,8 +16,7 @@ from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.ris import leg_response
 
 HEARD, SELDOM = 0.5, 0.05
-"""Shares of the trajectory from which on a landmark counts as detected, and up to which as not detected; between, at
-times."""
+"""Shares of the trajectory from which on a landmark counts as detected, and up to which as not detected."""
 LARGEST = 128
 """Elements along a side of the largest RIS panel that is proposed."""
 GROWTH = 1.05
@@ -25,14 +24,12 @@ GROWTH = 1.05
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """Label of a landmark's link budget by the share of the trajectory on which it is detected: `heard`, `heard at
-    times` or `not heard`."""
+    """Label of a landmark's link budget by its share: `heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 
 def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
-    """Lines that say what would help: one for each landmark that is not detected on half of the trajectory under the
-    best code, and one for each RIS panel that the beam sweep would hardly find."""
+    """Lines on what would help each landmark heard on less than half of the way, and panels hardly found by a sweep."""
     lines = []
     for link in links:
         if link.code in ("", "aimed") and link.share < HEARD:
@@ -48,8 +45,7 @@ def weak_places(link: LandmarkLink) -> Integers:
 
 
 def lack_db(link: LandmarkLink) -> float:
-    """SNR [dB] that a landmark lacks to be detected, at the median of the positions where its path is only too weak; 0
-    if there are none."""
+    """SNR [dB] that a landmark lacks, at the median of the positions where it is only too weak; 0 without any."""
     weak = weak_places(link)
     return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
 
@@ -71,8 +67,7 @@ def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisS
 
 
 def _what_helps(looked: Survey, link: LandmarkLink) -> str:
-    """Text on one landmark that is not detected: the reasons with their remedies, the SNR that it lacks, and what would
-    make up for that."""
+    """Text on a landmark that is not detected: reasons, remedies, the SNR it lacks, and what makes up for it."""
     scene, lack = looked.scene, lack_db(link)
     parts = list(_why_where(link, panel_held=bool(link.code) and not looked.settings.receiver.alternation))
     if lack:
@@ -86,16 +81,14 @@ def _what_helps(looked: Survey, link: LandmarkLink) -> str:
 
 
 def _why_where(link: LandmarkLink, *, panel_held: bool) -> Iterator[str]:
-    """Reasons why a landmark is not detected, the commonest first, each with its share of the trajectory and a
-    remedy."""
+    """Reasons why a landmark is not detected, the commonest first, with share of the trajectory and remedy."""
     for reason, count in Counter(reason for reason in link.reason if reason).most_common():
         share = f"{reason} on {count / len(link.reason):.0%} of it"
         yield share if reason == WEAK else f"{share} ({_way_round(reason, panel_held=panel_held)})"
 
 
 def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
-    """Remedy by size for a landmark that is too weak: the cross-section of a scatterer, or the elements of a RIS panel,
-    that would make up for a lack [dB]."""
+    """Remedy by size for a lack [dB]: the cross-section of a scatterer, or the elements of a RIS panel."""
     scene = looked.scene
     if link.code == "":
         yield f"or an echo of {10.0 ** (lack / 10.0):.2g} times the cross-section"
@@ -103,16 +96,14 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
     panel = next(one for one in scene.panels if one.name == link.landmark)
     spec, grown = panel.spec, enough_elements(looked, panel, link)
     now = f"(now {spec.rows} x {spec.cols})"
-    yield (
-        f"or a panel of {grown.rows} x {grown.cols} elements {now}"
-        if grown
-        else (f"no panel of up to {LARGEST} elements a side would do {now}")
-    )
+    if grown:
+        yield f"or a panel of {grown.rows} x {grown.cols} elements {now}"
+    else:
+        yield f"no panel of up to {LARGEST} elements a side would do {now}"
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """Warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam sweep that looks for
-    it."""
+    """Warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam sweep."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:
         yield (
@@ -122,8 +113,7 @@ def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[st
 
 
 def _way_round(why: str, *, panel_held: bool) -> str:
-    """Remedy for a reason why a landmark is not detected, other than too weak a path; `panel_held`: it is a RIS panel
-    whose code is held for the whole slot."""
+    """Remedy for a reason other than a weak path; `panel_held`: a RIS panel with one code for the whole slot."""
     if "behind the panel" in why:
         return "turn the panel, or lead the way before it"
     if "shaded" in why:
@@ -136,8 +126,7 @@ def _way_round(why: str, *, panel_held: bool) -> str:
 
 
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
-    """SNR over the detection threshold (K,) [dB] of the direct path over a RIS panel of a given data sheet under the
-    best code, as if nothing were in its way."""
+    """Margin (K,) [dB] of a RIS panel's direct path under the best code for a data sheet, nothing in its way."""
     radio, agent = looked.settings.radio, looked.scene.agent
     ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
     tx, rx = (

@@ -18,14 +18,13 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.run import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.report.studies import classifier
+from rislam_rt.report.studies.channel_validation import CERTIFICATE, COMPARISON, write_comparison
 from rislam_rt.report.studies.claims import write_claims
-from rislam_rt.report.studies.fig4a import fig4a_table, findings_of
-from rislam_rt.report.studies.files import CERTIFICATE, COMPARISON, CURVES, write_comparison, write_fig4a
+from rislam_rt.report.studies.fig4a import CURVES, fig4a_table, findings_of, write_fig4a
 from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import write_swept
-from rislam_rt.report.terminal_tables import print_validation
+from rislam_rt.report.terminal_tables import print_cards, print_validation
 from rislam_rt.report.unseen import write_unseen
-from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.scene.file_names import safe_name
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all

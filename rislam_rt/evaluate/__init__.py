@@ -9,8 +9,7 @@ from rislam_rt.evaluate.confidence_intervals import (
     rms_over_runs,
     share_interval,
 )
-from rislam_rt.evaluate.consistency import normalised_squares
-from rislam_rt.evaluate.errors import align, position_errors, rmse, root_mean_square
+from rislam_rt.evaluate.errors import align, normalised_squares, position_errors, rmse, root_mean_square
 from rislam_rt.evaluate.plane_matching import (
     NEAR_ANGLE,
     NEAR_WALL,
@@ -23,27 +22,8 @@ from rislam_rt.evaluate.plane_matching import (
 from rislam_rt.evaluate.set_distances import gospa, match_points
 
 __all__ = [
-    "NEAR_ANGLE",
-    "NEAR_WALL",
-    "Interval",
-    "Surfaces",
-    "align",
-    "association_fractions",
-    "association_score",
-    "bootstrap",
-    "bootstrap_ratio",
-    "ghost_planes",
-    "gospa",
-    "label_switches",
-    "match_planes",
-    "match_points",
-    "median_over_runs",
-    "normalised_squares",
-    "plane_angle",
-    "plane_distance",
-    "position_errors",
-    "rms_over_runs",
-    "rmse",
-    "root_mean_square",
-    "share_interval",
-]
+    "NEAR_ANGLE", "NEAR_WALL", "Interval", "Surfaces", "align", "association_fractions", "association_score",
+    "bootstrap", "bootstrap_ratio", "ghost_planes", "gospa", "label_switches", "match_planes", "match_points",
+    "median_over_runs", "normalised_squares", "plane_angle", "plane_distance", "position_errors", "rms_over_runs",
+    "rmse", "root_mean_square", "share_interval",
+]  # fmt: skip

@@ -1,5 +1,4 @@
-"""Scores of data association: how well a filter assigned measurements to landmarks, by true identities that only the
-scorer sees."""
+"""Scores of data association: how well measurements were assigned to landmarks, by true identities."""
 
 from typing import NamedTuple
 
@@ -43,26 +42,17 @@ def association_score(label: Integers, truth: Integers) -> AssociationScore:
 
 
 def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> tuple[float, float, float]:
-    """Accuracy, precision and recall of data association, from counts (L, I) of how often label (L,) met identity (I,);
-    -1 is none."""
+    """Accuracy, precision, recall from counts (L, I) of how often label (L,) met identity (I,); -1 is none."""
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[scipy.optimize.linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
-    total, answered, known = (
-        int(counts.sum()),
-        int(counts[labels != NONE].sum()),
-        int(counts[:, identities != NONE].sum()),
-    )
-    return (
-        (right + left_alone) / total if total else 1.0,
-        right / answered if answered else 1.0,
-        right / known if known else 1.0,
-    )
+    parts = (right + left_alone, counts), (right, counts[labels != NONE]), (right, counts[:, identities != NONE])
+    accuracy, precision, recall = (part / int(of.sum()) if of.sum() else 1.0 for part, of in parts)
+    return accuracy, precision, recall
 
 
 def label_switches(label: Integers, truth: Integers) -> int:
-    """Number of times that a true identity's label differs from the label it last had; a -1 on either side does not
-    count."""
+    """Number of times that a true identity's label differs from its last one; -1 does not count."""
     switches = 0
     both = (np.asarray(label) != NONE) & (np.asarray(truth) != NONE)
     for identity in np.unique(np.asarray(truth)[both]):

@@ -49,13 +49,9 @@ def share_interval(count: int, runs: int) -> Interval:
 
 
 def bootstrap(
-    samples: Floats,
-    *,
-    rng: np.random.Generator,
-    statistic: Statistic = mean_over_runs,
-    level: float = 0.95,
+    samples: Floats, *, rng: np.random.Generator, statistic: Statistic = mean_over_runs, level: float = 0.95,
     resamples: int = 2000,
-) -> Interval:
+) -> Interval:  # fmt: skip
     """Bias-corrected and accelerated bootstrap interval (Efron 1987) of a statistic of samples (R, ...) from R
     independent runs.
 

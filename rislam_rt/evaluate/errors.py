@@ -1,5 +1,4 @@
-"""Position errors of an estimated trajectory, and its alignment with the true one. Plain arrays in, plain values
-out."""
+"""Errors of estimates: of positions, after alignment, and normalised by a filter's own covariances (NEES, NIS)."""
 
 import numpy as np
 
@@ -32,11 +31,24 @@ def root_mean_square(errors: Floats) -> float:
 
 
 def align(estimate: Floats, truth: Floats) -> Floats:
-    """Estimated positions (K, 3) aligned with the true ones: turned about z and shifted to the least squared
-    distances."""
+    """Estimated positions (K, 3) turned about z and shifted onto the true ones at the least squared distances."""
     centred, target = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
     # The angle that maximises sum target . R centred, with complex numbers for the plane.
     overlap = np.sum(np.conj(centred[:, 0] + 1j * centred[:, 1]) * (target[:, 0] + 1j * target[:, 1]))
     angle = np.angle(overlap) if overlap != 0.0 else 0.0
     c, s = np.cos(angle), np.sin(angle)
     return centred @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + truth.mean(axis=0)
+
+
+def normalised_squares(errors: Floats, covariances: Floats) -> Floats:
+    """Normalised squared errors `e^T P^-1 e` (...,), NEES or NIS, of errors (..., D) with covariances (..., D, D).
+
+    NEES of state errors, NIS of innovations; chi-square with D degrees of freedom when the filter is consistent.
+    Infinite where a covariance is not positive definite.
+    """
+    errors, covariances = np.broadcast_arrays(np.asarray(errors)[..., None], np.asarray(covariances))
+    errors = errors[..., :1]
+    definite = np.linalg.eigvalsh(covariances)[..., 0] > 0.0
+    safe = np.where(definite[..., None, None], covariances, np.eye(covariances.shape[-1]))
+    squares = np.sum(errors * np.linalg.solve(safe, errors), axis=(-2, -1))
+    return np.where(definite, squares, np.inf)

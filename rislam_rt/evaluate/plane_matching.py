@@ -1,5 +1,4 @@
-"""Matching of estimated wall planes with a room's true walls, and ghost planes that stand for none: the one criterion
-of all scores."""
+"""Matching of estimated planes with a room's true walls, and ghost planes that stand for none."""
 
 from typing import NamedTuple
 
@@ -53,7 +52,8 @@ def match_planes(surfaces: Surfaces, normal: Floats, offset: Floats, heard: Bool
     match = np.full(len(surfaces.middle), -1)
     asked = np.arange(len(match)) if heard is None else np.flatnonzero(heard)
     if len(asked) and len(offset):
-        match[asked] = match_nearest(_allowed_distance(surfaces, normal, offset)[asked], NEAR_WALL)
+        distance, angle = plane_distance(surfaces, normal, offset), plane_angle(surfaces, normal)
+        match[asked] = match_nearest(np.where(angle <= NEAR_ANGLE, distance, np.inf)[asked], NEAR_WALL)
     return match
 
 
@@ -66,9 +66,3 @@ def ghost_planes(surfaces: Surfaces, normal: Floats, offset: Floats) -> Booleans
     match = match_planes(surfaces, normal, offset)
     ghosts[match[match >= 0]] = False
     return ghosts
-
-
-def _allowed_distance(surfaces: Surfaces, normal: Floats, offset: Floats) -> Floats:
-    """RMS distances (W, M) [m] of planes from true walls, infinite where the angle between them forbids the pair."""
-    distance, angle = plane_distance(surfaces, normal, offset), plane_angle(surfaces, normal)
-    return np.where(angle <= NEAR_ANGLE, distance, np.inf)

@@ -28,7 +28,10 @@ def gospa(estimate: Floats, truth: Floats, *, cutoff: float = 1.0, order: float 
     Rahmathullah, Garcia-Fernandez and Svensson, FUSION 2017: not divided by the number of points, and each missed or
     false one costs `c^p / 2`, so that a pair further apart than c counts as one of each.
     """
-    distance = _distances(estimate, truth, cutoff, order)
+    if not (cutoff > 0.0 and order >= 1.0):
+        received = f"cutoff, order: {cutoff}, {order} received"
+        raise ConfigError(f"{received}; give a positive cut-off and an order of 1 or more")
+    distance = np.minimum(_pairwise(estimate, truth), cutoff)
     rows, cols = scipy.optimize.linear_sum_assignment(distance**order)
     close = distance[rows, cols] < cutoff
     local = float(np.sum(distance[rows[close], cols[close]] ** order))
@@ -66,16 +69,6 @@ def match_nearest(distance: Floats, limit: float) -> Integers:
     near = distance[rows, columns] <= limit
     partner[rows[near]] = columns[near]
     return partner
-
-
-def _distances(estimate: Floats, truth: Floats, cutoff: float, order: float) -> Floats:
-    """Distances (N, M) between estimated and true points, at most the cut-off; ConfigError for a bad cut-off or
-    order."""
-    if not (cutoff > 0.0 and order >= 1.0):
-        raise ConfigError(
-            f"cutoff, order: {cutoff}, {order} received; give a positive cut-off and an order of 1 or more"
-        )
-    return np.minimum(_pairwise(estimate, truth), cutoff)
 
 
 def _pairwise(estimate: Floats, truth: Floats) -> Floats:

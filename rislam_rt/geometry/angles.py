@@ -36,8 +36,7 @@ def rotation_about(axis: Floats, angle: float) -> Floats:
 
 
 def rotation_z(heading: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) about z by headings (...,) [rad]: from the agent's body frame (x forward) to room
-    axes."""
+    """Rotations (..., 3, 3) about z by headings (...,) [rad]: from the agent's body frame (x forward) to the room."""
     heading = np.asarray(heading, dtype=np.float64)
     rotation = np.zeros((*heading.shape, 3, 3))
     rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(heading)

@@ -17,8 +17,7 @@ def connected(pairs: Integers, count: int) -> Integers:
 
 
 def connected_triangles(triangles: Floats, tolerance: float = 1e-6) -> Integers:
-    """Number (T,) of the connected part of a mesh to which each triangle (T, 3, 3) belongs; corners within `tolerance`
-    [m] count as one."""
+    """Connected part (T,) of a mesh that each triangle (T, 3, 3) is in; corners within `tolerance` [m] are one."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3) / tolerance), axis=0, return_inverse=True)
     faces = corner.reshape(-1, 3)
     label = connected(np.concatenate([faces[:, :2], faces[:, 1:]]), int(faces.max(initial=-1)) + 1)

@@ -60,12 +60,13 @@ def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floa
         (T, 3, 3) [m] and the wall (T,) of each.
     """
     count = len(normal)
-    area = _areas(triangles, owner, count)
-    members = _members(owner, count)
+    area = np.asarray(np.bincount(owner, triangle_areas(triangles), count), dtype=np.float64)
+    order = np.argsort(owner, kind="stable")
+    members = np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
     corner = np.array([triangles[m[0], 0] for m in members]).reshape(-1, 3)
     pairs = []
     for i, j in _parallel_pairs(normal, offset, corner, gap):
-        upper, lower = (i, j) if _lies_on(area, i, j) else (j, i)
+        upper, lower = (i, j) if area[i] <= area[j] * (1.0 + ALIKE) else (j, i)
         corners = triangles[members[upper]]
         apart = float(np.abs(signed_distance(corners, normal[lower], offset[lower])).max())
         if apart <= gap and overlap(corners, triangles[members[lower]], normal[lower], gap):
@@ -105,10 +106,7 @@ def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
 
 
 def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) -> list[tuple[int, int]]:
-    """Pairs of walls that may be coplanar: nearly one normal, one corner (W, 3) near the other's plane.
-
-    Walls sorted by their normal's component in a generic direction are compared with their neighbours in that order.
-    """
+    """Pairs of walls of nearly one normal, one corner (W, 3) near the other's plane, found by sorted normals."""
     key = np.abs(normal @ np.array([0.36, 0.48, 0.80]))
     order = np.argsort(key, kind="stable")
     found: list[tuple[int, int]] = []
@@ -123,24 +121,6 @@ def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) 
         keep = (turn <= COPLANAR_ANGLE) & (np.minimum(far, also) <= gap)
         found += [(int(min(p)), int(max(p))) for p in zip(i[keep], j[keep], strict=True)]
     return sorted(found)
-
-
-def _lies_on(area: Floats, i: int, j: int) -> bool:
-    """Whether wall i, of the lower number, lies on the coplanar wall j: its area (W,) is smaller, or alike."""
-    return bool(area[i] <= area[j] * (1.0 + ALIKE))
-
-
-def _areas(triangles: Floats, owner: Integers, count: int) -> Floats:
-    """Areas (W,) [m^2] of walls, each the sum over its triangles (T, 3, 3)."""
-    area = np.zeros(count)
-    np.add.at(area, owner, triangle_areas(triangles))
-    return area
-
-
-def _members(owner: Integers, count: int) -> list[Integers]:
-    """Numbers of the triangles that belong to each wall."""
-    order = np.argsort(owner, kind="stable")
-    return np.split(order, np.searchsorted(owner[order], np.arange(1, count)))[:count]
 
 
 def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:

@@ -1,6 +1,5 @@
 """Plane segmentation of a triangle mesh: which triangles lie in one plane, and the plane that fits their corners."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +38,7 @@ class _Mesh(NamedTuple):
     """Angle (T,) [rad] by which a triangle's normal may differ from that of its plane."""
 
     def in_plane(self, normal: Floats, distance: float, turn: float, offset: float) -> Integers:
-        """Rows of the triangles that lie in a plane: normals that agree within `slack + turn`, and all corners within
-        `offset` [m]."""
+        """Rows of the triangles in a plane: normals within `slack + turn`, all corners within `offset` [m]."""
         here, widest = abs(float(_GENERIC @ normal)), float(self.slack.max()) + turn
         low, high = np.searchsorted(self.key, [here - widest, here + widest])
         angle = np.linalg.norm(np.cross(self.normal[low:high], normal), axis=-1)
@@ -59,8 +57,9 @@ def planar_regions(triangles: Floats, angle: float, offset: float) -> PlanarRegi
         return PlanarRegions(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
     order, mesh = _sorted_mesh(triangles, angle)
     group = np.full(len(triangles), -1, dtype=np.int64)
-    for count, seed in enumerate(_seeds(mesh.slack, group)):
-        group[_grown(mesh, seed, group < 0, angle, offset)] = count
+    for seed in np.argsort(mesh.slack, kind="stable"):  # the surest normal first
+        if group[seed] < 0:
+            group[_grown(mesh, int(seed), group < 0, angle, offset)] = group.max() + 1
     unsorted = np.empty_like(group)
     unsorted[order] = group
     _, first, number = np.unique(unsorted, return_index=True, return_inverse=True)
@@ -77,13 +76,6 @@ def fit_plane(points: Floats, side: Floats) -> tuple[Floats, float]:
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][-1]
     normal = np.copysign(1.0, normal @ side) * normal
     return normal, float(normal @ middle)
-
-
-def _seeds(slack: Floats, group: Integers) -> Iterator[int]:
-    """Rows of the triangles from which planes are grown: those without a group yet, the most accurate normal first."""
-    for seed in np.argsort(slack, kind="stable"):
-        if group[seed] < 0:
-            yield int(seed)
 
 
 def _sorted_mesh(triangles: Floats, angle: float) -> tuple[Integers, _Mesh]:
@@ -112,8 +104,7 @@ def _grown(mesh: _Mesh, seed: int, free: Booleans, angle: float, offset: float) 
 
 
 def _fitted(triangles: Floats, group: Integers) -> PlanarRegions:
-    """Planes of groups (T,) of triangles: that of a group's first triangle where it is exact, else the least-squares
-    fit to all corners."""
+    """Planes of groups (T,) of triangles: that of the first where it is exact, else fitted to all corners."""
     normal, offset = triangle_planes(triangles)
     _, first = np.unique(group, return_index=True)
     normal, offset = normal[first], offset[first]

@@ -7,8 +7,7 @@ from rislam_rt.geometry.angles import unit
 
 
 def triangle_cross(triangles: Floats) -> Floats:
-    """Cross products (T, 3) [m^2] of two edges of triangles (T, 3, 3): normals, as long as twice the triangle's
-    area."""
+    """Normals (T, 3) [m^2] of triangles (T, 3, 3), cross products as long as twice the triangle's area."""
     return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 

@@ -15,8 +15,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.bistatic import cosine_gradient
-from rislam_rt.geometry.mirror_chain import mirror_chain
-from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.planes import mirror_chain, plane_tangents
 from rislam_rt.information.accuracy import cosine_information
 from rislam_rt.information.position import range_information
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory

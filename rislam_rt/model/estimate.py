@@ -41,16 +41,12 @@ class MapEstimate:
     def __post_init__(self) -> None:
         count, walls = len(np.asarray(self.ident)), len(np.asarray(self.wall_offset))
         for name, dtype, shape in (
-            ("ident", np.int64, (count,)),
-            ("position", np.float64, (count, 3)),
-            ("covariance", np.float64, (count, 3, 3)),
-            ("parent", np.int64, (count,)),
-            ("ris_probability", np.float64, (count,)),
-            ("strength", np.float64, (count,)),
-            ("wall_normal", np.float64, (walls, 3)),
-            ("wall_offset", np.float64, (walls,)),
+            ("ident", np.int64, (count,)), ("position", np.float64, (count, 3)),
+            ("covariance", np.float64, (count, 3, 3)), ("parent", np.int64, (count,)),
+            ("ris_probability", np.float64, (count,)), ("strength", np.float64, (count,)),
+            ("wall_normal", np.float64, (walls, 3)), ("wall_offset", np.float64, (walls,)),
             ("wall_std", np.float64, (walls, 2)),
-        ):
+        ):  # fmt: skip
             freeze(self, name, dtype, shape)
         if self.panel is not None:
             freeze(self, "panel", np.int64, (count,))
@@ -64,8 +60,7 @@ class MapEstimate:
 
     @property
     def ris(self) -> int:
-        """Row of the landmark that is identified as the RIS panel, of several panels as the first; -1 if none is. See
-        `panel_row`."""
+        """Row of the landmark identified as the (first) RIS panel; -1 if none is. See `panel_row`."""
         return self.panel_row(0)
 
     def panel_row(self, panel: int) -> int:

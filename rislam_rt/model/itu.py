@@ -22,8 +22,7 @@ ITU_MATERIALS: dict[str, tuple[tuple[float, float, float, float, float, float], 
     "medium_dry_ground": ((1.0, 10.0, 15.0, -0.1, 0.035, 1.63),),
     "wet_ground": ((1.0, 10.0, 30.0, -0.4, 0.15, 1.3),),
 }
-"""Building materials of ITU-R P.2040-4, table 3: lowest and highest frequency [GHz] and the constants a, b, c, d of
-each range."""
+"""ITU-R P.2040-4, table 3: lowest and highest frequency [GHz] and constants a, b, c, d of each range."""
 
 
 def itu_parameters(name: str, carrier: float) -> tuple[float, float, float, float]:

@@ -1,5 +1,4 @@
-"""Measurement of one cycle: the multipath components that the receiver reports, and, kept apart for scoring, the true
-path of each."""
+"""Measurement of one cycle: the components that the receiver reports, and, kept apart, the true path of each."""
 
 from dataclasses import dataclass
 
@@ -39,13 +38,9 @@ class Measurement:
     def __post_init__(self) -> None:
         count = len(np.asarray(self.tau))
         for name, shape in (
-            ("tau", (count,)),
-            ("cosines", (count, 2)),
-            ("amplitude", (count,)),
-            ("tau_std", (count,)),
-            ("cosines_std", (count, 2)),
-            ("amplitude_std", (count,)),
-        ):
+            ("tau", (count,)), ("cosines", (count, 2)), ("amplitude", (count,)), ("tau_std", (count,)),
+            ("cosines_std", (count, 2)), ("amplitude_std", (count,)),
+        ):  # fmt: skip
             freeze(self, name, np.float64, shape)
         if self.from_panel is not None:
             freeze(self, "from_panel", np.float64, (count,))

@@ -95,18 +95,12 @@ class Paths:
     def __post_init__(self) -> None:
         cycles, paths = np.shape(self.valid)
         for name, dtype, shape in (
-            ("kind", np.int64, (paths,)),
-            ("landmark", np.int64, (paths,)),
-            ("tx_walls", np.int64, (paths, None)),
-            ("rx_walls", np.int64, (paths, None)),
-            ("valid", np.bool_, (cycles, paths)),
-            ("tau", np.float64, (cycles, paths)),
-            ("departure", np.float64, (cycles, paths, 3)),
-            ("arrival", np.float64, (cycles, paths, 3)),
-            ("gain", np.complex128, (cycles, paths)),
-            ("vertices", np.float64, (cycles, paths, None, 3)),
-            ("num_vertices", np.int64, (paths,)),
-        ):
+            ("kind", np.int64, (paths,)), ("landmark", np.int64, (paths,)), ("tx_walls", np.int64, (paths, None)),
+            ("rx_walls", np.int64, (paths, None)), ("valid", np.bool_, (cycles, paths)),
+            ("tau", np.float64, (cycles, paths)), ("departure", np.float64, (cycles, paths, 3)),
+            ("arrival", np.float64, (cycles, paths, 3)), ("gain", np.complex128, (cycles, paths)),
+            ("vertices", np.float64, (cycles, paths, None, 3)), ("num_vertices", np.int64, (paths,)),
+        ):  # fmt: skip
             freeze(self, name, dtype, shape)
 
     def __repr__(self) -> str:
@@ -150,8 +144,7 @@ class Paths:
         return int(self.kind[path]), int(self.landmark[path]), tx, rx
 
     def label(self, path: int) -> str:
-        """Text of a propagation path's identity, e.g. `VS wall_y0 sphere | wall_x0`: walls of the Rx leg after the
-        bar."""
+        """Text of a path's identity, e.g. `VS wall_y0 sphere | wall_x0`: walls of the Rx leg after the bar."""
         kind, landmark, tx, rx = self.identity(path)
         names = [self.walls[w] for w in tx] + ([self.landmarks[landmark]] if landmark >= 0 else [])
         text = " ".join([PathKind(kind).name, *names])

@@ -70,9 +70,8 @@ def _open_edges(vertices: Floats, faces: Integers) -> Floats:
     """Edges (E, 2, 3) of a mesh that one face alone has, or that lie between faces which are not in one plane."""
     points, same = np.unique(np.round(vertices, 6), axis=0, return_inverse=True)
     corners = same.reshape(-1)[faces]
-    edges, edge = np.unique(
-        np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0, return_inverse=True
-    )
+    ends = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, edge = np.unique(ends, axis=0, return_inverse=True)
     first, second, third = (points[corners[:, number]] for number in range(3))
     normal = np.cross(second - first, third - first)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

@@ -80,23 +80,15 @@ class SchemeResult:
     def __post_init__(self) -> None:
         cycles, held = np.shape(self.position)[0], len(np.asarray(self.ident))
         for name, dtype, shape in (
-            ("time", np.float64, (cycles,)),
-            ("position", np.float64, (cycles, 3)),
-            ("velocity", np.float64, (cycles, 3)),
-            ("heading", np.float64, (cycles,)),
-            ("covariance", np.float64, (cycles, 6, 6)),
-            ("sent", np.int64, (cycles, None, None)),
-            ("applied", np.int64, (cycles, None, None)),
-            ("gain", np.complex128, (cycles, None)),
-            ("component_path", np.int64, (cycles, None)),
-            ("component_landmark", np.int64, (cycles, None)),
-            ("ident", np.int64, (held,)),
-            ("parent", np.int64, (held,)),
-            ("held", np.bool_, (cycles, held)),
-            ("landmark_position", np.float64, (cycles, held, 3)),
-            ("ris_probability", np.float64, (cycles, held)),
+            ("time", np.float64, (cycles,)), ("position", np.float64, (cycles, 3)),
+            ("velocity", np.float64, (cycles, 3)), ("heading", np.float64, (cycles,)),
+            ("covariance", np.float64, (cycles, 6, 6)), ("sent", np.int64, (cycles, None, None)),
+            ("applied", np.int64, (cycles, None, None)), ("gain", np.complex128, (cycles, None)),
+            ("component_path", np.int64, (cycles, None)), ("component_landmark", np.int64, (cycles, None)),
+            ("ident", np.int64, (held,)), ("parent", np.int64, (held,)), ("held", np.bool_, (cycles, held)),
+            ("landmark_position", np.float64, (cycles, held, 3)), ("ris_probability", np.float64, (cycles, held)),
             ("seconds", np.float64, (cycles, len(STEPS))),
-        ):
+        ):  # fmt: skip
             freeze(self, name, dtype, shape)
         if self.panel is not None:
             freeze(self, "panel", np.int64, (cycles, held))
@@ -104,8 +96,7 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """Whether (K, I) each of a scheme's landmarks was identified as a given RIS panel in each cycle (probability
-        above one half)."""
+        """Whether (K, I) each of a scheme's landmarks was identified as a RIS panel (probability above one half)."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:
@@ -115,8 +106,7 @@ class SchemeResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlamResult:
-    """Result of a whole run: the true scene and paths, the result of each scheme, and all that is needed to repeat
-    it."""
+    """Result of a whole run: true scene and paths, each scheme's result, and all that is needed to repeat it."""
 
     name: str
     """Name of the pipeline."""
@@ -140,9 +130,8 @@ class SlamResult:
     def __repr__(self) -> str:
         errors = ", ".join(f"{name} {self._rmse(scheme):.3g} m" for name, scheme in self.schemes.items())
         seed = "no seed" if self.seed is None else f"seed {self.seed}"
-        return (
-            f"SlamResult '{self.name}' in '{self.scene.name}', {seed}, {len(self.scene.agent)} cycles; RMSE: {errors}"
-        )
+        about = f"SlamResult '{self.name}' in '{self.scene.name}', {seed}, {len(self.scene.agent)} cycles"
+        return f"{about}; RMSE: {errors}"
 
     def _repr_html_(self) -> str:
         ways = ((name, scheme.position) for name, scheme in self.schemes.items())

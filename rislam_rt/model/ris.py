@@ -1,5 +1,4 @@
-"""Reconfigurable intelligent surfaces (RIS): data sheets of panels, their true places, and the phase codes that they
-are set to."""
+"""Reconfigurable intelligent surfaces (RIS): data sheets of panels, their true places, and their phase codes."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -77,13 +76,11 @@ class RisSpec:
         return slice(0, self.num_elements)
 
     def parts(self, code: "RisCode") -> "tuple[RisCode, ...]":
-        """Phase codes of the single RIS panels in a code for all of them: here the code itself, as there is one
-        panel."""
+        """Phase codes of the single RIS panels in a code for all of them: here the code itself."""
         return (code,)
 
     def place(self, panel: int, response: Complexes) -> Complexes:
-        """Put the element responses (..., N, M) of one RIS panel among those of all panels: here they stay as they are,
-        as there is one panel."""
+        """Put a RIS panel's element responses (..., N, M) among those of all panels: here they stay as they are."""
         return response
 
     def offsets(self) -> Floats:
@@ -150,8 +147,7 @@ class RisSpecs:
         return tuple(RisCode(row.reshape(shape), code.levels) for row, shape in zip(rows, shapes, strict=True))
 
     def place(self, panel: int, response: Complexes) -> Complexes:
-        """Put the element responses (..., N, M) of one RIS panel into the row (..., 1, E) of all panels' elements: 0 at
-        the others."""
+        """Put a RIS panel's responses (..., N, M) into the row (..., 1, E) of all panels' elements: 0 at the others."""
         whole = np.zeros((*response.shape[:-2], 1, self.num_elements), dtype=response.dtype)
         whole[..., 0, self.span(panel)] = response.reshape(*response.shape[:-2], -1)
         return whole
@@ -167,8 +163,7 @@ def join_sheets(sheets: tuple[RisSpec, ...]) -> DataSheet:
 
 
 def join_codes(codes: "tuple[RisCode, ...]") -> "RisCode":
-    """Join the phase codes (..., N, M) of single RIS panels into one code for all of them; that of a single panel is
-    taken as it is."""
+    """Join the phase codes (..., N, M) of RIS panels into one for all; a single one stays as it is."""
     if len(codes) == 1:
         return codes[0]
     rows = [code.index.reshape(*code.index.shape[:-2], 1, -1) for code in codes]

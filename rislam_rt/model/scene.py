@@ -66,14 +66,12 @@ class Material:
 
     @property
     def is_slab(self) -> bool:
-        """Whether a material reflects the polarisations across and in the plane of incidence differently: all but a
-        constant `reflection`."""
+        """Whether a material reflects TE and TM differently: all but a constant `reflection`."""
         return self.reflection is None
 
     @property
     def level(self) -> float | None:
-        """Constant magnitude |R| of a material's reflection coefficient, the mean of both polarisations; None for a
-        slab, whose own depends on the angle."""
+        """Constant |R| of a material, the mean of both polarisations; None for a slab, which has no constant one."""
         if self.reflection_te is not None and self.reflection_tm is not None:
             return 0.5 * (abs(self.reflection_te) + abs(self.reflection_tm))
         return self.reflection

@@ -21,8 +21,7 @@ when all else is unknown (`information.resolved_probability`); always."""
 ONE_PULSE = 1.0
 """Period [s] that stands for a sounding which does not repeat: longer than any path."""
 CERTAIN_SNR = 10.0
-"""Standard deviations of the measured SNR's root above the threshold from which on the detection probability is 1 to
-double precision."""
+"""Deviations of the measured SNR's root above the threshold from which on detection is sure to double precision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +38,7 @@ class SensorModel:
     window: tuple[float, float] = (0.0, 80e-9)
     """First and last delay [s] at which components are reported."""
     period: float = ONE_PULSE
-    """Period [s] after which a sounding of tones repeats: what comes later is measured as if it came earlier by whole
-    periods."""
+    """Period [s] after which a sounding of tones repeats: what comes later is measured whole periods earlier."""
     resolution: str = "cell"
     """Rule by which two paths are resolved, one of `RESOLUTIONS`."""
     alternation: bool = False
@@ -58,8 +56,7 @@ class SensorModel:
 
     @property
     def cell(self) -> Floats:
-        """Widths (3,) of the receiver's resolution cell: 1/B [s] in delay, and the array's beam in either direction
-        cosine (2, all directions, without an aperture)."""
+        """Widths (3,) of the resolution cell: 1/B [s], and the beam in either direction cosine (2 without aperture)."""
         array = self.radio.array
         beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
         return np.array([1.0 / self.radio.bandwidth, *beams])
@@ -74,8 +71,7 @@ class SensorModel:
         return np.asarray((delay >= self.window[0]) & (delay <= self.window[1]))
 
     def heard_as(self, length: Floats) -> Floats:
-        """Path lengths (...,) [m] as the receiver measures them: true lengths (...,) [m] less whole periods of the
-        sounding."""
+        """Path lengths (...,) [m] as measured: true lengths (...,) [m] less whole periods of the sounding."""
         return np.asarray(np.mod(length, SPEED_OF_LIGHT * self.period))
 
     def nearest(self, gap: Floats) -> Floats:
@@ -103,20 +99,14 @@ class SensorModel:
         return np.where(excess >= 0.0, np.exp(-np.maximum(excess, 0.0)), 0.0)
 
     def may_merge(self, gap: Floats) -> Booleans:
-        """Whether (...,) two paths that differ by `gap` (..., 3) in delay [s] and direction cosines share a resolution
-        cell."""
+        """Whether (...,) paths `gap` (..., 3) apart in delay [s] and direction cosines share a resolution cell."""
         if self.resolution == "all":
             return np.zeros(gap.shape[:-1], dtype=np.bool_)
         return np.asarray((np.abs(gap) < self.cell).all(axis=-1))
 
 
 def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
-    """Probability (...,) that the measured SNR of a path exceeds the detection threshold; expected SNR and threshold
-    linear, over all antennas.
-
-    Marcum's `Q_1(sqrt(2 snr), sqrt(2 threshold))`: twice the measured SNR is noncentral chi-square with two degrees of
-    freedom. `exp(-threshold)` for noise alone.
-    """
+    """Probability (...,) that the receiver reports a lone path of this expected SNR; see the function."""
     level = np.sqrt(2.0 * threshold)
     mean = np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0))
     doubtful, found = mean < level + CERTAIN_SNR, np.ones(mean.shape)

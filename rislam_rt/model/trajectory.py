@@ -10,8 +10,7 @@ from rislam_rt.geometry.angles import rotation_z
 
 
 def _default_offset() -> Floats:
-    """Default offset (3,) [m] of the Rx in the body frame: half the paper's 0.1 m baseline, turned 0.5 rad against the
-    heading (a straight one makes paths hit edges)."""
+    """Default offset (3,) [m] of the Rx in the body: half of 0.1 m, turned 0.5 rad, or paths would hit edges."""
     return np.array([0.05 * np.cos(0.5), 0.05 * np.sin(0.5), 0.0])
 
 

@@ -68,8 +68,7 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
     if level.count() and level.min() < 0.0 < level.max():
         axis.contour(coverage.x, coverage.y, level, levels=[0.0], colors="#d55e00", linewidths=2.0, zorder=1)
     draw_plan(axis, scene)
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
+    axis.set(xlabel="x [m]", ylabel="y [m]")
     axis.set_title(
         f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m: heard at "
         f"{coverage.heard:.0%} of where it is seen", weight="bold",

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design import Design
 from rislam_rt.model import DataSheet, PathKind, RisCode, RisSpecs, SlamResult
-from rislam_rt.report.room_figures import middle_cycles
 from rislam_rt.report.style import save_figure, styled
 
 MAX_LABELLED = 10
@@ -24,7 +23,7 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
     if not schemes:
         return None
     sheet = result.scene.ris.spec if result.scene.ris is not None else None
-    cycles = middle_cycles(len(result.scene.agent), number)
+    cycles = ((np.arange(number) + 0.5) / number * len(result.scene.agent)).astype(np.int64)
     direct = np.flatnonzero(result.paths.kind == PathKind.RIS)
     with styled():
         figure = Figure(figsize=(2.1 * number + 0.8, 2.25 * len(schemes) + 0.3))
@@ -63,8 +62,7 @@ def _draw_code(axis: Axes, index: Integers | Floats, levels: int, sheet: DataShe
     if isinstance(sheet, RisSpecs):
         index = _side_by_side([part.index for part in sheet.parts(RisCode(index, levels))])
     axis.imshow(index, cmap=_colours(levels), vmin=-0.5, vmax=levels - 0.5, origin="lower", interpolation="nearest")
-    axis.set_xticks([])
-    axis.set_yticks([])
+    axis.set(xticks=[], yticks=[])
     axis.grid(False)
     if max(index.shape) <= MAX_LABELLED and np.isfinite(index).all():
         for (row, col), level in np.ndenumerate(index):

@@ -130,9 +130,7 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
         axis.plot(point[0], point[1], "x", color=colour, ms=9, mew=2.2, zorder=6)
         ring = ellipse(point[:2], scheme.map.covariance[row, :2, :2])
         axis.plot(ring[:, 0], ring[:, 1], color=colour, lw=1.0, zorder=6)
-    for number, panel in enumerate(
-        scene.panels if len(scene.panels) > 1 else ()
-    ):  # of several: which is held for which
+    for number, panel in enumerate(scene.panels if len(scene.panels) > 1 else ()):  # of several: held for which
         row = scheme.map.panel_row(number)
         if row >= 0:
             point = scheme.map.position[row]

@@ -17,8 +17,7 @@ from rislam_rt.report.map_from_above import draw_above
 from rislam_rt.report.room_figures import draw_paths
 from rislam_rt.report.style import to_png
 from rislam_rt.report.terminal_tables import summary_rows
-from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels
-from rislam_rt.report.timing import draw_timing
+from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels, draw_timing
 from rislam_rt.report.view.page import view_fragment, view_script, view_style
 from rislam_rt.report.view.run_data import run_data
 from rislam_rt.storage.files import write_atomic
@@ -103,9 +102,8 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     about += f"{summary['trace_seconds']:.1f} s."
     names = list(summary["schemes"])
     head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
-    rows = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in summary_rows(summary)
-    )
+    cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in summary_rows(summary))
+    rows = "".join(f"<tr>{row}</tr>" for row in cells)
     said = judge_run(result, summary)
     sentences = "".join(
         f"<li>{html.escape(text)}{_bullets(said.missing[name])}</li>" for name, text in said.schemes.items()

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.report.drawing_geometry import wall_edges
@@ -43,8 +43,7 @@ def draw_scene(scene: Scene, path: Path) -> Path:
         flat = figure.add_subplot(1, 2, 1)
         draw_plan(flat, scene)
         name_walls(flat, scene)
-        flat.set_xlabel("x [m]")
-        flat.set_ylabel("y [m]")
+        flat.set(xlabel="x [m]", ylabel="y [m]")
         flat.set_title(f"{scene.name} from above", weight="bold")
         axis: Any = figure.add_subplot(1, 2, 2, projection="3d", computed_zorder=False)
         _draw_room_3d(axis, scene)
@@ -66,14 +65,10 @@ def _draw_room_3d(axis: Any, scene: Scene) -> None:
         axis.add_collection3d(Poly3DCollection(list(floor), facecolor="#f1f1f1", edgecolor="none", zorder=0))
     axis.add_collection3d(Line3DCollection(list(wall_edges(walls)), colors=WALL, lw=1.0, zorder=1))
     axis.add_collection3d(Poly3DCollection(list(walls.occluders.triangles), facecolor=SHADE, alpha=0.3, zorder=1))
-    axis.set_xlim(low[0], high[0])
-    axis.set_ylim(low[1], high[1])
-    axis.set_zlim(low[2], high[2])
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axis.set_box_aspect(high - low, zoom=1.0)
     axis.view_init(elev=24.0, azim=-62.0)
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
-    axis.set_zlabel("z [m]")
+    axis.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     axis.grid(False)
     for side in (axis.xaxis, axis.yaxis, axis.zaxis):
         side.set_pane_color((1.0, 1.0, 1.0, 0.0))
@@ -117,8 +112,3 @@ def path_points(scene: Scene, paths: Paths, cycle: int, path: int) -> Floats:
     count = int(paths.num_vertices[path])
     inner = paths.vertices[cycle, path, :count]
     return np.concatenate([scene.agent.tx[cycle][None], inner, scene.agent.rx[cycle][None]])
-
-
-def middle_cycles(count: int, number: int) -> Integers:
-    """Cycles to be shown in a figure: the middles of `number` equal parts of `count` cycles."""
-    return ((np.arange(number) + 0.5) / number * count).astype(np.int64)

@@ -19,50 +19,27 @@ DPI = 120
 TRUTH = "black"
 WALL = "#8c8c8c"
 SCHEME = {
-    "optimized": "#0072B2",
-    "random": "#D55E00",
-    "exact": "#009E73",
-    "genie": "#CC79A7",
-    "no_ris": "#7a5c00",
-    "bp_slam": "#56B4E9",
-    "bp_slam_aoa": "#004B6E",
-    "channel_slam": "#E69F00",
-}
+    "optimized": "#0072B2", "random": "#D55E00", "exact": "#009E73", "genie": "#CC79A7", "no_ris": "#7a5c00",
+    "bp_slam": "#56B4E9", "bp_slam_aoa": "#004B6E", "channel_slam": "#E69F00",
+}  # fmt: skip
 """Colour of each scheme, the same in every figure."""
 MARKER = {
-    "optimized": "o",
-    "random": "s",
-    "exact": "^",
-    "genie": "*",
-    "no_ris": "D",
-    "bp_slam": "v",
-    "bp_slam_aoa": "^",
+    "optimized": "o", "random": "s", "exact": "^", "genie": "*", "no_ris": "D", "bp_slam": "v", "bp_slam_aoa": "^",
     "channel_slam": "P",
-}
+}  # fmt: skip
 """Marker of each scheme in every figure, so that schemes differ not in colour alone."""
 KIND = {
-    PathKind.LOS: "black",
-    PathKind.VT: "#999999",
-    PathKind.PS: "#009E73",
-    PathKind.VS: "#7CCBB2",
-    PathKind.RIS: "#D55E00",
-    PathKind.VRIS: "#F3B583",
-}
+    PathKind.LOS: "black", PathKind.VT: "#999999", PathKind.PS: "#009E73", PathKind.VS: "#7CCBB2",
+    PathKind.RIS: "#D55E00", PathKind.VRIS: "#F3B583",
+}  # fmt: skip
 """Colour of each path class."""
 MARKED_BY = {"png": "Comment", "svg": "Description", "pdf": "Subject"}
 """Picture formats, and the metadata field of each that holds the program's mark (`storage.files.MARK`)."""
 SETTINGS: dict[Any, Any] = {
-    "font.size": 10,
-    "axes.titlesize": 11,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
+    "font.size": 10, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.grid": True, "grid.color": "#e3e3e3",
+    "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
     "figure.constrained_layout.use": True,
-}
+}  # fmt: skip
 
 
 @contextmanager
@@ -74,11 +51,8 @@ def styled() -> Iterator[None]:
 
 def close_up(axis: Any, middle: Floats, half: float) -> None:
     """Make an axis a close-up of a map: a framed square about a point (2,), `half` [m] to each side, without ticks."""
-    axis.set_xlim(middle[0] - half, middle[0] + half)
-    axis.set_ylim(middle[1] - half, middle[1] + half)
-    axis.set_aspect("equal")
-    axis.set_xticks([])
-    axis.set_yticks([])
+    axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal")
+    axis.set(xticks=[], yticks=[])
     for spine in axis.spines.values():
         spine.set_visible(True)
 

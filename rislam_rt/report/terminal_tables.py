@@ -1,11 +1,12 @@
-"""Tables for the terminal: scores of runs, path classes, channel comparisons, code designs, sweeps, scenes."""
+"""Tables for the terminal: scores of runs and studies, path classes, channel comparisons, designs, sweeps, scenes."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from rich.markup import escape
+from rich.table import Column, Table
 
 from rislam_rt.model import PathKind, Paths, Scene
 
@@ -14,16 +15,13 @@ if TYPE_CHECKING:
     from rislam_rt.channel.compare import PathReport, Validation
     from rislam_rt.design import Design
     from rislam_rt.studies.pipeline_sweep import SchemeScore
+    from rislam_rt.sweeps import Row
 
 
 def print_summary(summary: Mapping[str, Any]) -> None:
     """Print the scores of a run as a table, a column for each scheme: RMSE of agent, landmarks and walls, bound."""
-    schemes = summary["schemes"]
     title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
-    table = Table()
-    table.add_column("RMSE")
-    for name in schemes:
-        table.add_column(name, justify="right")
+    table = Table("RMSE", *(Column(name, justify="right") for name in summary["schemes"]))
     for row in summary_rows(summary):
         table.add_row(*row)
     _show(title, table)
@@ -71,13 +69,10 @@ def path_table(paths: Paths) -> list[dict[str, Any]]:
         level = 20.0 * np.log10(np.maximum(np.abs(paths.gain[:, columns][valid]), 1e-20))
         rows.append(
             {
-                "class": kind.name,
-                "identities": len(columns),
-                "mean_per_cycle": float(valid.sum(axis=1).mean()),
-                "lowest_gain_db": float(level.min()),
-                "highest_gain_db": float(level.max()),
+                "class": kind.name, "identities": len(columns), "mean_per_cycle": float(valid.sum(axis=1).mean()),
+                "lowest_gain_db": float(level.min()), "highest_gain_db": float(level.max()),
             }
-        )
+        )  # fmt: skip
     return rows
 
 
@@ -113,9 +108,8 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
     ):
         table.add_row(f"largest {label} error", *(f"{content[key]:.2g} {unit}" for content in contents))
     for quantity in contents[0]["limits"]:
-        table.add_row(
-            f"{quantity.split(' [')[0]}: nearest to its limit", *(_nearest(c["limits"][quantity]) for c in contents)
-        )
+        label = f"{quantity.split(' [')[0]}: nearest to its limit"
+        table.add_row(label, *(_nearest(content["limits"][quantity]) for content in contents))
     _show(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
         _print_faults(report, numbers, "cycle")
@@ -176,14 +170,26 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
     _show("sweep", table)
 
 
+def print_cards(rows: Sequence["Row"], timings: Sequence[Mapping[str, Any]]) -> None:
+    """Print the score cards of a study in unseen rooms as a table, a column for each series."""
+    from rislam_rt.report.unseen.files import unseen_content
+    from rislam_rt.report.unseen.page import ROWS
+    from rislam_rt.report.unseen.score_cards import by_series, read_runs
+
+    cards = unseen_content(by_series(read_runs(rows)), timings)["cards"]
+    columns = (Column(name, justify="right") for name in cards)
+    table = Table("score", *columns, title="median (95 % interval); 95th percentile")
+    for label, show in ROWS.items():
+        table.add_row(escape(label), *(show(entry) for entry in cards.values()))
+    Console().print(table, highlight=False)
+
+
 def print_scene(scene: Scene) -> None:
     """Print the contents of a scene as a table: reflectors, scatterers, panels, trajectory, bounds."""
     low, high = scene.bounds
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
-        material = reflector.material
-        kind = material.words
-        table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {kind}")
+        table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {reflector.material.words}")
     for scatterer in scene.scatterers:
         table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2")
     for panel in scene.panels:

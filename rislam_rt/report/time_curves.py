@@ -1,12 +1,15 @@
-"""Figures of curves against time: errors of agent and landmarks with the filter's own std, gains of path classes."""
+"""Figures of curves against time (errors, gains of path classes), and of the computing times of a cycle's steps."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
-from rislam_rt.model import PathKind, SchemeResult, SlamResult
+from rislam_rt.model import STEPS, PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.report.style import KIND, scheme_colour, styled
 
@@ -24,8 +27,7 @@ def draw_agent_error(result: SlamResult) -> Figure:
             axis.fill_between(time, 0.0, 100.0 * believed, color=colour, alpha=0.15, lw=0.0)
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
             axis.plot(time, 100.0 * error, color=colour, lw=1.6, label=label)
-        axis.set_xlabel("time [s]")
-        axis.set_ylabel("agent position error [cm]")
+        axis.set(xlabel="time [s]", ylabel="agent position error [cm]")
         axis.set_title("How far off the agent is, and how far off it believes to be", weight="bold")
         axis.set_xlim(time[0], time[-1])
         axis.set_ylim(0.0)
@@ -48,8 +50,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
         never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
         for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
             axis.set_title(landmark, weight="bold")
-            axis.set_xlabel("time [s]")
-            axis.set_xlim(time[0], time[-1])
+            axis.set(xlabel="time [s]", xlim=(time[0], time[-1]))
             axis.set_ylim(0.0)
             if number in never:
                 axis.text(0.5, 0.5, "never found", transform=axis.transAxes, ha="center", color="#555555")
@@ -86,9 +87,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
                 axis.plot(time, level, color=scheme_colour(name), lw=width, zorder=order, label=f"RIS, {name}")
         threshold = detection_snr_db - snr_per_gain_db
         axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")
-        axis.set_xlim(time[0], time[-1])
-        axis.set_xlabel("time [s]")
-        axis.set_ylabel("path gain [dB]")
+        axis.set(xlim=(time[0], time[-1]), xlabel="time [s]", ylabel="path gain [dB]")
         shift = (lambda g: np.asarray(g) + snr_per_gain_db, lambda s: np.asarray(s) - snr_per_gain_db)
         right = axis.secondary_yaxis("right", functions=shift)
         right.set_ylabel("SNR over all antennas [dB]")
@@ -103,3 +102,29 @@ def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
     with np.errstate(divide="ignore"):
         level = 20.0 * np.log10(gain)
     return np.where(gain > 0.0, level, np.nan)
+
+
+def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
+    """Draw the computing times of the cycle's steps: median (bar), 99th percentile (whisker), and `budget` [s]."""
+    schemes = result.schemes
+    height = 0.8 / len(schemes)
+    with styled():
+        figure = Figure(figsize=(8.6, 1.4 + 0.45 * len(STEPS) * max(len(schemes), 2) / 2))
+        axis = figure.subplots()
+        for number, (name, scheme) in enumerate(schemes.items()):
+            at = np.arange(len(STEPS)) - 0.4 + (number + 0.5) * height
+            median, high = 1e3 * np.percentile(scheme.seconds, [50.0, 99.0], axis=0)
+            whisker = np.stack([np.zeros(len(STEPS)), high - median])
+            axis.barh(at, median, 0.9 * height, xerr=whisker, color=scheme_colour(name), label=name,
+                      error_kw={"lw": 1.0, "capsize": 2})  # fmt: skip
+        for step, limit in enumerate(budget):
+            axis.plot([1e3 * limit] * 2, [step - 0.45, step + 0.45], color="black", lw=2.0)
+        axis.set_yticks(np.arange(len(STEPS)), STEPS)
+        axis.invert_yaxis()
+        axis.set(xscale="log", xlabel="time of a step [ms]")
+        axis.grid(False, axis="y")
+        axis.set_title("Steps of a cycle against their budgets", weight="bold")
+        handles, _ = axis.get_legend_handles_labels()
+        budget_line = Line2D([], [], color="black", lw=2.0, label="budget")
+        figure.legend(handles=[*handles, budget_line], loc="outside lower center", ncols=5, fontsize=9)
+    return figure

@@ -101,14 +101,12 @@ def scene_file(path: str | Path) -> Path:
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
-    """Build a scene from the validated content of its file: read the meshes that it names, and collect what is wrong
-    with them."""
+    """Build a scene from the validated content of its file and its meshes, and collect what is wrong with them."""
     mesh_files = MeshFiles(file.parent, spec.limits, spec.meshes)
     findings: list[Finding] = []
 
     def made(kind: str, sections: Sequence[Any], build: Callable[[Any], Any]) -> list[Any]:
-        """Reflectors, scatterers, occluders or panels made from their sections of the scene file; what is wrong with a
-        section goes to the findings."""
+        """Parts made from their sections of the scene file; what is wrong with a section goes to the findings."""
         found = []
         for number, section in enumerate(sections):
             try:
@@ -119,17 +117,17 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
                 findings.append(fault.at(str(file), field))
         return found
 
-    reflectors = made(
-        "reflector",
-        spec.reflector,
-        lambda one: Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material)),
-    )
+    def reflector(one: Any) -> Reflector:
+        return Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material))
+
+    reflectors = made("reflector", spec.reflector, reflector)
     scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, mesh_files))
     occluders = made("shade", spec.shade, lambda one: Occluder(*mesh_files.mesh(one.mesh, one), one.name))
     panels = made("ris", spec.ris, build_panel)
     try:
         if not (findings and spec.agent.random_walk):  # which needs the whole room
-            surfaces = _surfaces(reflectors, [*occluders, *(s.shade for s in scatterers if s.shade)])
+            meshes = [*reflectors, *occluders, *(s.shade for s in scatterers if s.shade)]
+            surfaces = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
             agent, mesh_files.contents["trajectory"] = build_motion(spec.agent, file.parent, surfaces)
     except Fault as fault:
         findings.append(fault.at(str(file), "agent"))
@@ -143,24 +141,14 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     return SceneDraft(str(file), scene, [], bounds)
 
 
-def _surfaces(reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Floats:
-    """Triangles (T, 3, 3) [m] of all reflectors and occluders of a scene, from which a random walk keeps away."""
-    return np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in reflectors), *(s.triangles for s in occluders)])
-
-
 def _material(section: MaterialSection) -> Material:
     """Material of a reflector from its section of the scene file."""
     given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
     return Material(
-        section.reflection,
-        section.itu,
-        permittivity=section.permittivity,
-        conductivity=section.conductivity_s_m or 0.0,
-        reflection_te=section.reflection_te,
-        reflection_tm=section.reflection_tm,
-        scattering=section.scattering,
-        **given,
-    )
+        section.reflection, section.itu, permittivity=section.permittivity,
+        conductivity=section.conductivity_s_m or 0.0, reflection_te=section.reflection_te,
+        reflection_tm=section.reflection_tm, scattering=section.scattering, **given,
+    )  # fmt: skip
 
 
 def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:

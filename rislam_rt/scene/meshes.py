@@ -1,10 +1,12 @@
-"""Meshes read from the content of files (PLY, OBJ, STL, GLB) and checked before anything else sees them, and written as
-PLY."""
+"""Meshes read from the content of files (PLY, OBJ, STL, GLB) and checked, and written as PLY."""
 
 import io
+import json
 import logging
 import re
+import struct
 import warnings
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import PurePosixPath
@@ -14,7 +16,6 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.mesh_file_checks import check_glb, too_many_faces, without_comments
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""
@@ -26,7 +27,10 @@ MAX_COORDINATE = 1e5
 """Largest coordinate [m] of a mesh in the room."""
 MAX_NODES = 1_000
 """Most nodes of a GLB file by default: reading takes time in proportion to their square."""
+MAX_HEADER = 100_000
+"""Most bytes of a PLY file's header."""
 
+_PLY_NOTE = re.compile(rb"^(?:comment|obj_info)(?:[ \t][^\r\n]*)?(?:\r\n|\r|\n)", re.MULTILINE)
 _PLY_HEADER = re.compile(
     rb"ply\nformat binary_little_endian 1\.0\n"
     rb"element vertex (\d{1,9})\nproperty (double|float) x\nproperty \2 y\nproperty \2 z\n"
@@ -56,22 +60,16 @@ def as_mesh(triangles: Floats) -> Mesh:
 
 
 class MeshReader:
-    """Parser of mesh files that keeps the last file parsed: a scene picks many nodes of one GLB file, one after the
-    other."""
+    """Parser of mesh files that keeps the last file parsed: a scene picks many nodes of one GLB file."""
 
     def __init__(self) -> None:
         self._key: tuple[str, bytes] = ("", b"")
         self._loaded: Any = None
 
     def parse(
-        self,
-        content: bytes,
-        name: str,
-        node: str | None = None,
-        max_faces: int = MAX_FACES,
-        max_nodes: int = MAX_NODES,
-        reach: float = MAX_COORDINATE,
-    ) -> Mesh:
+        self, content: bytes, name: str, node: str | None = None, max_faces: int = MAX_FACES,
+        max_nodes: int = MAX_NODES, reach: float = MAX_COORDINATE,
+    ) -> Mesh:  # fmt: skip
         """Parse a mesh file's content into triangles; `node` picks one named node of a GLB file.
 
         What is too large is refused before it is unfolded: a GLB file may name one mesh in thousands of nodes. `reach`
@@ -134,8 +132,7 @@ def ply_bytes(vertices: Floats, faces: Integers) -> bytes:
 
 
 def _own_ply(content: bytes) -> Mesh | None:
-    """Mesh from a PLY file of the common binary layout, read without trimesh, whose import takes half a second; None
-    for any other layout."""
+    """Mesh from a PLY file of the common binary layout, without trimesh's slow import; None for any other."""
     header = _PLY_HEADER.match(content)
     if header is None:
         return None
@@ -153,9 +150,11 @@ def _own_ply(content: bytes) -> Mesh | None:
 
 @contextmanager
 def _errors_as_faults(file_type: str) -> Iterator[None]:
-    """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep numpy's warnings back."""
+    """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep warnings and logs back."""
+    logged = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
     try:
-        with warnings.catch_warnings(), np.errstate(all="ignore"), _silence():
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             yield
     except Fault:
@@ -163,18 +162,8 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
     except Exception as error:
         cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
         raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Keep libraries from logging while a mesh file is parsed, tracebacks of failures that have an answer here least of
-    all."""
-    before = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        yield
     finally:
-        logging.disable(before)
+        logging.disable(logged)
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:
@@ -231,3 +220,59 @@ def sound_mesh(mesh: Mesh, max_faces: int, reach: float) -> Mesh:
     if largest > reach:
         raise Fault(f"a coordinate of {largest:.3g}, and {reach:.3g} is the most", "give 'units', near the origin")
     return Mesh(vertices[used], compact.reshape(faces.shape).astype(np.int64))
+
+
+def without_comments(content: bytes) -> bytes:
+    """Content of a PLY file without its header's comments: the reader would look for a texture named there."""
+    end = content.find(b"end_header", 0, MAX_HEADER)
+    return content if end < 0 else _PLY_NOTE.sub(b"", content[:end]) + content[end:]
+
+
+def too_many_faces(count: int, limit: int) -> Fault:
+    """Error for a mesh with more faces than the scene file's limit."""
+    mend = f"simplify the mesh, or raise limits.faces = {limit} in the scene file"
+    return Fault(f"{count} faces, and check and trace take time in proportion to them", mend)
+
+
+def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
+    """Refuse a GLB mesh file whose nodes are too many, or, each mesh counted as often as a node names it, have too many
+    faces.
+
+    What cannot be read as a GLB file passes: the reader will say what is wrong with it.
+
+    Raises
+    ------
+    Fault
+        There are too many.
+    """
+    document = _document(content)
+    try:
+        nodes, meshes, accessors = (list(document.get(key, [])) for key in ("nodes", "meshes", "accessors"))
+        uses = Counter(node["mesh"] for node in nodes if isinstance(node, dict) and "mesh" in node)
+        faces = sum(times * _num_faces(meshes[mesh], accessors) for mesh, times in uses.items())
+    except (TypeError, KeyError, IndexError, AttributeError, ValueError, OverflowError):
+        return
+    if len(nodes) > max_nodes:
+        mend = f"join them, or raise limits.nodes = {max_nodes} in the scene file"
+        raise Fault(f"{len(nodes)} nodes, and reading takes time in proportion to their square", mend)
+    if faces > max_faces:
+        raise too_many_faces(faces, max_faces)
+
+
+def _document(content: bytes) -> dict[str, Any]:
+    """Table of contents (JSON chunk) of a GLB mesh file; empty if there is none."""
+    try:
+        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
+        found = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}
+    except (struct.error, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _num_faces(mesh: Any, accessors: list[Any]) -> int:
+    """Number of triangles of a GLB file's mesh: a third of its indices, or of its corners where it has none."""
+    total = 0
+    for part in mesh["primitives"]:
+        number = part["indices"] if "indices" in part else part["attributes"]["POSITION"]
+        total += max(int(accessors[number]["count"]), 0) // 3
+    return total

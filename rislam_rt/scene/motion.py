@@ -64,8 +64,7 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
-    """Trajectory at constant velocity (3,) [m/s] from `start` (3,) [m]; heading along it, 0 if it has no horizontal
-    part."""
+    """Trajectory at constant velocity (3,) [m/s] from `start` (3,) [m], heading along it (0 if vertical)."""
     time = np.arange(cycles, dtype=np.float64) * cycle_s
     speed = np.asarray(velocity, dtype=np.float64)
     heading = np.arctan2(speed[1], speed[0]) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
@@ -84,10 +83,8 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
     """
     most = int(way.total / (speed * cycle_s) + 1e-9) + 1
     if cycles is not None and cycles > most:
-        raise Fault(
-            f"{cycles} cycles wanted, the way of {way.total:.3g} m ends after {most}",
-            "lower agent.cycles, or lead the way on",
-        )
+        what = f"{cycles} cycles wanted, the way of {way.total:.3g} m ends after {most}"
+        raise Fault(what, "lower agent.cycles, or lead the way on")
     if (cycles or most) > MAX_CYCLES:
         raise Fault(f"the way of {way.total:.3g} m takes {most} cycles", f"give at most {MAX_CYCLES}: agent.cycles")
     time = np.arange(cycles or most, dtype=np.float64) * cycle_s
@@ -96,8 +93,7 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
 
 
 def along_heading(course: Floats) -> Floats:
-    """Headings (K,) [rad] along velocities or tangents (K, 3); where one has no horizontal part, that of the one
-    before, or after."""
+    """Headings (K,) [rad] along velocities or tangents (K, 3); of a vertical one, that of the one before, or after."""
     level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
     if not level.any():
         return np.zeros(len(course))
@@ -121,10 +117,8 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
     step = np.diff(time)
     if step.max(initial=0.0) > max(LONGEST_GAP, cycle_s):
         pose = int(np.argmax(step))
-        raise Fault(
-            f"{step[pose]:.3g} s without a pose after pose {pose}, over which agent.cycle_s would have to interpolate",
-            "cut the file there",
-        )
+        gap = f"{step[pose]:.3g} s without a pose after pose {pose}"
+        raise Fault(f"{gap}, over which agent.cycle_s would have to interpolate", "cut the file there")
     count = int(time[-1] / cycle_s + 1e-6) + 1
     if count > MAX_CYCLES:
         raise Fault(f"{count} cycles of {cycle_s:g} s in the trajectory", f"give at most {MAX_CYCLES}")
@@ -149,20 +143,12 @@ def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Traject
     time, position, heading = found
     if agent.cycles is not None:
         if agent.cycles > len(time):
-            raise Fault(
-                f"{agent.cycles} cycles wanted, {len(time)} poses in '{agent.trajectory}'", "lower agent.cycles"
-            )
+            what = f"{agent.cycles} cycles wanted, {len(time)} poses in '{agent.trajectory}'"
+            raise Fault(what, "lower agent.cycles")
         time, position = time[: agent.cycles], position[: agent.cycles]
         heading = None if heading is None else heading[: agent.cycles]
-    velocity = _velocity(time, position)
+    velocity = np.asarray(np.gradient(position, time, axis=0)) if len(time) > 1 else np.zeros_like(position)
     return Trajectory(time, position, velocity, along_heading(velocity) if heading is None else heading, body)
-
-
-def _velocity(time: Floats, position: Floats) -> Floats:
-    """Velocities (K, 3) [m/s] of a recorded motion by central differences of its positions; zero for a single pose."""
-    if len(time) < 2:
-        return np.zeros_like(position)
-    return np.asarray(np.gradient(position, time, axis=0), dtype=np.float64)
 
 
 def _body(agent: AgentSection) -> Body:

@@ -6,8 +6,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 
 
 def outline_loops(faces: Integers) -> list[list[int]]:
-    """Closed loops of corners that outline triangles (T, 3), all turned the same way; loops around holes run the other
-    way."""
+    """Closed loops of corners that outline triangles (T, 3), turned like them; around holes the other way."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     there = {(int(a), int(b)) for a, b in edges}
     follow: dict[int, list[int]] = {}
@@ -44,8 +43,7 @@ def signed_area(corners: Floats) -> float:
 
 
 def inside_loop(corners: Floats, points: Floats) -> Booleans:
-    """Whether (...,) points (..., 2) lie inside a polygon (n, 2): a ray towards +x crosses its outline an odd number of
-    times."""
+    """Whether (...,) points (..., 2) lie inside a polygon (n, 2): a ray along x crosses it an odd number of times."""
     a, b = corners, np.roll(corners, -1, axis=0)
     y = points[..., None, 1]
     spans = (a[:, 1] > y) != (b[:, 1] > y)
@@ -125,8 +123,7 @@ def triangulate(outer: Floats, holes: list[Floats]) -> Integers | None:
 
 
 def _bridged(ring: list[int], hole: list[int], points: Floats, others: list[list[int]]) -> list[int] | None:
-    """Join a hole to a polygon's outline by the shortest bridge from the hole's rightmost corner that crosses nothing;
-    None if there is none."""
+    """Join a hole to a polygon's outline by the shortest bridge from its rightmost corner; None if all cross."""
     tip = max(range(len(hole)), key=lambda i: points[hole[i], 0])
     start = points[hole[tip]]
     loops = [ring, hole, *others]
@@ -186,8 +183,7 @@ def _clip_ears(ring: list[int], points: Floats) -> list[tuple[int, int, int]] | 
 
 
 def _is_empty(ear: tuple[int, int, int], ring: list[int], points: Floats, flat: float) -> bool:
-    """Whether no other corner of a polygon lies in an ear to be clipped; copies of the ear's own corners (bridges) do
-    not count."""
+    """Whether no other corner of a polygon lies in an ear; copies of its own corners (bridges) do not count."""
     a, b, c = points[list(ear)]
     rest = points[ring]
     inside = (_turn(a, b, rest) > -flat) & (_turn(b, c, rest) > -flat) & (_turn(c, a, rest) > -flat)

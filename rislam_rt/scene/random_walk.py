@@ -1,5 +1,4 @@
-"""A random walk of the agent through a room: waypoints drawn one after the other, each as far from every surface as is
-asked."""
+"""A random walk of the agent through a room: waypoints drawn in turn, each as far from surfaces as is asked."""
 
 import numpy as np
 
@@ -14,8 +13,7 @@ WIDEST_TURN = np.radians(110.0)
 LEG = (0.5, 6.0)
 """Range [m] of the lengths drawn for a random walk's legs, log-uniform, besides what the arcs at both ends take."""
 LOOK = 0.05
-"""Spacing [m] of the points of a random walk at which its distance from the surfaces is checked; a quarter of the
-clearance, if less."""
+"""Spacing [m] at which a random walk's distance from surfaces is checked; a quarter of the clearance, if less."""
 TRIES, STEPS_BACK = 40, 3
 """Draws of a random walk's next waypoint before the last few waypoints are given up, and how many those are."""
 GIVE_UP = 400
@@ -82,6 +80,5 @@ def _is_clear(points: list[Floats], radius: float, clearance: float, triangles: 
 
 
 def _check_step(clearance: float) -> float:
-    """Spacing [m] of the points at which a random walk's clearance is checked: between two of them it comes nearer by
-    half of it at most."""
+    """Spacing [m] at which a random walk's clearance is checked: between, it comes nearer by half of it at most."""
     return min(LOOK, clearance / 4.0)

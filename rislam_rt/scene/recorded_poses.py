@@ -1,5 +1,4 @@
-"""Recorded poses of the agent: TUM files (`timestamp x y z qx qy qz qw`, one pose a line) and CSV files whose columns
-have names."""
+"""Recorded poses of the agent: TUM files (`timestamp x y z qx qy qz qw` a line) and CSV files with named columns."""
 
 import csv
 import io
@@ -14,8 +13,7 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.schema import SMALLEST
 
 MAX_TIME = 1e11
-"""Largest time stamp [s] of a recording: three thousand years from the epoch on, where float64 still tells 20
-microseconds apart."""
+"""Largest time stamp [s] of a recording: three thousand years, where float64 still tells 20 microseconds apart."""
 MAX_STEP = 1e6
 """Longest step [s] within a recording, twelve days: longer gaps lie between recordings."""
 MAX_TILT = 1e-3
@@ -95,8 +93,7 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
 
 
 def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
-    """Index of the column of a recording's CSV file that holds a quantity, and its unit in SI; None for one that may be
-    left out."""
+    """Index and unit in SI of the CSV column that holds a quantity; None for one that may be left out."""
     if what in named:
         if named[what] not in header:
             raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {_few(header)}")
@@ -156,9 +153,8 @@ def _heading(q: Floats) -> Floats:
     """Headings (K,) [rad] of recorded unit quaternions (K, 4), which must be turns about z."""
     length = np.linalg.norm(np.clip(q, -2.0, 2.0), axis=1)  # a wrong length stays one, and no square overflows
     if (np.abs(length - 1.0) > 1e-3).any():
-        raise Fault(
-            f"quaternion of pose {int(np.argmax(np.abs(length - 1.0) > 1e-3))} has not length 1", "normalise it"
-        )
+        pose = int(np.argmax(np.abs(length - 1.0) > 1e-3))
+        raise Fault(f"quaternion of pose {pose} has not length 1", "normalise it")
     x, y, z, w = (q / length[:, None]).T
     tilt = 2.0 * np.hypot(x, y)
     if (tilt > MAX_TILT).any():

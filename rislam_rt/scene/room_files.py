@@ -21,8 +21,7 @@ CYCLES = {"cycles": 600, "cycle_s": 0.1}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomFiles:
-    """A room as the files of its scene folder: the table of `scene.toml`, meshes by file name, other files, and what
-    its README says."""
+    """A room as the files of its scene folder: table of `scene.toml`, meshes, other files, and README."""
 
     table: dict[str, Any]
     meshes: dict[str, Mesh]

@@ -15,8 +15,7 @@ from rislam_rt.toml import parse_toml
 MAX_SCENE_BYTES = 4_000_000
 """Most bytes of a scene file, which people write; anything larger is another file by mistake."""
 SMALLEST = 1e-6
-"""Smallest length [m] or time [s] in a scene file, a micrometre or a microsecond: nothing that a radio sees is
-finer."""
+"""Smallest length [m] or time [s] in a scene file: nothing that a radio sees is finer."""
 
 Coordinate = Annotated[float, Field(ge=-1e5, le=1e5, allow_inf_nan=False)]
 Length = Annotated[float, Field(ge=SMALLEST, le=1e5, allow_inf_nan=False)]
@@ -27,8 +26,7 @@ Name = Annotated[
     Field(pattern=r"^[.\-]*[\p{L}\p{N}_][\p{L}\p{M}\p{N}_.\-]*$", max_length=64),
     AfterValidator(lambda name: unicodedata.normalize("NFC", name)),
 ]
-"""Name in a scene file: letters and digits of any script, in the composed form, so that names which look alike are
-alike."""
+"""Name in a scene file: letters and digits of any script, composed, so that names which look alike are alike."""
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 ItuMaterial = Literal[
@@ -232,11 +230,6 @@ class LimitsSection(SceneSection):
     """Most point scatterers: each is traced on its own, with every wall on both legs."""
 
 
-def _listed(value: Any) -> Any:
-    """Make the scene file's one table `[ris]` a list of one."""
-    return [value] if isinstance(value, dict) else value
-
-
 class SceneSpec(SceneSection):
     """Validated content of a whole scene file."""
 
@@ -245,22 +238,18 @@ class SceneSpec(SceneSection):
     scatterer: list[ScattererSection] = []
     shade: Annotated[list[OccluderSection], Field(max_length=10_000)] = []
     meshes: MeshesSection = MeshesSection()
-    ris: Annotated[list[RisSection], BeforeValidator(_listed), Field(max_length=100)] = []
+    ris: Annotated[
+        list[RisSection], BeforeValidator(lambda ris: [ris] if isinstance(ris, dict) else ris), Field(max_length=100)
+    ] = []
     """`[ris]` for one panel, `[[ris]]` for several."""
     agent: AgentSection
     limits: LimitsSection = LimitsSection()
 
     @model_validator(mode="after")
-    def _not_too_many(self) -> "SceneSpec":
+    def _not_too_many_and_distinct(self) -> "SceneSpec":
         if len(self.scatterer) > self.limits.scatterers:
-            raise ValueError(
-                f"{len(self.scatterer)} scatterers, of which each is traced on its own; "
-                f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _panels_distinct(self) -> "SceneSpec":
+            mend = f"take fewer, or raise limits.scatterers = {self.limits.scatterers}"
+            raise ValueError(f"{len(self.scatterer)} scatterers, of which each is traced on its own; {mend}")
         names = [panel.name for panel in self.ris]
         if len(set(names)) < len(names):
             raise ValueError(f"ris.name: {', '.join(names)} received; give every panel a name of its own")

@@ -14,8 +14,7 @@ def quad(corners: Floats | Sequence[Floats] | Sequence[Sequence[float]]) -> Mesh
 
 
 def hexahedron(corners: Floats) -> dict[str, Mesh]:
-    """Meshes of the six faces, normals inwards, of a box-like solid from its corners (2, 2, 2, 3), indexed by x, y and
-    z side."""
+    """Meshes of the six faces, normals inwards, of a solid from its corners (2, 2, 2, 3) by x, y and z side."""
     c = np.asarray(corners, dtype=np.float64)
     return {
         "floor": quad([c[0, 0, 0], c[1, 0, 0], c[1, 1, 0], c[0, 1, 0]]),

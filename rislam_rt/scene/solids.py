@@ -1,5 +1,4 @@
-"""Closed meshes of solids (sphere, cylinder) as occluders: seen from all sides, they cast in the mean as large a shadow
-as the true shape."""
+"""Closed meshes of solids (sphere, cylinder) as occluders with the true mean shadow over all directions."""
 
 import numpy as np
 
@@ -32,8 +31,7 @@ def sphere_mesh(center: Floats, radius: float) -> Mesh:
 
 
 def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) -> Mesh:
-    """Mesh of a cylinder, a prism with closed ends about a unit vector `axis`; its girth is the true cylinder's, as
-    Cauchy asks."""
+    """Closed prism about a unit vector `axis` for a cylinder; its girth is the true one, as Cauchy asks."""
     across, aside = plane_tangents(axis)
     # turned by a fraction of a side, so that no edge lies along the room's axes
     angle = 2.0 * np.pi * (np.arange(CYLINDER_SIDES) + 0.37) / CYLINDER_SIDES

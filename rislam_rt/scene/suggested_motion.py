@@ -1,5 +1,4 @@
-"""Suggested motion of the agent for a room that comes without one: through an open place, along the longest free
-straight line."""
+"""Suggested motion of the agent for a room without one: through an open place, along the longest free line."""
 
 from typing import Any
 
@@ -12,20 +11,17 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.room_files import BASELINE
 
 NUM_PLACES, NUM_RAYS, NUM_WAYS = 120, 64, 24
-"""Places that are tried for a suggested motion (a fifth of them in rooms of many faces), rays cast from each, and
-directions of the motion."""
+"""Places tried for a suggested motion (a fifth with many faces), rays cast from each, and directions."""
 MANY_FACES = 5000
 """Faces of a room from which on fewer places are tried."""
 HEADROOM = 1.0
 """[m] Free height above what counts as a floor, where there is such a place."""
 CARRIED = 1.5
-"""[m] Height above what lies below at which a person carries a radio, that of the suggested motion; half of the height
-where there is less."""
+"""[m] Height at which a person carries a radio, that of the suggested motion; half of the free height, if less."""
 CLEAR, LEAST_CLEAR = 0.5, 0.02
 """[m] Distance that the suggested motion keeps from all surfaces, and the least it makes do with in a tight room."""
 SPEED, CYCLE, CYCLES = 0.1, 0.1, 600
-"""Suggested speed [m/s], the paper's, time between cycles [s] and number of cycles; slower where the line is shorter
-than that."""
+"""Suggested speed [m/s], the paper's (slower on a short line), time between cycles [s], and number of cycles."""
 
 
 def suggest_agent(triangles: Floats) -> dict[str, Any]:
@@ -57,8 +53,7 @@ def suggest_agent(triangles: Floats) -> dict[str, Any]:
 
 
 def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats) -> Floats:
-    """Free distance (D,) [m] from a place (3,) along directions (D, 3) to the first surface, or out of the box (2,
-    3)."""
+    """Free distance (D,) [m] from a place (3,) along (D, 3) to the first surface, or out of the box (2, 3)."""
     with np.errstate(divide="ignore"):
         out = (np.where(directions > 0.0, box[1], box[0]) - place) / directions
     leaves = np.where(directions == 0.0, np.inf, out).min(axis=1)
@@ -70,8 +65,7 @@ def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats)
 
 
 def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
-    """Places (N, 3) [m] for a suggested motion to pass, spread over the plan at the height of a carried radio above
-    the lowest surface there with headroom, and whether (N,) each has nothing above it."""
+    """Places (N, 3) [m] for a suggested motion, carried above the lowest surface; whether (N,) each is in the open."""
     count = NUM_PLACES if len(triangles) < MANY_FACES else NUM_PLACES // 5
     k = np.arange(count) + 0.5
     share = np.stack([k / count, (k * 0.5 * (np.sqrt(5.0) - 1.0)) % 1.0], axis=-1)  # Fibonacci lattice
@@ -88,8 +82,7 @@ def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
 
 
 def _levels(plan: Floats, triangles: Floats) -> Floats:
-    """Heights [m], ascending, at which the vertical line through a point (2,) of the plan meets a room's triangles, to
-    find floors and what is above them."""
+    """Heights [m], ascending, at which a vertical line through a plan's point (2,) meets a room's triangles."""
     corners = triangles[:, :, :2] - plan
     after = np.roll(corners, -1, axis=1)
     turn = corners[..., 0] * after[..., 1] - corners[..., 1] * after[..., 0]
@@ -102,8 +95,7 @@ def _levels(plan: Floats, triangles: Floats) -> Floats:
 def _motion(
     place: Floats, ways: Floats, ahead: Floats, behind: Floats, keep: float, triangles: Floats
 ) -> dict[str, Any]:
-    """Suggested `[agent]` table: the longest straight line through a place that keeps clear of all surfaces, no longer
-    than the suggested speed and cycles make it."""
+    """Suggested `[agent]` table: the longest straight line through a place that keeps clear, of limited length."""
     wanted = SPEED * CYCLE * (CYCLES - 1)
     for row in np.argsort(-np.minimum(ahead + behind, wanted), kind="stable"):
         length = min(wanted, float(ahead[row] + behind[row]))

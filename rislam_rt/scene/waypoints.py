@@ -33,8 +33,7 @@ class RoundedPath(NamedTuple):
         return float(np.sum(self.length))
 
     def at(self, travelled: Floats) -> tuple[Floats, Floats]:
-        """Positions (K, 3) [m] and unit tangents (K, 3) of a path along waypoints at distances (K,) [m] from its
-        start."""
+        """Positions (K, 3) [m] and unit tangents (K, 3) of a path along waypoints at distances (K,) [m] along it."""
         begin = np.concatenate([[0.0], np.cumsum(self.length)[:-1]])
         piece = np.clip(np.searchsorted(begin, travelled, side="right") - 1, 0, len(begin) - 1)
         gone, radius = travelled - begin[piece], self.radius[piece]
@@ -61,9 +60,8 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
         pair = int(np.argmax(length < 1e-6))
         raise Fault(f"waypoints {pair} and {pair + 1} are the same point", "leave one out")
     along = legs / length[:, None]
-    turn = np.arctan2(
-        np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), np.einsum("ij,ij->i", along[:-1], along[1:])
-    )
+    before, after = along[:-1], along[1:]
+    turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
     if (turn > SHARPEST).any():
         raise Fault(
             f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {int(np.argmax(turn)) + 1}",
@@ -82,8 +80,7 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
 
 
 def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> RoundedPath:
-    """Path along waypoints as leg, arc, leg, ..., leg, from the legs' directions, the turns, and the lengths that the
-    arcs cut off."""
+    """Path along waypoints as leg, arc, leg, ... from directions, turns, and what the arcs cut off and leave."""
     count = 2 * len(along) - 1
     start, way, inward = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3))
     start[::2], way[::2] = waypoints[:-1] + cut[:-1, None] * along, along

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.geometry.mirror_chain import mirror_chain
-from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.planes import mirror_chain, plane_tangents
 
 STEP = 1e-5
 

@@ -9,8 +9,7 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
-from rislam_rt.geometry.mirror_chain import mirror_chain
-from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.planes import mirror_chain, plane_tangents
 from rislam_rt.information import LinearMeasurements, MotionPrior, build_landmark_model, posterior_bound
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.evaluate import share_interval
+from rislam_rt.report.terminal_tables import print_cards
 from rislam_rt.report.unseen import write_unseen
 from rislam_rt.report.unseen.score_cards import by_series, card, class_cards, cycle_times, read_runs
-from rislam_rt.report.unseen.terminal import print_cards
 from rislam_rt.studies.unseen import UnseenSpec
 from rislam_rt.studies.unseen.sweep import SNR
 from rislam_rt.sweeps import Row

@@ -18,7 +18,7 @@ class LegEnds(NamedTuple):
     """Antennas at the two ends of specular legs, and the agent's heading."""
 
     device: tuple[str, str]
-    """Pattern and polarisation (`model.antennas`) at the device."""
+    """Pattern and polarisation (`model.radio`) at the device."""
     far: tuple[str, str]
     """Pattern and polarisation at the far end: a landmark, or the Rx."""
     heading: Floats

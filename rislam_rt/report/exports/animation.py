@@ -1,7 +1,7 @@
 """Animation of a run as a GIF: the room from above, and beside it a close-up of the agent."""
 
 import io
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -19,9 +19,6 @@ from rislam_rt.report.view.room_data import spread
 from rislam_rt.report.view.run_data import KNOWN
 from rislam_rt.storage.files import MARK
 
-if TYPE_CHECKING:
-    from PIL.Image import Image
-
 FRAMES = 80
 """Number of frames of an animation."""
 FRAME_MS, LAST_MS = 100, 2500
@@ -36,30 +33,27 @@ HALVES = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
     """Draw the animation of a run and encode it as GIF; `tell` reports progress after every frame."""
+    from PIL import Image
+
     rows = spread(len(result.scene.agent), FRAMES)
-    pictures: list[Image] = []
+    pictures = []
     with styled():
         figure, room, near = _empty_frame(result)
         canvas: Any = FigureCanvasAgg(figure)
         for number, cycle in enumerate(rows):
             moving = _draw_moment(room, near, result, int(cycle))
             canvas.draw()
-            pictures.append(_picture(canvas))
+            pixels = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+            pictures.append(Image.fromarray(pixels).quantize(64))
             for artist in moving:
                 artist.remove()
             tell("frames", number + 1, len(rows))
     target = io.BytesIO()
     durations = [FRAME_MS] * (len(pictures) - 1) + [LAST_MS]
     pictures[0].save(
-        target,
-        format="GIF",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=durations,
-        loop=0,
-        optimize=True,
+        target, format="GIF", save_all=True, append_images=pictures[1:], duration=durations, loop=0, optimize=True,
         comment=MARK,
-    )
+    )  # fmt: skip
     return target.getvalue()
 
 
@@ -70,8 +64,7 @@ def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     figure = Figure(figsize=(WIDTH, 0.6 * WIDTH * aspect + 0.9), dpi=DPI)
     room, near = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
     draw_plan(room, result.scene)
-    room.set_xlabel("x [m]")
-    room.set_ylabel("y [m]")
+    room.set(xlabel="x [m]", ylabel="y [m]")
     room.set_title(" ", weight="bold")
     for scheme in result.schemes:
         near.plot([], [], color=scheme_colour(scheme), lw=2.0, label=scheme)
@@ -105,8 +98,7 @@ def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list
         moving += axis.plot(*truth, "o", color=TRUTH, ms=6, zorder=8)
     for scheme in result.schemes.values():
         moving += _draw_belief(room, near, scheme, cycle)
-    near.set_xlim(truth[0] - half, truth[0] + half)
-    near.set_ylim(truth[1] - half, truth[1] + half)
+    near.set(xlim=(truth[0] - half, truth[0] + half), ylim=(truth[1] - half, truth[1] + half))
     room.set_title(f"{scene.name}, t = {scene.agent.elapsed[cycle]:.1f} s", weight="bold")
     return moving
 
@@ -126,10 +118,3 @@ def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> li
         place: Floats = scheme.landmark_position[cycle, shown, :2]
         moving += room.plot(*place.T, marker, color=colour, mfc="none", ms=8, mew=1.8, zorder=7)
     return moving
-
-
-def _picture(canvas: Any) -> "Image":
-    """Convert a drawn frame of the animation to an image of 64 colours."""
-    from PIL import Image
-
-    return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()).quantize(64)

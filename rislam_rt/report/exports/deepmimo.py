@@ -23,12 +23,9 @@ REFLECTION, SCATTERING = 1, 3
 """DeepMIMO's interaction codes: those of a path are the digits of one number, from the Tx on; a line of sight is 0."""
 NO_DIFFUSE = ("diffuse_reflections", "diffuse_diffractions", "diffuse_transmissions")
 NO_FLAGS = (
-    "diffuse_final_interaction_only",
-    "diffuse_random_phases",
-    "terrain_reflection",
-    "terrain_diffraction",
+    "diffuse_final_interaction_only", "diffuse_random_phases", "terrain_reflection", "terrain_diffraction",
     "terrain_scattering",
-)
+)  # fmt: skip
 NO_SCATTERING = ("cross_polarization_coefficient", "roughness", "vertical_attenuation", "horizontal_attenuation")
 """Settings that the format wants and that have no meaning here: paths are specular or run over a point."""
 METAL = 1e7
@@ -86,16 +83,11 @@ def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
     points = np.array(paths.vertices[cycle, found, :longest])
     points[np.arange(points.shape[1]) >= count[:, None]] = np.nan
     values = {
-        "power": 20.0 * np.log10(np.abs(gain)),
-        "phase": np.rad2deg(np.angle(gain)),
-        "delay": paths.tau[cycle, found],
-        "aod_az": np.rad2deg(phi_t),
-        "aod_el": np.rad2deg(theta_t),
-        "aoa_az": np.rad2deg(phi_r),
+        "power": 20.0 * np.log10(np.abs(gain)), "phase": np.rad2deg(np.angle(gain)), "delay": paths.tau[cycle, found],
+        "aod_az": np.rad2deg(phi_t), "aod_el": np.rad2deg(theta_t), "aoa_az": np.rad2deg(phi_r),
         "aoa_el": np.rad2deg(theta_r),
-        "inter": np.array([_interactions(paths, int(path)) for path in found], dtype=np.float64),
-        "inter_pos": points,
-    }
+        "inter": np.array([_interactions(paths, int(path)) for path in found], dtype=np.float64), "inter_pos": points,
+    }  # fmt: skip
     return {name: values[name][None] for name in PER_PATH}
 
 
@@ -115,54 +107,31 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
     return {
         "version": FORMAT_VERSION,
         "rt_params": {
-            "raytracer_name": f"rislam_rt ({paths.source})",
-            "raytracer_version": __version__,
-            "frequency": radio.carrier,
-            "max_path_depth": depth + 1,
-            "max_reflections": depth,
-            "max_diffractions": 0,
-            "max_scattering": 1,
-            "max_transmissions": 0,
-            **dict.fromkeys(NO_DIFFUSE, 0),
-            **dict.fromkeys(NO_FLAGS, False),
-            "num_rays": 0,
-            "ray_casting_method": "none",
-            "ray_casting_range_az": 360.0,
-            "ray_casting_range_el": 180.0,
-            "gps_bbox": [0.0, 0.0, 0.0, 0.0],
+            "raytracer_name": f"rislam_rt ({paths.source})", "raytracer_version": __version__,
+            "frequency": radio.carrier, "max_path_depth": depth + 1, "max_reflections": depth, "max_diffractions": 0,
+            "max_scattering": 1, "max_transmissions": 0, **dict.fromkeys(NO_DIFFUSE, 0),
+            **dict.fromkeys(NO_FLAGS, False), "num_rays": 0, "ray_casting_method": "none",
+            "ray_casting_range_az": 360.0, "ray_casting_range_el": 180.0, "gps_bbox": [0.0, 0.0, 0.0, 0.0],
             "synthetic_array": True,
             "raw_params": {
-                "scene": scene.name,
-                "time_s": scene.agent.time.tolist(),
-                "landmarks": list(paths.landmarks),
+                "scene": scene.name, "time_s": scene.agent.time.tolist(), "landmarks": list(paths.landmarks),
             },
         },
         "txrx_sets": {
             f"txrx_set_{number}": {
-                "name": name,
-                "id_orig": number,
-                "id": number,
-                "is_tx": name == "tx",
-                "is_rx": name == "rx",
-                "num_points": 1,
-                "num_active_points": 1,
-                "num_ant": 1,
-                "dual_pol": False,
-                "ant_rel_positions": [[0, 0, 0]],
-                "array_orientation": [0, 0, 0],
+                "name": name, "id_orig": number, "id": number, "is_tx": name == "tx", "is_rx": name == "rx",
+                "num_points": 1, "num_active_points": 1, "num_ant": 1, "dual_pol": False,
+                "ant_rel_positions": [[0, 0, 0]], "array_orientation": [0, 0, 0],
             }
             for number, name in enumerate(("tx", "rx"))
         },
         "materials": {f"material_{n}": one for n, one in enumerate(_materials(scene, radio))},
         "scene": {
-            "num_scenes": paths.num_cycles,
-            "n_objects": len(scene.reflectors),
-            "n_vertices": sum(len(one.vertices) for one in scene.reflectors),
-            "n_faces": faces,
-            "n_triangular_faces": faces,
-            "representation": "mesh",
+            "num_scenes": paths.num_cycles, "n_objects": len(scene.reflectors),
+            "n_vertices": sum(len(one.vertices) for one in scene.reflectors), "n_faces": faces,
+            "n_triangular_faces": faces, "representation": "mesh",
         },
-    }
+    }  # fmt: skip
 
 
 def _distinct(scene: Scene) -> list[Material]:
@@ -182,11 +151,7 @@ def _materials(scene: Scene, radio: RadioConfig) -> list[dict[str, Any]]:
 
 
 def _electric(material: Material, carrier: float) -> dict[str, float]:
-    """Permittivity and conductivity [S/m] of a material for DeepMIMO, at the carrier [Hz].
-
-    A constant coefficient has neither: it is written as the half-space that reflects so at normal incidence, and a
-    coefficient of 1 as a metal.
-    """
+    """Permittivity and conductivity [S/m] at the carrier [Hz] for DeepMIMO; of a constant R, its half-space's."""
     if material.itu is not None:
         a, b, c, d = itu_parameters(material.itu, carrier)
         ghz = carrier / 1e9

@@ -1,10 +1,18 @@
 """The page of the channel validation: how traced and image-source paths were compared, and a table of all rooms."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rislam_rt.channel.compare import Validation
 from rislam_rt.report.markdown import table_lines
+from rislam_rt.report.studies.channel_validation_figure import draw_certificate
+from rislam_rt.report.style import to_png
+from rislam_rt.storage.files import json_file, write_all
+from rislam_rt.studies.compare import Comparison
+from rislam_rt.studies.spec import CompareSpec
+
+COMPARISON, CERTIFICATE = "channel_validation", "figures/path_certificate.png"
 
 _HEAD = [
     "room", "depth", "numbers", "poses", "matched", "explained", "unexplained",
@@ -37,6 +45,22 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 """
 
 
+def write_comparison(
+    found: Comparison, spec: CompareSpec, content: Mapping[str, Any], folder: Path, *, figures: bool = True
+) -> Path:
+    """Write the files of a comparison of both channels: page, JSON and figure; return the page's path.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    files = {f"{COMPARISON}.md": validation_page(found.rows, seed=spec.seed).encode()}
+    if figures and found.certificate is not None:
+        files[CERTIFICATE] = to_png(draw_certificate(found.certificate))
+    return write_all(folder, files | {f"{COMPARISON}.json": json_file(content)})
+
+
 def validation_table(rows: Sequence[Validation]) -> str:
     """Markdown table of the channel validation: matched and one-sided paths with reasons, largest errors, by room."""
     cells = []
@@ -53,9 +77,8 @@ def validation_table(rows: Sequence[Validation]) -> str:
 
 def validation_page(rows: Sequence[Validation], *, seed: int) -> str:
     """Markdown page of the channel validation: method and table."""
-    return f"{_TEXT}Seed {seed}; poses at random, midpoint at least 0.1 m off every surface, baseline 0.1 m.\n\n" + (
-        validation_table(rows)
-    )
+    how = f"Seed {seed}; poses at random, midpoint at least 0.1 m off every surface, baseline 0.1 m."
+    return f"{_TEXT}{how}\n\n{validation_table(rows)}"
 
 
 def _reasons(numbers: Mapping[str, Any]) -> str:
@@ -77,7 +100,5 @@ def _error(spread: Mapping[str, float]) -> str:
     """Table cell of the channel validation: largest error and 99th percentile; `< 1e-12` for mere rounding."""
     if not spread:
         return "-"
-    return " ".join(
-        text.format("< 1e-12" if value < 1e-12 else f"{value:.1e}")
-        for text, value in (("{}", spread["max"]), ("({})", spread["p99"]))
-    )
+    largest, p99 = ("< 1e-12" if spread[name] < 1e-12 else f"{spread[name]:.1e}" for name in ("max", "p99"))
+    return f"{largest} ({p99})"

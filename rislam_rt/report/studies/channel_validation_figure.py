@@ -123,5 +123,4 @@ def _draw_plan(axis: Axes, certificate: Certificate) -> None:
     axis.plot(*scene.agent.position[0, :2], "*", color=TRUTH, ms=11, zorder=9)
     axis.set_aspect("equal")
     axis.grid(False)
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
+    axis.set(xlabel="x [m]", ylabel="y [m]")

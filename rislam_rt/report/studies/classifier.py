@@ -141,11 +141,10 @@ def classifier_page(found: Training, spec: ClassifierSpec, figures: Sequence[str
     scores, features, panel = figures or (None, None, None)
     lines = ["# Classifier of multipath components: scores", "", *paragraph(about), ""]
     lines += [*picture(scores, "F1 in each room"), "## Scores", "", *_score_table(found), ""]
-    lines += [
-        "Of each random start, the mean over classes of the share told rightly in the random rooms for validation,"
-    ]
-    lines += ["and F1 on all test rooms: "]
-    lines[-1] += ", ".join(f"{chosen:.4f} and {tested:.4f}" for chosen, tested in found.restarts) + "."
+    starts = ", ".join(f"{chosen:.4f} and {tested:.4f}" for chosen, tested in found.restarts)
+    told = "the mean over classes of the share told rightly in the random rooms for validation,"
+    lines.append(f"Of each random start, {told}")
+    lines.append(f"and F1 on all test rooms: {starts}.")
     lines += ["", "## The panel's direct path", "", *_panel_summary(found), ""]
     lines += picture(panel, "Share of looks at the panel that are dropped, room by room")
     lines += ["### Room by room", "", *_panel_rooms(found), ""]

@@ -1,5 +1,7 @@
 """Figure, table and page of Fig. 4(a): panel gain against distance, and which of the paper's claims hold."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -7,15 +9,33 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design import GainCurves
-from rislam_rt.report.markdown import picture
-from rislam_rt.report.style import SCHEME, TRUTH, styled
-from rislam_rt.storage.files import csv_file
+from rislam_rt.report.markdown import picture, table_lines
+from rislam_rt.report.style import SCHEME, TRUTH, styled, to_png
+from rislam_rt.storage.files import csv_file, json_file, write_all
 from rislam_rt.studies.fig4a import Fig4a
 from rislam_rt.studies.spec import Fig4aSpec
 
+CURVES, CURVES_FIGURE = "fig4a", "figures/fig4a.png"
 SPHERE = "#009E73"
 NUM_SHOWN = 9
 """Number of places in the page's table."""
+
+
+def write_fig4a(
+    found: Fig4a, spec: Fig4aSpec, scene: str, content: Mapping[str, Any], folder: Path, *, figures: bool = True
+) -> Path:
+    """Write the files of Fig. 4(a): page, CSV, JSON and figure; return the page's path.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    page = fig4a_page(found, spec, scene, CURVES_FIGURE if figures else None)
+    files = {f"{CURVES}.md": page.encode(), f"{CURVES}.csv": fig4a_csv(found)}
+    if figures:
+        files[CURVES_FIGURE] = to_png(draw_fig4a(found, spec))
+    return write_all(folder, files | {f"{CURVES}.json": json_file(content)})
 
 
 def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
@@ -99,13 +119,10 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
     lines += picture(figure, "Gain against distance")
     shown = np.unique(np.linspace(0, len(found.distance) - 1, NUM_SHOWN).round().astype(int))
     for element, curves in found.curves.items():
-        lines += [
-            f"## Element pattern `{element}`, gains in dB", "",
-            "| distance [m] | optimised | random | optimum | sphere |", "| --- | --- | --- | --- | --- |",
-            *(f"| {found.distance[k]:.2f} | {_spread(curves.optimized, k)} | {_spread(curves.random, k)} | "
-              f"{curves.exact[k]:.2f} | {found.sphere[k]:.2f} |" for k in shown),
-            "",
-        ]  # fmt: skip
+        rows = [[f"{found.distance[k]:.2f}", _spread(curves.optimized, k), _spread(curves.random, k),
+                 f"{curves.exact[k]:.2f}", f"{found.sphere[k]:.2f}"] for k in shown]  # fmt: skip
+        table = table_lines(["distance [m]", "optimised", "random", "optimum", "sphere"], rows)
+        lines += [f"## Element pattern `{element}`, gains in dB", "", *table, ""]
     return "\n".join(lines[:-1]) + "\n"
 
 

@@ -55,12 +55,10 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
         axis.set_yscale("log")
         mark_metres(axis.yaxis)
         unit = unit_of(along)
-        axis.set_xlabel((f"{along} [{unit}]" if unit else along) or "scheme")
-        axis.set_ylabel("RMSE of the agent's position [m]")
+        axis.set(xlabel=(f"{along} [{unit}]" if unit else along) or "scheme", ylabel="RMSE of the agent's position [m]")
         runs = sorted({len(score.rmse) for score in scores})
-        axis.set_title(
-            f"{' to '.join(map(str, runs[:: max(len(runs) - 1, 1)]))} runs a point, 95 % bootstrap intervals"
-        )
+        count = " to ".join(map(str, runs[:: max(len(runs) - 1, 1)]))
+        axis.set_title(f"{count} runs a point, 95 % bootstrap intervals")
         figure.legend(loc="outside lower center", ncols=3, fontsize=9)
     return figure
 

@@ -1,4 +1,4 @@
-"""Entries of swept studies: scores of one scheme at one point over all repetitions, and their form in tables."""
+"""Entries of swept studies: scores of one scheme at one point over all repetitions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,6 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.audible import HEARD
+from rislam_rt.report.swept.table_cells import NOTHING
 from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.swept import Group, paired_gain, spread
 
@@ -16,8 +17,6 @@ NEAR_BOUND = 1.5
 """Largest ratio of RMSE to posterior bound at which the bound counts as what limits the error."""
 GOOD_ASSOCIATION = 0.95
 """Share of correctly associated components below which data association counts as what limits the error."""
-NOTHING = "-"
-"""Table cell without a value."""
 
 
 def scheme_entry(group: Group, scheme: str) -> dict[str, Any]:
@@ -75,33 +74,6 @@ def entries_csv(entries: Sequence[Mapping[str, Any]]) -> bytes:
     return csv_file(names, ([_cell(entry[name]) for name in names] for entry in entries))
 
 
-def metres(value: float | None) -> str:
-    """Table cell: a length in metres with three decimals."""
-    return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
-
-
-def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
-    """Table cell: an entry's error in metres with its interval."""
-    value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
-    if value is None or low is None:
-        return metres(value)
-    return f"{value:.3f} ({low:.3f} to {high:.3f})"
-
-
-def ratio(value: float | None) -> str:
-    """Table cell: a ratio with two decimals."""
-    return NOTHING if value is None else f"{value:.2f}"
-
-
-def percent_between(entry: Mapping[str, Any], name: str) -> str:
-    """Table cell: a share of an entry in percent with its interval."""
-    if entry[name] is None:
-        return NOTHING
-    found = (entry[name + end] for end in ("", "_low", "_high"))
-    value, low, high = (np.nan if part is None else 100 * part for part in found)
-    return f"{value:.0f} % ({low:.0f} to {high:.0f})"
-
-
 def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, list[Mapping[str, Any]]]:
     """Entries of a study grouped by scheme, each group sorted by one number."""
     found: dict[str, list[Mapping[str, Any]]] = {}
@@ -121,24 +93,15 @@ def failure_notes(groups: Sequence[Group]) -> list[str]:
     return [*lines, *(f"- {reason}" for reason in ["", *reasons[:10]] if reason)]
 
 
-def panel_of(group: Group, scheme: str) -> str | None:
-    """Name of the landmark in a scheme's scores that is the panel, of several the first; None without one."""
-    known = _panels_of(group, scheme)
-    return known[0] if known else None
-
-
-def _panels_of(group: Group, scheme: str) -> list[str]:
+def panels_of(group: Group, scheme: str) -> list[str]:
     """Names of the landmarks in a scheme's scores that are panels."""
     names = group.parts(scheme, "landmarks")
     return [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """RMS errors of panel and scatterers at the end of the runs with their bounds, and the share that was mapped then.
-
-    None where there is nothing to be found.
-    """
-    panels = _panels_of(group, scheme)
+    """RMS errors and bounds of panel and scatterers at the end of the runs, and the share mapped; None of nothing."""
+    panels = panels_of(group, scheme)
     names = group.parts(scheme, "landmarks")
     own = panels if SCHEMES[scheme].panel else []
     found: dict[str, float | None] = {}
@@ -150,10 +113,7 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """RMS angle and distance errors of the walls found at the end of the runs, with bounds and the map's own std.
-
-    The share found is that among walls with a path above the detection threshold for `HEARD` s in all.
-    """
+    """RMS errors, bounds and own std of walls found at the end; the share is of those heard for `HEARD` s in all."""
     names = group.parts(scheme, "walls")
     angle, offset, own, least, near, audible = (
         _pooled(group, scheme, "walls", names, part)

@@ -1,5 +1,4 @@
-"""Drawing of error curves: RMSE of each scheme with its interval as a band, the posterior bound dashed, names at the
-ends."""
+"""Drawing of error curves: RMSE of each scheme with its interval as a band, posterior bound dashed, names."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

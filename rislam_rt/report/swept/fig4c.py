@@ -8,18 +8,9 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.markdown import picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import (
-    by_scheme,
-    interval_entry,
-    metres,
-    metres_between,
-    panel_of,
-    percent_between,
-    ratio,
-    scheme_entry,
-    what_limits,
-)
+from rislam_rt.report.swept.entries import by_scheme, interval_entry, panels_of, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, mark_metres
+from rislam_rt.report.swept.table_cells import metres, metres_between, percent_between, ratio
 from rislam_rt.studies.swept import Fig4cSpec, Group, paired_gain, spread
 
 TITLE = "Error against the panel's size: Fig. 4(c)"
@@ -55,8 +46,7 @@ def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
         label_ends(panel, curves, "panel_m")
         for axis, what in ((agent, "agent's position"), (panel, "panel's position at the end")):
             axis.set_xticks(sizes, [f"{size} x {size}" for size in sizes], fontsize=9)
-            axis.set_xlabel("elements of the panel")
-            axis.set_ylabel(f"RMSE of the {what} [m]")
+            axis.set(xlabel="elements of the panel", ylabel=f"RMSE of the {what} [m]")
     return figure
 
 
@@ -86,9 +76,9 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
 
 
 def panel_error(group: Group, scheme: str) -> Any:
-    """Position error (R,) [m] of the panel at the end of each run; NaN where it is not mapped."""
-    name = panel_of(group, scheme)
-    return np.full(len(group.results), np.nan) if name is None else group.column(scheme, "landmarks", name, "final_m")
+    """Position error (R,) [m] of the (first) panel at the end of each run; NaN where it is not mapped."""
+    panels = panels_of(group, scheme)
+    return group.column(scheme, "landmarks", panels[0], "final_m") if panels else np.full(len(group.results), np.nan)
 
 
 def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:

@@ -1,5 +1,4 @@
-"""Table, figure and page of the hardware study: errors of the receiver with impairments, with and without
-calibration."""
+"""Table, figure and page of the hardware study: the receiver's errors with impairments and calibration."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,15 +8,14 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import NOTHING, ratio
+from rislam_rt.report.swept.table_cells import NOTHING, percent, ratio
 from rislam_rt.studies.swept import Group, HardwareSpec
 from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 
 TITLE = "Hardware: what a laboratory must reach for the panel to matter"
 SCORES = ("false", "panel", "landmarks", "components", "error_over_std", "left")
 HEARD, MORE_FALSE = 0.9, 2.0
-"""Tolerable impairment: least share of panel detections relative to an ideal front end, and most further false
-components a cycle."""
+"""Tolerable: least share of panel detections relative to an ideal front end, most further false components."""
 WAYS = {
     "built": ("", "receiver"), "told": ("", "told"), "calibrated": (CALIBRATED, "receiver"),
     "calibrated_told": (CALIBRATED, "told"),
@@ -78,7 +76,7 @@ def hardware_body(content: Mapping[str, Any], spec: HardwareSpec, figure: str | 
     """Lines of the hardware study's page: tolerable levels, the picture, all numbers."""
     ideal = content["entries"][0]
     text = f"""Largest level at which the panel is heard in {100 * HEARD:.0f} % of the looks in which an ideal front end
-    hears it ({_share(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
+    hears it ({percent(ideal["panel"])}), with at most {MORE_FALSE:g} more false components a cycle than there
     ({ratio(ideal["false"])}); {NOTHING} where it is so at none of the levels tried:"""
     lines = [*paragraph(LAW), "", *paragraph(text), ""]
     head = ["fault", *NAMES.values(), "levels tried"]
@@ -114,17 +112,12 @@ def _limit(
     limit = None
     for entry in entries:
         if entry["fault"] == fault.name and entry["way"] == way:
-            if not _matters(entry, ideal):
+            if any(one.get("panel") is None for one in (entry, ideal)):
+                break
+            if entry["panel"] < HEARD * ideal["panel"] or entry["false"] > ideal["false"] + MORE_FALSE:
                 break
             limit = str(entry["level"])
     return limit
-
-
-def _matters(scores: Mapping[str, Any], ideal: Mapping[str, Any]) -> bool:
-    """Whether an impairment is tolerable: panel detections and false components near those of an ideal front end."""
-    if any(one.get("panel") is None for one in (scores, ideal)):
-        return False
-    return bool(scores["panel"] >= HEARD * ideal["panel"] and scores["false"] <= ideal["false"] + MORE_FALSE)
 
 
 def _limit_row(content: Mapping[str, Any], name: str) -> list[str]:
@@ -145,12 +138,7 @@ def _rows(content: Mapping[str, Any], scores: Sequence[str]) -> list[list[str]]:
         unit = content["about"].get(name, {}).get("unit", "")
         cells = [f"`{name}`", f"{level} {unit}".strip()]
         for score in scores:
-            show = _share if score == "panel" else ratio
+            show = percent if score == "panel" else ratio
             cells += [show(ways[way][score]) if way in ways else NOTHING for way in WAYS]
         rows.append(cells)
     return rows
-
-
-def _share(value: float | None) -> str:
-    """Table cell: a share in percent."""
-    return NOTHING if value is None else f"{100 * value:.0f} %"

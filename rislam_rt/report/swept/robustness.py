@@ -7,16 +7,9 @@ from matplotlib.figure import Figure
 
 from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.entries import (
-    interval_entry,
-    metres,
-    metres_between,
-    percent_between,
-    ratio,
-    rmse_change,
-    scheme_entry,
-)
+from rislam_rt.report.swept.entries import interval_entry, rmse_change, scheme_entry
 from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
+from rislam_rt.report.swept.table_cells import metres, metres_between, percent, percent_between, ratio
 from rislam_rt.studies.swept import Group, RobustnessSpec
 
 WORST = 3
@@ -79,8 +72,7 @@ def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
                 edge = "black" if entry["ordinary"] else colour
                 draw_rmse(axis, place, entry, colour, ms=5.5, mec=edge, mew=1.0)
         axis.set_yticks(range(len(rows)), [_label(content, name) for name in rows], fontsize=8)
-        axis.set_ylim(len(rows) - 0.4, -0.6)
-        axis.set_xscale("log")
+        axis.set(ylim=(len(rows) - 0.4, -0.6), xscale="log")
         mark_metres(axis.xaxis)
         axis.set_xlabel(f"RMSE of the agent's position [m], {scheme}; dotted: nothing wrong")
         axis.set_title("Levels from light to dark; ring: ordinary equipment", fontsize=10)
@@ -122,10 +114,10 @@ def _row(content: Mapping[str, Any], entry: Mapping[str, Any]) -> list[str]:
     name = entry["mismatch"]
     note = f"`{name}`: {content['about'][name]['note']}" if name else "`reference`: nothing is wrong"
     level = _level(content, name, entry["level"]) + ("*" if entry["ordinary"] else "") if name else ""
-    found = "-" if entry["ris_found"] is None else f"{100 * entry['ris_found']:.0f} %"
     return [
         note, level, entry["scheme"], metres_between(entry), percent_between(entry, "change"), metres(entry["bound_m"]),
-        metres(entry["aligned_m"]), ratio(entry["nees_per_dof"]), metres(entry["ris_m"]), found,
+        metres(entry["aligned_m"]), ratio(entry["nees_per_dof"]), metres(entry["ris_m"]),
+        percent(entry["ris_found"]),
         ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
     ]  # fmt: skip
 

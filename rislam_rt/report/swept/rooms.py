@@ -11,28 +11,20 @@ from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
 from rislam_rt.pipeline.scores.audible import HEARD
 from rislam_rt.report.markdown import paragraph, picture, table_lines
 from rislam_rt.report.style import MARKER, scheme_colour, styled
-from rislam_rt.report.swept.entries import metres, metres_between, ratio, scheme_entry, what_limits
+from rislam_rt.report.swept.entries import scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.report.swept.table_cells import metres, metres_between, ratio
 from rislam_rt.studies.swept import Group, RoomsSpec
 
 TITLE = "All rooms"
 AIMS: dict[str, float] = {
-    "rmse_m": 0.04,
-    "over_bound": 1.5,
-    "ris_m": 0.06,
-    "scatterer_m": 0.1,
-    "wall_deg": 2.0,
-    "wall_m": 0.1,
-    "diverged": 0,
+    "rmse_m": 0.04, "over_bound": 1.5, "ris_m": 0.06, "scatterer_m": 0.1, "wall_deg": 2.0, "wall_m": 0.1, "diverged": 0,
     "failed": 0,
-}
+}  # fmt: skip
 """Aims: the largest value of each score that is good enough."""
 BOUND_OF = {
-    "ris_m": "ris_bound_m",
-    "scatterer_m": "scatterer_bound_m",
-    "wall_deg": "wall_bound_deg",
-    "wall_m": "wall_bound_m",
-}
+    "ris_m": "ris_bound_m", "scatterer_m": "scatterer_bound_m", "wall_deg": "wall_bound_deg", "wall_m": "wall_bound_m",
+}  # fmt: skip
 """Names of the posterior bounds of the errors of landmarks and walls."""
 
 
@@ -144,15 +136,9 @@ def rooms_body(content: Mapping[str, Any], spec: RoomsSpec, figure: str | None) 
 
 
 NAMES = {
-    "rmse_m": "agent",
-    "over_bound": "bound",
-    "ris_m": "panel",
-    "scatterer_m": "scatterers",
-    "wall_deg": "wall angle",
-    "wall_m": "wall distance",
-    "diverged": "divergence",
-    "failed": "failure",
-}
+    "rmse_m": "agent", "over_bound": "bound", "ris_m": "panel", "scatterer_m": "scatterers", "wall_deg": "wall angle",
+    "wall_m": "wall distance", "diverged": "divergence", "failed": "failure",
+}  # fmt: skip
 """Names of the aims on the page."""
 
 

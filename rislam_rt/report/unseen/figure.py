@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rislam_rt.arrays import Floats
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.error_curves import mark_metres
 from rislam_rt.report.unseen.score_cards import CLASSES, SchemeRun, column, in_order
@@ -51,7 +50,7 @@ def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[Scheme
                 continue
             middle = place + (number - 0.5 * (len(runs) - 1)) * width
             value, lost = column(own, SCORE), column(own, "lost") > 0.0
-            x = middle + _scatter(len(own), 0.7 * width)
+            x = middle + 0.7 * width * ((np.arange(len(own)) * 0.618034) % 1.0 - 0.5)  # so that dots overlap less
             axis.plot(x[~lost], value[~lost], ls="none", marker="o", ms=3.5, alpha=0.7, color=colour)
             axis.plot(x[lost], value[lost], ls="none", marker="x", ms=4.5, color=colour)
             for score, style in ((SCORE, "-"), (BOUND, ":")):
@@ -61,8 +60,3 @@ def _draw_division(axis: Axes, division: str, runs: Mapping[str, Sequence[Scheme
                 )  # fmt: skip
     axis.set_xticks(range(len(order)), order)
     axis.set_title(f"By {division}", fontsize=10)
-
-
-def _scatter(count: int, width: float) -> Floats:
-    """Fixed horizontal offsets for the figure's dots, so that they overlap less."""
-    return np.asarray(width * ((np.arange(count) * 0.618034) % 1.0 - 0.5))

@@ -6,17 +6,9 @@ from typing import Any
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
 from rislam_rt.pipeline.scores.audible import HEARD
 from rislam_rt.report.markdown import paragraph, picture, table_lines
-from rislam_rt.report.swept.entries import NOTHING
+from rislam_rt.report.swept.table_cells import NOTHING
 from rislam_rt.report.unseen.score_cards import SchemeRun
-from rislam_rt.studies.unseen.score import (
-    FAR_OVER,
-    GOOD_ANGLE,
-    GOOD_OFFSET,
-    LASTING,
-    LOST,
-    NEAR_POINT,
-    SETTLED,
-)
+from rislam_rt.studies.unseen.score import FAR_OVER, GOOD_ANGLE, GOOD_OFFSET, LASTING, LOST, NEAR_POINT, SETTLED
 from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
 
 MILLI = 1e3
@@ -31,25 +23,14 @@ def unseen_page(
     """Markdown page of a study in unseen rooms."""
     lines = ["# Unseen rooms", "", *about, "", *_meaning(), ""]
     lines += picture(figure, "Relative error of every run, by class of room and motion")
-    lines += ["## Score card", "", *card_table(content["cards"]), ""]
-    for name, cards in content["classes"].items():
-        lines += [f"## By class: {name}", "", *class_table(cards), ""]
+    cards = content["cards"]
+    rows = [[label, *(show(entry) for entry in cards.values())] for label, show in ROWS.items()]
+    lines += ["## Score card", "", *table_lines(["", *cards], rows), ""]
+    for name, classes in content["classes"].items():
+        rows = [[entry["division"], entry["class"], *(show(entry) for show in COLUMNS.values())] for entry in classes]
+        lines += [f"## By class: {name}", "", *table_lines(["class of", "", *COLUMNS], rows), ""]
     lines += ["## Worst runs", "", *_worst(runs), "", "## Failures", "", *_failures(runs)]
     return "\n".join(lines) + "\n"
-
-
-def card_table(cards: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Table of the score cards of a study in unseen rooms, a row a score, a column a series."""
-    rows = [[label, *(show(entry) for entry in cards.values())] for label, show in ROWS.items()]
-    return table_lines(["", *cards], rows)
-
-
-def class_table(cards: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table of scores by class of unseen rooms, a row a class."""
-    head = ["class of", "", *COLUMNS]
-    return table_lines(
-        head, [[entry["division"], entry["class"], *(show(entry) for show in COLUMNS.values())] for entry in cards]
-    )
 
 
 def _meaning() -> list[str]:
@@ -122,9 +103,7 @@ def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
 def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
     """Lines on the runs that failed."""
     found = [(name, run) for name, members in runs.items() for run in members if run.failed]
-    if not found:
-        return ["None."]
-    return [f"- room {run.room}, {name}: {run.failed}" for name, run in found]
+    return [f"- room {run.room}, {name}: {run.failed}" for name, run in found] or ["None."]
 
 
 def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:

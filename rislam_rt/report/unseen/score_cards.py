@@ -48,16 +48,12 @@ def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
                 name = ", ".join([*parts, *([scheme] if len(schemes) > 1 or not parts else [])])
                 failed = str(scores.get("failed", ""))
                 traits = row.result["traits"]
-                found.append(
-                    SchemeRun(
-                        name, row.cell.ident, scheme, int(str(point["room"])), traits, {} if failed else scores, failed
-                    )
-                )
+                kept = {} if failed else scores
+                found.append(SchemeRun(name, row.cell.ident, scheme, int(str(point["room"])), traits, kept, failed))
         elif row.failed:
             message = f"{row.state}: {row.message}"
-            found.append(
-                SchemeRun(", ".join(parts) or "all", row.cell.ident, "", int(str(point["room"])), {}, {}, message)
-            )
+            name = ", ".join(parts) or "all"
+            found.append(SchemeRun(name, row.cell.ident, "", int(str(point["room"])), {}, {}, message))
     order = {name: number for number, name in enumerate(dict.fromkeys(run.series for run in found))}
     return sorted(found, key=lambda run: (order[run.series], run.room))
 
@@ -69,11 +65,9 @@ def _banded(name: str, limits: Sequence[float], unit: str = "") -> Callable[[Map
         number = int(np.searchsorted(limits, traits[name], side="right"))
         if number == 0:
             return f"below {limits[0]:g}{unit}"
-        return (
-            f"from {limits[-1]:g}{unit}"
-            if number == len(limits)
-            else f"{limits[number - 1]:g} to {limits[number]:g}{unit}"
-        )
+        if number == len(limits):
+            return f"from {limits[-1]:g}{unit}"
+        return f"{limits[number - 1]:g} to {limits[number]:g}{unit}"
 
     return band
 
@@ -109,11 +103,11 @@ def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
     entry |= _share("consistent", inside, int(np.sum(~np.isnan(nees))))
     entry |= _share("lost", _count(good, "lost"), len(good))
     entry |= _share("silent", _count(good, "silent"), len(good))
-    entry |= _share("walls_found", _count(good, "walls_found"), _count(good, "walls_heard"))
-    entry |= _share("walls_good", _count(good, "walls_good"), _count(good, "walls_heard"))
-    entry |= _share("points_found", _count(good, "points_found"), _count(good, "points_heard"))
-    entry |= _share("panel_found", _count(good, "panel_found"), _count(good, "panel_heard"))
-    entry |= _share("births_right", _count(good, "births_right"), _count(good, "births_judged"))
+    for name, of in (
+        ("walls_found", "walls_heard"), ("walls_good", "walls_heard"), ("points_found", "points_heard"),
+        ("panel_found", "panel_heard"), ("births_right", "births_judged"),
+    ):  # fmt: skip
+        entry |= _share(name, _count(good, name), _count(good, of))
     for name in ("births", "ghost_walls", "ghost_points"):
         entry[name] = mean_known(column(good, name))
     return entry

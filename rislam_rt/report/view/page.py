@@ -36,13 +36,9 @@ def view_script() -> str:
 def view_page(title: str, about: str, data: Mapping[str, Any]) -> str:
     """HTML page with one interactive view, self-contained."""
     return _asset("page.html").format(
-        mark=MARK,
-        title=html.escape(title),
-        about=html.escape(about),
-        style=view_style(),
-        view=view_fragment(data),
+        mark=MARK, title=html.escape(title), about=html.escape(about), style=view_style(), view=view_fragment(data),
         script=view_script(),
-    )
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=16)

@@ -26,14 +26,11 @@ def room_data(scene: Scene) -> dict[str, Any]:
     meshes = [*scene.occluders, *(s.shade for s in scene.scatterers if s.shade is not None)]
     occluders = np.concatenate([np.zeros((0, 3, 3)), *(mesh.triangles for mesh in meshes)])
     return {
-        "bounds": rounded(scene.bounds),
-        "walls": walls,
-        "left_out": left_out,
-        "shades": rounded(occluders[:MOST_TRIANGLES]),
-        "panels": [_panel(panel) for panel in scene.panels],
+        "bounds": rounded(scene.bounds), "walls": walls, "left_out": left_out,
+        "shades": rounded(occluders[:MOST_TRIANGLES]), "panels": [_panel(panel) for panel in scene.panels],
         "scatterers": [{"name": s.name, "position": rounded(s.position)} for s in scene.scatterers],
         "track": rounded(way[spread(len(way), WAY_POINTS)]),
-    }
+    }  # fmt: skip
 
 
 def spread(count: int, most: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
@@ -59,27 +56,20 @@ def _walls(scene: Scene) -> tuple[list[dict[str, Any]], int]:
     found = []
     for wall in shown:
         own = corners[walls.wall_of_triangle == wall]
+        clockwise = triangle_cross(own) @ walls.normal[wall] < 0.0
+        turned = np.where(clockwise[:, None, None], own[:, ::-1], own)
         reflector = walls.names[wall].partition("#")[0]
         label = reflector if reflector not in named and len(named) < MOST_NAMES else ""
         named.add(reflector)
         found.append(
             {
-                "name": walls.names[wall],
-                "label": label,
-                "normal": rounded(walls.normal[wall], 5),
+                "name": walls.names[wall], "label": label, "normal": rounded(walls.normal[wall], 5),
                 "offset": round(float(walls.offset[wall]), 5),
                 "center": rounded(np.average(own.mean(axis=1), axis=0, weights=area[walls.wall_of_triangle == wall])),
-                "triangles": rounded(_same_sense(own, walls.normal[wall])),
-                "edges": rounded(outline_edges(own)),
+                "triangles": rounded(turned), "edges": rounded(outline_edges(own)),
             }
-        )
+        )  # fmt: skip
     return found, len(order) - len(shown)
-
-
-def _same_sense(triangles: Floats, normal: Floats) -> Floats:
-    """Triangles (T, 3, 3) of a wall with their corners all counter-clockwise about its normal."""
-    sense = triangle_cross(triangles) @ normal
-    return np.where((sense < 0.0)[:, None, None], triangles[:, ::-1], triangles)
 
 
 def _panel(panel: RisPanel) -> dict[str, Any]:

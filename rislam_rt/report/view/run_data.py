@@ -21,13 +21,10 @@ def run_data(result: SlamResult) -> dict[str, Any]:
     """Data of a run for the interactive view: room, true trajectory and every scheme, at up to `FRAMES` cycles."""
     rows = spread(len(result.scene.agent), FRAMES)
     return room_data(result.scene) | {
-        "kind": "run",
-        "above": True,
-        "first": len(rows) - 1,
-        "time": rounded(result.scene.agent.elapsed[rows]),
+        "kind": "run", "above": True, "first": len(rows) - 1, "time": rounded(result.scene.agent.elapsed[rows]),
         "truth": rounded(result.scene.agent.position[rows], FINE),
         "schemes": [_scheme(result, scheme, rows) for scheme in result.schemes.values()],
-    }
+    }  # fmt: skip
 
 
 def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[str, Any]:
@@ -35,14 +32,11 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
     error = np.linalg.norm(scheme.position - result.scene.agent.position, axis=1)[rows]
     sigma = np.sqrt(np.maximum(np.trace(scheme.covariance[rows, :2, :2], axis1=1, axis2=2), 0.0))
     data = {
-        "name": scheme.scheme,
-        "colour": scheme_colour(scheme.scheme),
-        "position": rounded(scheme.position[rows], FINE),
+        "name": scheme.scheme, "colour": scheme_colour(scheme.scheme), "position": rounded(scheme.position[rows], FINE),
         "ellipse": [_ellipse(scheme.covariance[row, :2, :2]) for row in rows],
-        "error": rounded(np.column_stack([error, sigma]), FINE),
-        "lost": _lost(scheme, rows),
+        "error": rounded(np.column_stack([error, sigma]), FINE), "lost": _lost(scheme, rows),
         "landmarks": [mark for column in range(len(scheme.ident)) if (mark := _landmark(scheme, column, rows))],
-    }
+    }  # fmt: skip
     spec = result.scene.ris.spec if result.scene.ris is not None else None
     if scheme.applied.shape[1] and spec is not None:
         shapes = [[panel.rows, panel.cols] for panel in spec.panels]
@@ -82,10 +76,7 @@ def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, An
 
 
 def _code(scheme: SchemeResult, row: int, shapes: list[list[int]]) -> str:
-    """Phase levels of the code applied in a cycle as text in base 36, panel by panel with `|` between.
-
-    Every level has as many digits as the largest.
-    """
+    """Phase levels applied in a cycle in base 36, of one width, panel by panel with `|` between."""
     index = scheme.applied[row].ravel()
     digits = len(np.base_repr(scheme.levels - 1, 36))
     sizes = [rows * cols for rows, cols in shapes]

@@ -19,8 +19,7 @@ MAX_SPEED = 10.0
 
 
 def agent_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of an agent whose start or path lies outside the meshes' bounds, on a surface, inside an
-    object, or through a wall."""
+    """Scene check: errors of an agent out of bounds, on a surface, inside an object, or through a wall."""
     motion = room.scene.agent
     places = {"agent": motion.position, "Tx": motion.tx, "Rx": motion.rx}
     for part, points in places.items():
@@ -35,8 +34,7 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of an open room, of a speed in wrong units, of scatterers inside objects or below an array
-    that looks up."""
+    """Scene check: warnings of an open room, a wrong unit of speed, scatterers in objects or below the array."""
     motion = room.scene.agent
     directions = sphere_directions(NUM_PROBES)
     lost = ray_hits(motion.position[0], directions, room.triangles) < 0
@@ -51,9 +49,8 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
-            yield room.warning(
-                field, "it lies below the array, which hears from above only", "raise it above the agent"
-            )
+            message = "it lies below the array, which hears from above only"
+            yield room.warning(field, message, "raise it above the agent")
         name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
             yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
@@ -84,8 +81,7 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _inside_object(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: error of an agent whose start is inside an object; the path crosses no surface, or that was found
-    before."""
+    """Scene check: error of an agent whose start is inside an object; the path crosses no surface."""
     start = room.scene.agent.position[0]
     name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:
@@ -93,11 +89,7 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Name of the reflector of an object around a point (3,); empty if there is none.
-
-    An object is a connected piece that takes up less than a tenth of the scene's box and, so that a room of a larger
-    building is none, has none of the points `holding` (H, 3) in it.
-    """
+    """Name of the reflector with a small piece around a point (3,) that holds no mark (H, 3); empty without one."""
     scene_box = np.prod(room.bounds[1] - room.bounds[0])
     for number, reflector in enumerate(room.scene.reflectors):
         mine = room.triangles[room.owner == number]
@@ -107,6 +99,7 @@ def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
         label = connected_triangles(mine)
         for piece in range(label.max() + 1):
             solid = mine[label == piece]
+            # more than a tenth of the scene's box is no object, nor is what holds a mark: a room of a larger building
             if np.prod(np.ptp(solid.reshape(-1, 3), axis=0)) > 0.1 * scene_box or abs(winding(point, solid)) < 0.5:
                 continue
             if not any(abs(winding(mark, solid)) > 0.25 for mark in holding):

@@ -1,5 +1,4 @@
-"""Geometric queries to a mesh's triangle array: which triangles are near a point, which a segment crosses, which a ray
-hits, and whether a surface encloses a point."""
+"""Geometric queries to a mesh: triangles near a point, crossed by a segment, hit by a ray, or around a point."""
 
 from collections.abc import Iterator
 
@@ -25,8 +24,7 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
 
 
 def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
-    """Pairs (segment, triangle) where a segment from `start` (K, 3) to `end` (K, 3) passes through a triangle (T, 3,
-    3)."""
+    """Pairs (segment, triangle) where a segment, `start` to `end` (K, 3), passes through a triangle (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -87,15 +85,13 @@ def sphere_directions(count: int) -> Floats:
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
-    """Distance (S,) [m] of points (S, 3) from the nearest edge line of the triangle that each is tested against:
-    positive inside."""
+    """Distance (S,) [m] of points (S, 3) from the nearest edge line of their triangle: positive inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
 
 
 def _blocks(rows: int, columns: int) -> Iterator[slice]:
-    """Slices of the rows of a point-triangle table that are worked out in one go, each of no more than `_CHUNK`
-    pairs."""
+    """Slices of a point-triangle table's rows, each of no more than `_CHUNK` pairs."""
     step = max(1, _CHUNK // max(columns, 1))
     return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 

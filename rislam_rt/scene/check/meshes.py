@@ -1,10 +1,13 @@
-"""Scene check of meshes and point scatterers: names, degenerate and doubled faces, size, place."""
+"""Scene check of meshes, their materials, and point scatterers: names, degenerate and doubled faces, size, place."""
 
 from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
+from rislam_rt.errors import SceneError
+from rislam_rt.model import RadioConfig, Scene
+from rislam_rt.model.itu import ITU_MATERIALS, itu_parameters
 from rislam_rt.scene.check.mesh_queries import touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
@@ -44,23 +47,11 @@ def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: warnings of meshes with a size in wrong units, and of doubled faces."""
-    yield from _size(room)
-    yield from _coincident(room)
-
-
-def _size(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: warning of a room so large or so small that it is in wrong units."""
+    """Scene check: warnings of a room with a size in wrong units, and of doubled faces of one mesh."""
     diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
-        guess = "millimetres" if diagonal > 200.0 else "kilometres"
-        yield room.warning(
-            "reflector", f"the room measures {diagonal:.3g} m across", f"metres wanted: is it in {guess}?"
-        )
-
-
-def _coincident(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: warning of doubled faces of one mesh; those of two meshes are for the check of walls."""
+        mend = f"metres wanted: is it in {'millimetres' if diagonal > 200.0 else 'kilometres'}?"
+        yield room.warning("reflector", f"the room measures {diagonal:.3g} m across", mend)
     corners = np.round(room.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)
@@ -69,3 +60,19 @@ def _coincident(room: TriangleArray) -> Iterator[Finding]:
         name = room.name(int(first[np.argmax(count > 1)]))
         message = f"{int((count - 1).sum())} faces lie exactly on others of their mesh, the first in '{name}'"
         yield room.warning("reflector", message, "leave the doubles out")
+
+
+def material_errors(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Finding]:
+    """Scene check: errors of reflectors whose ITU-R P.2040 material is not specified at the carrier."""
+    ghz = radio.carrier / 1e9
+    for number, reflector in enumerate(scene.reflectors):
+        name = reflector.material.itu
+        if name is None:
+            continue
+        try:
+            itu_parameters(name, radio.carrier)
+        except SceneError:
+            ranges = " or ".join(f"{row[0]:g} to {row[1]:g} GHz" for row in ITU_MATERIALS[name])
+            message = f"'{name}' is not specified at the carrier of {ghz:g} GHz, only from {ranges}"
+            field = f"reflector[{number}].material.itu ({reflector.name})"
+            yield Finding("error", file, field, message, "take another material, or radio.carrier_ghz in that range")

@@ -1,5 +1,4 @@
-"""Scene check of occluders: sound meshes, no landmark inside but the centre of their own scatterer, and not the
-agent."""
+"""Scene check of occluders: sound meshes, nothing inside but their own scatterer's centre, and not the agent."""
 
 from collections.abc import Iterator
 
@@ -19,8 +18,7 @@ def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of an occluder that is not about its own scatterer, that encloses another landmark, or that
-    the agent runs into."""
+    """Scene check: errors of an occluder off its own scatterer, or about another landmark or the agent."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
     for field, number, shade in _occluders(room):
         inside = _inside(marks, shade)
@@ -41,8 +39,7 @@ def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of a cylinder whose far field the agent is not in, as its cross-section is one for plane
-    waves."""
+    """Scene check: warnings of a cylinder whose far field, for which its law holds, the agent is not in."""
     motion = room.scene.agent
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.law != "cylinder" or scatterer.height is None:
@@ -51,14 +48,12 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
         nearest = min(float(np.linalg.norm(p - scatterer.position, axis=-1).min()) for p in (motion.tx, motion.rx))
         if nearest < limit:
             message = f"the agent comes within {nearest:.3g} m, its far field begins at 2 h^2 / lambda = {limit:.3g} m"
-            yield room.warning(
-                f"scatterer[{number}].height_m ({scatterer.name})", message, "take a shorter one, or give 'rcs_m2'"
-            )
+            field = f"scatterer[{number}].height_m ({scatterer.name})"
+            yield room.warning(field, message, "take a shorter one, or give 'rcs_m2'")
 
 
 def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
-    """Field of the scene file, number of the scatterer (None for those that stand alone), and mesh of every
-    occluder."""
+    """Field in the scene file, number of the scatterer (None: stands alone), and mesh of every occluder."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade
@@ -72,8 +67,7 @@ def _inside(points: Floats, shade: Occluder) -> Booleans:
 
 
 def _enters(points: Floats, shade: Occluder) -> int | None:
-    """First cycle of the agent's track (K, 3) that begins inside an occluder, or after which it crosses its mesh; None
-    if it never does."""
+    """First cycle of the agent's track (K, 3) inside an occluder, or after which it enters; None if there is none."""
     if _inside(points[:1], shade)[0]:
         return 0
     cycles, _ = crossings(points[:-1], points[1:], shade.triangles)

@@ -17,8 +17,7 @@ MAX_TURN = 1e-2
 
 
 def panel_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of a RIS panel outside the bounds, off its host, facing out of the room, or over another
-    panel."""
+    """Scene check: errors of a RIS panel out of bounds, off its host, facing out, or over another panel."""
     for panel, key in _keyed(room):
         at = panel.center
         tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
@@ -37,14 +36,12 @@ def panel_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of a RIS panel that the agent is never in front of, that reflects more than a plate, whose
-    beams are ambiguous, or with a delay spread above 1 / B."""
+    """Scene check: warnings of a RIS panel never in front, implausible, beyond the room, or of a long delay spread."""
     for panel, key in _keyed(room):
         spec, motion = panel.spec, room.scene.agent
         if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
-            yield room.warning(
-                f"{key}.normal", "the agent is never in front of the panel", "turn the panel or the path"
-            )
+            message = "the agent is never in front of the panel"
+            yield room.warning(f"{key}.normal", message, "turn the panel or the path")
         yield from _implausible(room, panel, key, radio)
         yield from _beyond_room(room, panel, key)
         spread = _delay_spread(room, panel)
@@ -65,17 +62,14 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
     gap = other.center - one.center
     if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > MIN_CLEARANCE:
         return False
-    halves = [
-        0.5 * spec.spacing * [spec.cols, spec.rows] * np.stack([spec.right, spec.up]).T
-        for spec in (one.spec, other.spec)
-    ]
+    specs = (one.spec, other.spec)
+    halves = [0.5 * spec.spacing * [spec.cols, spec.rows] * np.stack([spec.right, spec.up]).T for spec in specs]
     axes = [one.spec.right, one.spec.up, other.spec.right, other.spec.up]
     return all(abs(gap @ axis) < sum(np.abs(axis @ half).sum() for half in halves) - MIN_CLEARANCE for axis in axes)
 
 
 def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check: warnings of a RIS panel that reflects more than a perfect plate, or whose elements are so far apart
-    that beams are ambiguous."""
+    """Scene check: warnings of a RIS panel that outdoes a perfect plate, or whose beams are ambiguous."""
     spec = panel.spec
     area = float(spec.spacing[0] * spec.spacing[1])
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
@@ -110,9 +104,8 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
     behind = sorted({room.name(int(t)) for t in near})
     if panel.host is None:
         if behind:
-            yield room.error(
-                f"{key}.host", f"missing, and the panel lies on '{behind[0]}'", f'add host = "{behind[0]}"'
-            )
+            message = f"missing, and the panel lies on '{behind[0]}'"
+            yield room.error(f"{key}.host", message, f'add host = "{behind[0]}"')
         return
     if panel.host not in names:
         yield room.error(f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
@@ -128,9 +121,8 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
     turn = np.linalg.norm(np.cross(normal, panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
-        yield room.error(
-            f"{key}.normal", f"{angle:.2f} degrees from the normal of '{panel.host}'", "lay it flat on its host"
-        )
+        message = f"{angle:.2f} degrees from the normal of '{panel.host}'"
+        yield room.error(f"{key}.normal", message, "lay it flat on its host")
 
 
 def _gap(room: TriangleArray, panel: RisPanel) -> float:
@@ -141,11 +133,7 @@ def _gap(room: TriangleArray, panel: RisPanel) -> float:
 
 
 def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """Scene check: error of a RIS panel that faces out of the room.
-
-    The room is where rays hit something: a panel with nothing before and something behind it looks out; unless the
-    agent is before it, in a room that is open there (a street).
-    """
+    """Scene check: error of a RIS panel with nothing before it but something behind, unless the agent is before it."""
     ahead, behind = (
         ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
                  room.triangles)[0] >= 0

@@ -12,8 +12,6 @@ from rislam_rt.scene.findings import Finding
 
 MIN_CLEARANCE = 1e-3
 """Least distance [m] of a device or scatterer from a surface: a nearer one loses that surface's reflection."""
-
-
 MIN_ALTITUDE = 1e-6
 """Least height [m] of a triangle: one with a smaller height has no usable normal."""
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Finding
-from rislam_rt.scene.mesh_placement import UNITS
+from rislam_rt.scene.mesh_files import UNITS
 
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
 """Units other than metres that rooms are drawn in, and their names in a scene file."""
@@ -20,8 +20,7 @@ LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
 USUAL_ROOM = (2.0, 100.0)
 """Range [m] of the longest side of rooms, to tell which unit was meant."""
 FAR = 3.0
-"""Distance of a point from the room, in sizes of the room, above which it was given in another unit, or is a mistake of
-another kind."""
+"""Distance of a point from the room, in sizes of the room, above which it was given in another unit."""
 LIMITS = (
     (("ris", "spacing_m"), 0.5, "m", "millimetres", 1e-3),
     (("reflector", "material", "thickness_m"), 3.0, "m", "millimetres", 1e-3),
@@ -31,8 +30,7 @@ LIMITS = (
     (("agent", "tx_offset_m"), 2.0, "m", "millimetres", 1e-3),
     (("agent", "rx_offset_m"), 2.0, "m", "millimetres", 1e-3),
 )
-"""Keys of the scene file, the largest value of each that is meant indoors, its unit, and the unit in which the number
-would be a usual one, with the factor."""
+"""Keys of the scene file, largest value meant indoors, its unit, the unit that would make it usual, and the factor."""
 
 SPEED_FIELD = "agent.velocity"
 """Key of the scene file that the check of the motion itself looks at too, in a scene that has no errors."""
@@ -97,8 +95,7 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Numbers in a scene file's table, for the check of units: dotted field and largest value wherever a path of keys
-    leads; in lists of tables, of each."""
+    """Dotted field and largest number wherever a path of keys leads in a scene file's table."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):
@@ -106,8 +103,7 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
-    """Points (3,) in a scene file's table, for the check of units: dotted field and value wherever a path of keys
-    leads; of a list of points, each."""
+    """Dotted field and point (3,) wherever a path of keys leads in a scene file's table; of a list, each."""
     for field, value in _places(table, path, ""):
         listed = isinstance(value, list) and value and isinstance(value[0], list)
         for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:
@@ -116,8 +112,7 @@ def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:
-    """Values in a scene file's table: dotted field and value wherever a path of keys leads; in lists of tables, of
-    each."""
+    """Dotted field and value wherever a path of keys leads in a scene file's table; in lists of tables, of each."""
     if isinstance(part, list) and path:
         for number, item in enumerate(part):
             yield from _places(item, path, f"{field}[{number}]")

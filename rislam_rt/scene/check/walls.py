@@ -15,8 +15,7 @@ from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
-"""Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat to whoever
-made it."""
+"""Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat."""
 
 
 class WallParts(NamedTuple):
@@ -43,8 +42,7 @@ def build_parts(room: TriangleArray) -> WallParts:
 
 
 def wall_findings(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: findings on meshes that lie on each other, on meshes that are nearly flat, and on how many walls a
-    mesh has."""
+    """Scene check: findings on meshes that lie on each other, are nearly flat, or have several walls."""
     parts = build_parts(room)
     yield from _stacked(room, parts)
     for number, part in enumerate(parts.flat):
@@ -56,14 +54,12 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
         angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
-            yield room.warning(
-                field, message, f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
-            )
+            mend = f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
+            yield room.warning(field, message, mend)
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
-    """Scene check: a finding for each pair of meshes with walls in one plane that overlap, with the largest gap; a note
-    where nobody sees it."""
+    """Scene check: a finding for each pair of meshes that overlap in one plane; a note where nobody sees it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
     limit = tracer_gap(room.bounds)
@@ -83,8 +79,7 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
 
 
 def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
-    """Whether a wall of triangles (T, 3, 3) has a side in the room; the foot of a crate has its inside above and
-    nothing below."""
+    """Whether a wall of triangles (T, 3, 3) has a side in the room, as the foot of a crate has not."""
     normal, _ = triangle_planes(wall)
     middle = wall.mean(axis=1)
     sides = np.concatenate([middle + MIN_CLEARANCE * normal, middle - MIN_CLEARANCE * normal])

@@ -10,7 +10,7 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.materials import MaterialAssignment
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.regions.region_groups import numbered, plain_name
+from rislam_rt.scene.importing.regions.region_groups import compass_side, numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.meshes import Mesh, as_mesh
@@ -19,11 +19,9 @@ from rislam_rt.scene.shapes import joined, quad
 from rislam_rt.spelling import counted
 
 THICKEST = 0.6
-"""Thickest wall [m]: an opening goes through all walls this near it that run along it, as both faces of a thick wall
-do."""
+"""Thickest wall [m]: an opening goes through all parallel walls this near, as both faces of a thick wall are."""
 ALONG = np.radians(5.0)
 """Largest angle [rad] between an opening of a floor plan and the wall that it goes through."""
-_SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 
 Entry = tuple[str, Mesh, dict[str, Any] | None]
 """Name, mesh and own material of a reflector that was extruded."""
@@ -127,13 +125,11 @@ def _rectangle(line: Line, low: float, high: float, bottom: float, top: float) -
 
 
 def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mesh]]) -> list[Mesh]:
-    """Faces of the frame that joins both faces of a thick extruded wall about an opening; those at floor and ceiling
-    become part of them."""
+    """Faces of the frame through a thick extruded wall about an opening; those at floor and ceiling join them."""
     first, second = lines
     if abs(float(second.distance(first.start + _reach(opening, first)[0] * first.along))) < SAME_LINE:
         return []
-    places = [opening.ends[n] for n in (0, 1)]
-    edges = [[line.start + float((p - line.start) @ line.along) * line.along for line in lines] for p in places]
+    edges = [[line.start + float((p - line.start) @ line.along) * line.along for line in lines] for p in opening.ends]
     bottom, top = opening.bottom, opening.top
     found = [quad([np.append(p, z) for p, z in ((a, bottom), (b, bottom), (b, top), (a, top))]) for a, b in edges]
     (a, b), (c, d) = edges
@@ -144,8 +140,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
 
 
 def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
-    """Triangles (T, 3, 2) [m] of the floors of all rooms of a plan; of the rectangle about all walls where no room is
-    drawn."""
+    """Triangles (T, 3, 2) [m] of the floors of a plan's rooms; without any, of the rectangle about all walls."""
     found = []
     for room in plan.rooms:
         triangles = triangulate(room, [])
@@ -162,8 +157,7 @@ def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
 
 
 def _line_name(line: Line, plan: FloorPlan) -> str:
-    """Name of an extruded wall: the drawn one if there is one, else `wall_north` where a room lies on one side only,
-    `partition` between two."""
+    """Name of an extruded wall: the drawn one, else `wall_north` with a room on one side only, or `partition`."""
     if line.name:
         return line.name
     low, high = line.spans[int(np.argmax([high - low for low, high in line.spans]))]
@@ -172,4 +166,4 @@ def _line_name(line: Line, plan: FloorPlan) -> str:
     if sides[0] == sides[1]:
         return "partition"
     outward = -line.across if sides[0] else line.across
-    return f"wall_{_SIDES[int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8]}"
+    return f"wall_{compass_side(outward)}"

@@ -74,9 +74,8 @@ def parse_corners(text: str) -> list[PlanShape]:
         try:
             x, y = (float(part) for part in word.split(","))
         except ValueError:
-            raise Fault(
-                f"--floorplan: '{one_line(word)[:40]}' is no corner", 'give x,y in metres, e.g. "0,0 4,0 4,3 0,3"'
-            ) from None
+            what = f"--floorplan: '{one_line(word)[:40]}' is no corner"
+            raise Fault(what, 'give x,y in metres, e.g. "0,0 4,0 4,3 0,3"') from None
         corners.append([x, y])
     return [PlanShape("room", np.array(corners).reshape(-1, 2), True, {})]
 

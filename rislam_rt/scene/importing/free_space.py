@@ -55,8 +55,7 @@ def find_free(triangles: Floats, floor: float) -> FreeSpace | None:
 
 
 def _free_at(points: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
-    """Free space of a room at one clearance [m]: of points (N, 3), those that see each other, and the longest line
-    among them; None where there is none."""
+    """Free space of a room among points (N, 3) at one clearance [m]; None where there is none."""
     gap = distance_to_triangles(points, triangles)
     points, gap = points[gap >= clearance], gap[gap >= clearance]
     if len(points) < 2:
@@ -88,8 +87,7 @@ def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
 
 
 def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Floats | None:
-    """Longest straight line (2, 3) through free space between two stations that keeps clear of all surfaces, cut to
-    `LONGEST`; None if none is long enough."""
+    """Longest straight free line (2, 3) between two stations, cut to `LONGEST`; None if none is long enough."""
     chosen = stations[np.linspace(0, len(stations) - 1, min(len(stations), _STATIONS)).astype(int)]
     i, j = np.triu_indices(len(chosen), 1)
     length = np.linalg.norm(chosen[i] - chosen[j], axis=1)
@@ -128,8 +126,7 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
 
 
 def _eyes(stations: Floats, triangles: Floats) -> Floats:
-    """Viewpoints (E, 3) in the free space: stations (S, 3), and free places straight above and below them at a tenth,
-    half and nine tenths of the height."""
+    """Viewpoints (E, 3) in the free space: stations (S, 3), and free places at three heights above or below them."""
     low, high = float(triangles[..., 2].min()), float(triangles[..., 2].max())
     found = [stations]
     for share in (0.1, 0.5, 0.9):

@@ -15,8 +15,7 @@ THICKNESS = {
     "medium_dry_ground": 1.0, "metal": 0.002, "plasterboard": 0.0125, "plywood": 0.012, "very_dry_ground": 1.0,
     "vinyl_tile": 0.003, "wet_ground": 1.0, "wood": 0.03,
 }  # fmt: skip
-"""Thickness [m] of a slab of each material where none is given: usual sizes of trade (boards), of construction
-(walls)."""
+"""Usual thickness [m] of a slab of each material where none is given: of boards in trade, of walls in building."""
 
 WORDS = {
     "metal": ("metal", "steel", "iron", "aluminium", "aluminum", "alu", "copper", "chrome", "metall", "stahl"),
@@ -57,9 +56,8 @@ def parse_material(text: str) -> dict[str, Any]:
         pass
     if kind == "itu" and name not in known:
         raise ConfigError(f"--material: '{name[:40]}' is no ITU material; give one of {', '.join(known)}")
-    raise ConfigError(
-        f"--material: '{text[:60]}' received; give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
-    )
+    wanted = "give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
+    raise ConfigError(f"--material: '{text[:60]}' received; {wanted}")
 
 
 def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
@@ -88,8 +86,7 @@ class MaterialAssignment:
         self.assumed: set[str] = set()
 
     def material(self, wall: str, node: str, material: str) -> dict[str, Any]:
-        """Material of an imported wall: the user's for wall, material or node, else by a word in the material's name or
-        the node's, else that of the rest."""
+        """Material of an imported wall: the user's, else by a word in its material's or node's name, else `rest`."""
         chosen = self.by_hand(wall, material, node)
         if chosen is not None:
             return chosen
@@ -131,8 +128,7 @@ class MaterialAssignment:
 
 
 def itu_by_word(name: str) -> str | None:
-    """ITU material that a word in the name of a material or node stands for: `Oak.003` is wood, `itu_concrete` is
-    concrete; None if there is none."""
+    """ITU material that a word in a material's or node's name stands for, `Oak.003` for wood; None if none does."""
     plain = re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
     for itu in get_args(ItuMaterial):
         if f"_{itu}_" in f"_{plain}_":

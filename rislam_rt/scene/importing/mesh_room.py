@@ -1,29 +1,24 @@
-"""Import of a mesh of a whole room, parted into walls, objects and clutter."""
+"""Import of a mesh of a whole room, parted into walls, objects and clutter, and a report of what became of it."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
+from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import find_free, is_seen
-from rislam_rt.scene.importing.import_report import summarise_import
 from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import place_parts
-from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets
-from rislam_rt.scene.importing.regions.region_groups import (
-    RegionGroup,
-    find_pieces,
-    numbered,
-    place_free_name,
-    wall_name,
-)
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets, weld
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, numbered, own_name, wall_name
 from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
-from rislam_rt.scene.importing.regions.welded_mesh import weld
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
 from rislam_rt.scene.meshes import Mesh, as_mesh
@@ -49,8 +44,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from a mesh, by its flat regions or the planes of a scan: reflectors with materials, and
-    occluders."""
+    """Draft of a room from a mesh, by its flat regions or a scan's planes: reflectors with materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
@@ -58,25 +52,21 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
         pieces, about = find_pieces(facets, [part.node for part in parts]), []
         found = sort_regions(facets, pieces, find_round(facets), options)
     if not found.surfaces:
-        raise Fault(
-            f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm", "check --units, or lower --detail"
-        )
+        what = f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm"
+        raise Fault(what, "check --units, or lower --detail")
     surfaces, unseen = _visible_surfaces(found)
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     occluders = _occluders(found, pieces, list(reflectors))
     palette.check_used([*reflectors, *sorted({p.material for p in parts if p.material})])
-    said = summarise_import(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
+    said = _summary(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
     remarks = [*notes, *about, *said]
     return RoomDraft(reflectors, occluders, remarks + palette.remarks())
 
 
 def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
-    """Surfaces of a mesh that an agent inside the room can see, and the area [m^2] of the others: outer skins, insides
-    of boards."""
-    triangles = np.concatenate([
-        *(s.mesh.triangles for s in found.surfaces), *(c.triangles for c in found.clutter)
-    ])  # fmt: skip
+    """Surfaces of a mesh that an agent in the room can see, and the area [m^2] of the others, as outer skins."""
+    triangles = np.concatenate([s.mesh.triangles for s in found.surfaces] + [c.triangles for c in found.clutter])
     free = find_free(triangles, float(triangles[..., 2].min()))
     if free is None:
         return found.surfaces, 0.0
@@ -89,12 +79,11 @@ def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
 def _reflectors(
     surfaces: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart], palette: MaterialAssignment
 ) -> dict[str, tuple[Mesh, dict[str, Any]]]:
-    """Reflectors of an imported mesh with names and materials: each wall of the room's shell by itself, each object as
-    one."""
+    """Reflectors of an imported mesh by name: each wall of the room's shell by itself, each object as one."""
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
     corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
-    uses = [place_free_name(parts[s.part].node) for s in shell]
+    uses = [own_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
     for surface, node in zip(shell, uses, strict=True):
         middle = surface.mesh.triangles.mean(axis=(0, 1))
@@ -107,11 +96,10 @@ def _reflectors(
         for part in sorted({s.part for s in mine}):
             entries.append((piece.name, joined([s.mesh for s in mine if s.part == part]), part))
     names = numbered([name for name, _, _ in entries])
-    found = {}
-    for name, (_, mesh, number) in zip(names, entries, strict=True):
-        material = palette.material(name, parts[number].node, parts[number].material)
-        found[name] = (mesh, material)
-    return found
+    return {
+        name: (mesh, palette.material(name, parts[number].node, parts[number].material))
+        for name, (_, mesh, number) in zip(names, entries, strict=True)
+    }
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:
@@ -122,3 +110,41 @@ def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str
     names = [f"{pieces[piece].name or 'room'}_clutter" for piece in by_piece]
     names = numbered([*taken, "ris", *names])[len(taken) + 1 :]
     return {name: as_mesh(np.concatenate(triangles)) for name, triangles in zip(names, by_piece.values(), strict=True)}
+
+
+def _summary(
+    facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
+    occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
+) -> list[str]:  # fmt: skip
+    """Report of an import: numbers, areas and errors of what became of a mesh, one line each."""
+    parted = (planar_regions(mesh.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for mesh, _ in reflectors.values())
+    walls = sum(len(regions.offset) for regions in parted)
+    total, waves = float(facets.area.sum()), found.narrow / options.wavelength
+    triangles = sum(len(mesh.faces) for mesh in occluders.values())
+    mirror = sum(s.area for s in surfaces)
+    remarks = [
+        f"{len(facets.mesh.faces)} triangles, {total:.4g} m^2: {walls} walls of {mirror:.4g} m^2 in {len(reflectors)} "
+        f"reflectors, {len(occluders)} occluders of {triangles} triangles",
+        f"walls are within {max(1e3 * max(s.error for s in surfaces), 0.01):.2g} mm of the mesh",
+    ]
+    if found.shading:
+        width = f"{100 * found.narrow:.2g} cm ({waves:.2g} wavelengths at {options.carrier_ghz:g} GHz)"
+        narrow = f"narrower than {width}" + (" or round" if options.curved == "shade" else "")
+        why = "that lie on no plane" if scanned else narrow
+        remarks.append(f"{found.shading:.3g} m^2 {why} shade and do not reflect")
+    if found.shade_error:
+        how = f"corners joined in cells of {1e3 * found.cell:.2g} mm, moved {1e3 * found.shade_error:.2g} mm at most"
+        remarks.append(f"clutter is thinned: {how}")
+    alike = Counter((round(radius, 3), sides, round(error, 4)) for radius, sides, error in found.cylinders)
+    for (radius, sides, error), count in alike.most_common(8):
+        what = "reflect" if options.curved == "planes" else "shade (--curved planes: reflect)"
+        many = "a cylinder" if count == 1 else f"each of {count} cylinders"
+        off = f"{1e3 * error:.2g} mm"
+        remarks.append(f"{many} of {radius:.3g} m became {sides} flat sides within {off} that {what}")
+    if found.gone > 1e-4 * total:
+        remarks.append(f"{found.gone:.3g} m^2 are left out: faces that stand on walls, things below the detail")
+    if unseen > 0.0:
+        remarks.append(f"{unseen:.3g} m^2 are left out that nobody inside can see")
+    if found.narrow > options.narrow * (1.0 + 1e-9):
+        remarks.append(f"the {options.max_walls} widest walls reflect (--max-walls)")
+    return remarks

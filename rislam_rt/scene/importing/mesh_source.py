@@ -1,5 +1,4 @@
-"""Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) read as triangles with the names of their node and
-material."""
+"""Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) as triangles with names of node and material."""
 
 import json
 import struct
@@ -12,8 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.importing.obj import read_obj
-from rislam_rt.scene.mesh_file_checks import check_glb
-from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, node_mesh, sound_mesh, unfold
+from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, check_glb, node_mesh, sound_mesh, unfold
 from rislam_rt.scene.read_inside_folder import read_inside
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -56,7 +54,7 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
         parts = _from_gltf(content, suffix, path.parent)
     elif suffix == ".obj":
         found, library = read_obj(content)
-        parts = [MeshPart(node, material, triangles) for node, material, triangles in found]
+        parts = [MeshPart(node, material, _sound(triangles)) for node, material, triangles in found]
         if library and not (path.parent / library).is_file():
             notes.append(f"'{library[:60]}' is not there: materials are known by their names in the OBJ file alone")
     else:
@@ -64,7 +62,7 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
         parts = [MeshPart("", "", mesh.triangles)]
     if not parts:
         raise Fault("the file has no triangles", "export it with its meshes")
-    return [MeshPart(part.node, part.material, _sound(part)) for part in parts], notes
+    return parts, notes
 
 
 def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
@@ -89,9 +87,9 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
     return content
 
 
-def _sound(part: MeshPart) -> Floats:
+def _sound(triangles: Floats) -> Floats:
     """Triangles (T, 3, 3) of an imported part after a check of their coordinates."""
-    corners = part.triangles.reshape(-1, 3)
+    corners = triangles.reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return sound_mesh(Mesh(corners, faces), MAX_IMPORT_FACES, ANY_UNIT).vertices[faces]
 

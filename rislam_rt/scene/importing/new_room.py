@@ -17,7 +17,7 @@ from rislam_rt.scene.importing.placement import check_size
 from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
 from rislam_rt.scene.importing.svg import parse_svg
 from rislam_rt.scene.load import check_scene
-from rislam_rt.scene.mesh_placement import UNITS
+from rislam_rt.scene.mesh_files import UNITS
 from rislam_rt.scene.room_files import room_files
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_files

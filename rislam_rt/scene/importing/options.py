@@ -25,8 +25,7 @@ class ImportOptions:
     curved: str = "shade"
     """What cylinders become: `shade`, occluders, or `planes`, flat sides that reflect."""
     max_walls: int = 150
-    """Most walls that reflect; where a file has more, the smallest become occluders: the image sources' time grows with
-    walls."""
+    """Most walls that reflect, the widest; the others become occluders: image sources take time with walls."""
     scan: bool | None = None
     """Whether the mesh is a scan, with noise and holes; None: as it looks."""
     fill: float = 1.0

@@ -47,10 +47,8 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     """
     free = find_free(draft.triangles, float(draft.triangles[..., 2].min()))
     if free is None:
-        raise Fault(
-            "no free place inside is found for the agent",
-            "check --units and --up; a room wants walls around a free way of 0.3 m",
-        )
+        mend = "check --units and --up; a room wants walls around a free way of 0.3 m"
+        raise Fault("no free place inside is found for the agent", mend)
     start, end = free.way
     agent = {"start": start.round(4).tolist(), "velocity": ((end - start) / 60.0).round(6).tolist(), **CYCLES}
     table: dict[str, Any] = {"name": name}
@@ -61,10 +59,8 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     table["agent"] = agent | BASELINE
     meshes = {key: mesh for key, (mesh, _) in draft.reflectors.items()} | draft.occluders
     length = float(np.linalg.norm(end - start))
-    remarks = [
-        *draft.remarks,
-        f"proposed way: {length:.2g} m in a minute, {free.clearance:g} m off all surfaces; {about}",
-    ]
+    way = f"{length:.2g} m in a minute, {free.clearance:g} m off all surfaces"
+    remarks = [*draft.remarks, f"proposed way: {way}; {about}"]
     if free.enclosed < 1.0:
         remarks.append(f"open: {1.0 - free.enclosed:.0%} of rays from the start leave the room")
     readme = f"{origin} " + " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
@@ -72,8 +68,7 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
 
 
 def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
-    """Propose a RIS panel like the paper's on what is above the middle of the agent's line, or else beside it: its
-    table (None if nothing fits), and a remark."""
+    """Propose a RIS panel like the paper's above or beside the agent's line: its table or None, and a remark."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.triangles for mesh, _ in draft.reflectors.values()])
     middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])

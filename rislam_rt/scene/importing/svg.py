@@ -61,8 +61,7 @@ def parse_svg(content: bytes) -> list[PlanShape]:
 
 
 def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> Iterator[PlanShape]:
-    """Shapes of a floor plan in an SVG element and in those within it, by the transforms and kinds of the groups around
-    them."""
+    """Shapes of a floor plan in an SVG element and those within, by the transforms and kinds of their groups."""
     if depth > _DEEPEST:
         raise Fault(f"groups {_DEEPEST} deep", "save it as plain SVG")
     tag = str(element.tag).rpartition("}")[2]

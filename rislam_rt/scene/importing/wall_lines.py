@@ -9,16 +9,10 @@ from rislam_rt.scene.importing.floor_plan import FloorPlan
 
 SAME_LINE = 5e-3
 """Distance [m] of two walls' lines below which they are one."""
-
-
 PARALLEL = np.radians(0.2)
 """Angle [rad] of two walls below which they are parallel."""
-
-
 SNAP = 0.05
 """Distance [m] of a wall's end from another wall up to which it is brought to it."""
-
-
 Spans = list[tuple[float, float]]
 
 
@@ -49,12 +43,10 @@ class Line(NamedTuple):
 
 
 def wall_lines(plan: FloorPlan) -> list[Line]:
-    """Lines of all walls of a floor plan, those along one line joined; walls drawn by themselves come before the edges
-    of rooms, which yield to them."""
-    drawn = [(line, material, name) for line, material, name in plan.walls]
+    """Lines of all walls of a floor plan, joined along one line; rooms' edges yield to walls drawn themselves."""
     edges = [np.stack([a, b]) for room in plan.rooms for a, b in zip(room, np.roll(room, -1, axis=0), strict=True)]
     lines: list[Line] = []
-    for ends, material, name in [*drawn, *((edge, None, "") for edge in edges)]:
+    for ends, material, name in [*plan.walls, *((edge, None, "") for edge in edges)]:
         length = float(np.linalg.norm(ends[1] - ends[0]))
         if length < 1e-3:
             continue

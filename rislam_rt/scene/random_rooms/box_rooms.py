@@ -17,16 +17,14 @@ FURNISHED = 0.4
 REFLECTION, RADIUS = (0.3, 0.95), (0.03, 0.3)
 """Ranges of a random box room's reflection coefficients, and of its scatterers' radii [m] (log-uniform)."""
 ALIKE, SLABS = 0.35, 0.35
-"""Shares of random box rooms of one reflection coefficient, and of slabs of building materials; in the others every
-wall has its own coefficient."""
+"""Shares of random box rooms of one reflection coefficient, and of slabs; in the others every wall has its own."""
 THICKNESS = {"concrete": 0.2, "brick": 0.12, "plasterboard": 0.025, "chipboard": 0.02, "marble": 0.03, "glass": 0.008,
              "plywood": 0.02, "wood": 0.03, "metal": 0.005}  # fmt: skip
 """ITU materials of random box rooms and their thicknesses [m], which vary by a factor of 0.6 to 1.6."""
 SHADING = 0.5
 """Share of a random box room's scatterers above 0.1 m of radius that hide what lies behind them."""
 PANEL, CEILING_PANEL, ELEMENTS = 0.8, 0.5, (4, 16)
-"""Share of random box rooms with a RIS panel, of panels in the ceiling (the others are on a wall); range of elements
-along a side."""
+"""Share of random box rooms with a RIS panel, of panels in the ceiling, not on a wall; range of elements a side."""
 MAX_SCATTERERS = 4
 """Most scatterers of a random box room."""
 MARGIN = 0.5
@@ -34,8 +32,7 @@ MARGIN = 0.5
 
 
 def random_room(name: str, *, rng: np.random.Generator) -> Scene:
-    """Draw a random box room: walls, perhaps a block, one to four spheres, and perhaps a RIS panel; the agent stands at
-    a corner."""
+    """Draw a random box room: walls, perhaps a block, spheres, perhaps a RIS panel; the agent is at a corner."""
     size = np.array([*rng.uniform(*SIZE, size=2), rng.uniform(*HEIGHT)])
     corners = _corners(size, TILT if rng.uniform() < TILTED else 0.0, rng)
     meshes = hexahedron(corners)

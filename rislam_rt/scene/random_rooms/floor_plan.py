@@ -21,8 +21,7 @@ OFFSET = 5.0
 
 
 def draw_plan(shape: str, *, rng: np.random.Generator) -> Floats:
-    """Draw the corners (E, 2) [m] of a random room's floor plan of one of `SHAPES`, of random size, turned and shifted
-    at random."""
+    """Draw a random room's floor plan (E, 2) [m] of one of `SHAPES`, its size, turn and shift at random."""
     long = float(np.exp(rng.uniform(*np.log(SIZE if shape == "convex" else SIZE_WITH_ARMS))))
     sides = np.array([long, long * rng.uniform(*ASPECT)])
     outline = {"convex": _convex, "l": _ell, "t": _tee, "u": _horseshoe}[shape](sides, rng)
@@ -66,8 +65,7 @@ def triangulate(outline: Floats) -> Integers:
 
 
 def halve(outline: Floats, point: Floats, normal: Floats) -> Floats:
-    """Corners of the part of a convex floor plan on one side of a line, where `normal . (x - point)` is not
-    negative."""
+    """Corners of the part of a convex floor plan where `normal . (x - point)` is not negative."""
     side = (outline - point) @ normal
     kept = []
     for a, b, near, far in zip(outline, np.roll(outline, -1, axis=0), side, np.roll(side, -1), strict=True):
@@ -98,18 +96,16 @@ def _tee(sides: Floats, rng: np.random.Generator) -> Floats:
     (a, b), (u, v) = sides, rng.uniform(*ARM, size=2) * sides
     left = rng.uniform(0.3, 0.7) * (a - u)
     right = left + u
-    return np.array(
-        [[left, 0], [right, 0], [right, b - v], [a, b - v], [a, b], [0, b], [0, b - v], [left, b - v]], dtype=np.float64
-    )
+    stem = [[left, b - v], [left, 0], [right, 0], [right, b - v]]
+    return np.array([*stem[1:], [a, b - v], [a, b], [0, b], [0, b - v], stem[0]], dtype=np.float64)
 
 
 def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
     """Draw the corners of a random U-shaped floor plan of given sides."""
     (a, b), floor = sides, rng.uniform(*ARM) * sides[1]
     left, right = rng.uniform(ARM[0], 0.38, size=2) * a
-    return np.array(
-        [[0, 0], [a, 0], [a, b], [a - right, b], [a - right, floor], [left, floor], [left, b], [0, b]], dtype=np.float64
-    )
+    arms = [[a - right, b], [a - right, floor], [left, floor], [left, b]]
+    return np.array([[0, 0], [a, 0], [a, b], *arms, [0, b]], dtype=np.float64)
 
 
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:

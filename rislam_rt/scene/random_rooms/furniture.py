@@ -21,8 +21,7 @@ KINDS = {
 TABLE_TOP = 0.05
 """Thickness [m] of a table top."""
 OFF_WAY, OFF_WALLS, APART = 0.55, 0.1, 0.15
-"""Least distances [m] of a piece of furniture from the agent's path (where their heights meet), from the walls and from
-another piece."""
+"""Least distances [m] of furniture from the agent's path (where heights meet), from walls, from another piece."""
 HEADROOM = 0.4
 """[m] above and below the agent's path within which a piece counts as on its height, and below the ceiling."""
 _TRIES = 40
@@ -52,9 +51,8 @@ class FurniturePiece(NamedTuple):
         """Points (16, 2) [m] around the outline of a piece of furniture."""
         share = np.array([-1.0, -0.5, 0.0, 0.5])
         one = np.ones(4)
-        square = np.concatenate(
-            [np.stack(side, axis=-1) for side in ((share, -one), (one, share), (-share, one), (-one, -share))]
-        )
+        sides = ((share, -one), (one, share), (-share, one), (-one, -share))
+        square = np.concatenate([np.stack(side, axis=-1) for side in sides])
         return np.asarray(self.center + (square * self.half) @ self.turn.T)
 
     def distance(self, points: Floats) -> Floats:
@@ -69,9 +67,8 @@ class FurniturePiece(NamedTuple):
 
     def mesh(self) -> Mesh:
         """Mesh of a piece of furniture without the face on the floor, so that no two faces coincide."""
-        size = [*self.half.tolist()]
         without = ("floor",) if self.bottom == 0.0 else ()
-        solid = block([-size[0], -size[1], self.bottom], [*size, self.top], without=without)
+        solid = block([*-self.half, self.bottom], [*self.half, self.top], without=without)
         vertices = solid.vertices.copy()
         vertices[:, :2] = vertices[:, :2] @ self.turn.T + self.center
         return Mesh(vertices, solid.faces)
@@ -108,8 +105,7 @@ def draw_piece(kind: str, center: Floats, yaw: float, *, rng: np.random.Generato
 
 
 def fits(piece: FurniturePiece, ground: PlacementLimits, others: list[FurniturePiece]) -> bool:
-    """Whether a piece of furniture stands inside the floor plan, below the ceiling, off the agent's path and off all
-    others."""
+    """Whether a piece of furniture fits the floor plan, is below the ceiling, off the agent's path and other pieces."""
     rim = piece.rim()
     if depth_inside(ground.outline, rim).min() < OFF_WALLS or ground.roof.height(rim).min() < piece.top + HEADROOM:
         return False

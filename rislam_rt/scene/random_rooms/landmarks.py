@@ -1,18 +1,15 @@
-"""Random landmarks of a room, scatterers and RIS panel: open, below the agent, behind a screen; on any wall or in the
-ceiling."""
+"""Random landmarks of a room: scatterers in the open, below the agent or hidden; a RIS panel on wall or ceiling."""
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import RisPanel, RisSpec, Scatterer
+from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.random_rooms.floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
-RADIUS = (0.03, 0.25)
-"""Range [m] of the random scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
 PLACES = ("open", "below", "hidden")
 """Where a random scatterer is: anywhere, below the whole motion, or behind a screen for most of it."""
 SHARES = (0.6, 0.2, 0.2)
@@ -43,8 +40,7 @@ _TRIES = 60
 def draw_scatterer(
     place: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> tuple[Floats, list[FurniturePiece]] | None:
-    """Draw the position (3,) of a random scatterer, at one of `PLACES`, and the screen that hides it, if any; None
-    where nothing fits."""
+    """Draw a random scatterer's position (3,) at one of `PLACES`, and a screen if it has one; None if none fits."""
     low, high = ground.outline.min(axis=0), ground.outline.max(axis=0)
     lowest = float(ground.way[:, 2].min())
     for _ in range(_TRIES):
@@ -77,12 +73,6 @@ def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> fl
     return len(np.unique(cycles)) / len(seen_from)
 
 
-def make_scatterer(number: int, position: Floats, *, rng: np.random.Generator) -> Scatterer:
-    """Make a spherical scatterer of random radius at a position (3,) [m]."""
-    radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
-    return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
-
-
 def draw_panel(
     side: str, ground: PlacementLimits, pieces: list[FurniturePiece], landmarks: Floats, *, rng: np.random.Generator
 ) -> RisPanel | None:
@@ -108,8 +98,7 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Draw the place of a RIS panel on a wall, longer ones more often, above the start and below its upper edge: host,
-    centre, normal and up; None where it does not fit."""
+    """Draw a RIS panel's host, centre, normal and up on a wall, above the start; None where it does not fit."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)

@@ -16,8 +16,7 @@ MOTIONS = ("straight", "curve", "corner", "stop", "turn", "climb")
 CYCLES, CYCLE = 300, 0.1
 """Number of cycles of a random motion, and time [s] between them: half a minute."""
 SPEED, SLOWEST = (0.05, 0.6), 0.01
-"""Range of random speeds [m/s], log-uniform; in a room too small for a draw it is slowed down, no further than to
-`SLOWEST`."""
+"""Range of random speeds [m/s], log-uniform; in too small a room a draw is slowed down, to `SLOWEST` at least."""
 OFF_WALLS, BELOW_CEILING = 0.45, 0.6
 """Least distances [m] of a random motion from the walls and from the ceiling."""
 HEIGHT, CLIMB = (0.3, 1.6), (0.3, 0.9)
@@ -34,8 +33,7 @@ _STARTS, _SLOWER = 64, 0.8
 
 
 class MotionProfile(NamedTuple):
-    """Profile of a random motion about its start: shares of the speed, rates of turn [rad/s] and of climb [m/s], (K,)
-    each."""
+    """Profile of a random motion: shares of the speed, rates of turn [rad/s] and of climb [m/s], (K,) each."""
 
     pace: Floats
     turn: Floats
@@ -84,9 +82,8 @@ def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.r
             if height is not None and depth_inside(outline, place[number]).min() >= OFF_WALLS:
                 position = np.column_stack([place[number], height + rise])
                 angle = np.asarray(wrap(yaw[number] + heading))
-                velocity = np.column_stack(
-                    [speed * course.pace[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1), course.climb]
-                )
+                ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+                velocity = np.column_stack([speed * course.pace[:, None] * ahead, course.climb])
                 return Trajectory(_times(), position, velocity, angle, Body())
         speed *= _SLOWER
     raise SceneError("no room for a motion; draw another plan")
@@ -98,8 +95,7 @@ def _times() -> Floats:
 
 
 def _start_height(roof: Roof, place: Floats, rise: Floats, rng: np.random.Generator) -> float | None:
-    """Draw the height [m] at the start of a random motion, all of which stays between the lowest height and the
-    ceiling; None if it cannot."""
+    """Draw a random motion's height [m] at the start, so that all of it fits the room; None if it cannot."""
     room = roof.height(place) - BELOW_CEILING - rise
     low, high = HEIGHT[0] - min(0.0, float(rise.min())), min(HEIGHT[1], float(room.min()))
     return None if high < low else float(rng.uniform(low, high))
@@ -136,8 +132,7 @@ def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[t
 
 
 def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Generator) -> Floats:
-    """Draw the rate of turn (K,) [rad/s] of a random motion that turns in every stop, at a constant rate over all of
-    it."""
+    """Draw the rate of turn (K,) [rad/s] of a random motion that turns at a constant rate in every stop."""
     rate = np.zeros(len(time))
     for begin, end in stops:
         angle = rng.uniform(*SPIN) * rng.choice([-1.0, 1.0])

@@ -12,15 +12,7 @@ from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.random_rooms.floor_plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_pieces
-from rislam_rt.scene.random_rooms.landmarks import (
-    MOST,
-    PLACES,
-    SHARES,
-    draw_panel,
-    draw_scatterer,
-    hidden_share,
-    make_scatterer,
-)
+from rislam_rt.scene.random_rooms.landmarks import MOST, PLACES, SHARES, draw_panel, draw_scatterer, hidden_share
 from rislam_rt.scene.random_rooms.random_motion import MOTIONS, draw_motion, draw_motion_profile
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
@@ -32,6 +24,8 @@ ALIKE = 0.5
 """Share of random rooms whose walls are all of one coefficient; else each has its own."""
 MAX_PIECES, MAX_SCATTERERS = 6, 6
 """Most pieces of furniture and most scatterers of a random room."""
+RADIUS = (0.03, 0.25)
+"""Range [m] of the random scatterers' radii, log-uniform; each is a sphere of cross-section pi r^2."""
 PER_PIECE = 3.0
 """Area [m^2] of the floor plan for each piece of furniture."""
 PANEL, CEILING_PANEL = 0.7, 0.4
@@ -95,8 +89,7 @@ def draw_room(seed: int) -> RandomRoom:
 
 
 def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
-    """One draw of a random room: floor plan, roof, motion, furniture, landmarks, materials; refused where nothing fits
-    in."""
+    """One draw of a random room, from floor plan to materials; refused where nothing fits in."""
     outline = draw_plan(shape, rng=rng)
     roof = draw_roof(outline, ceiling, rng=rng)
     agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)
@@ -113,19 +106,12 @@ def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rn
     points = [scatterer.position for scatterer in landmarks]
     lowest = float(agent.position[:, 2].min())
     return RandomRoom(
-        scene=replace(scene, digest=scene_digest(scene)),
-        seed=seed,
-        shape=shape,
-        ceiling=ceiling,
-        motion=motion,
-        size=extent(outline),
-        reflection=float(np.mean([r.material.reflection for r in reflectors[: len(shell)]])),
-        pieces=len(pieces),
-        below=sum(float(point[2]) < lowest for point in points),
-        hidden=sum(hidden_share(point, agent.position, pieces) >= MOST for point in points),
-        panel=panel,
+        scene=replace(scene, digest=scene_digest(scene)), seed=seed, shape=shape, ceiling=ceiling, motion=motion,
+        size=extent(outline), reflection=float(np.mean([r.material.reflection for r in reflectors[: len(shell)]])),
+        pieces=len(pieces), below=sum(float(point[2]) < lowest for point in points),
+        hidden=sum(hidden_share(point, agent.position, pieces) >= MOST for point in points), panel=panel,
         speed=float(np.linalg.norm(agent.velocity, axis=1).mean()),
-    )
+    )  # fmt: skip
 
 
 def _landmarks(
@@ -140,8 +126,14 @@ def _landmarks(
         if found is not None:
             positions = np.concatenate([positions, found[0][None]])
             pieces += found[1]
-    scatterers = [make_scatterer(number, point, rng=rng) for number, point in enumerate(positions)]
+    scatterers = [_sphere(number, point, rng) for number, point in enumerate(positions)]
     return scatterers, ris
+
+
+def _sphere(number: int, position: Floats, rng: np.random.Generator) -> Scatterer:
+    """Make a spherical scatterer of random radius at a position (3,) [m]."""
+    radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
+    return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
 
 
 def _reflectors(

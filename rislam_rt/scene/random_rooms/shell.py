@@ -12,11 +12,9 @@ from rislam_rt.scene.random_rooms.floor_plan import extent, halve, triangulate
 CEILINGS = ("flat", "shed", "gable")
 """Forms of a random room's ceiling: level, one slope, two slopes (over convex plans)."""
 LOWEST = (2.2, 6.0)
-"""Range [m] of the height at a random room's lowest wall, log-uniform; a small room is at most `SLENDER` times as high
-as wide."""
+"""Range [m] of a random room's lowest wall, log-uniform; at most `SLENDER` times the width of a small room."""
 SLENDER, RISE, STEEPEST = 1.3, (0.3, 5.0), 0.5
-"""Largest height of a small random room over its width; range [m] by which a sloped ceiling rises, log-uniform, and its
-largest slope."""
+"""Largest height over width of a small random room; range [m] of a ceiling's rise, log-uniform; largest slope."""
 
 
 class Roof(NamedTuple):
@@ -64,16 +62,15 @@ def draw_roof(outline: Floats, form: str, *, rng: np.random.Generator) -> Roof:
 
 
 def build_shell(outline: Floats, roof: Roof) -> dict[str, Mesh]:
-    """Meshes of a random room's shell by name, normals inwards: `floor`, `ceiling` (a gable has `ceiling_a` and
-    `ceiling_b`), `wall_0`, ..."""
+    """Meshes of a random room's shell, normals inwards: `floor`, `ceiling` (a gable: `_a`, `_b`), `wall_0`, ..."""
     faces = triangulate(outline)
-    meshes = {"floor": Mesh(_lifted(outline, np.zeros(len(outline))), faces)}
+    meshes = {"floor": Mesh(np.column_stack([outline, np.zeros(len(outline))]), faces)}
     if roof.form == "gable":
         for name, side in (("ceiling_a", 1.0), ("ceiling_b", -1.0)):
             part = halve(outline, roof.point, side * roof.axis)
-            meshes[name] = Mesh(_lifted(part, roof.height(part)), triangulate(part)[:, ::-1])
+            meshes[name] = Mesh(np.column_stack([part, roof.height(part)]), triangulate(part)[:, ::-1])
     else:
-        meshes["ceiling"] = Mesh(_lifted(outline, roof.height(outline)), faces[:, ::-1])
+        meshes["ceiling"] = Mesh(np.column_stack([outline, roof.height(outline)]), faces[:, ::-1])
     for number, (a, b) in enumerate(zip(outline, np.roll(outline, -1, axis=0), strict=True)):
         meshes[f"wall_{number}"] = _wall(a, b, roof)
     return meshes
@@ -92,21 +89,15 @@ def ceiling_normal(roof: Roof, point: Floats) -> Floats:
 
 
 def _wall(a: Floats, b: Floats, roof: Roof) -> Mesh:
-    """Mesh of one wall of a random room: a strip from the floor to the ceiling, with a corner more where a ridge meets
-    it."""
+    """Mesh of a random room's wall, from floor to ceiling, with a corner more where a ridge meets it."""
     feet = [a, b]
     near, far = ((p - roof.point) @ roof.axis for p in (a, b))
     if roof.form == "gable" and near * far < 0.0:
         feet.insert(1, a + near / (near - far) * (b - a))
     foot = np.array(feet)
     count = len(foot)
-    vertices = np.concatenate([_lifted(foot, np.zeros(count)), _lifted(foot, roof.height(foot))])
+    vertices = np.concatenate([np.column_stack([foot, np.zeros(count)]), np.column_stack([foot, roof.height(foot)])])
     k = np.arange(count - 1)
     low = np.stack([k + 1, k, k + count], axis=-1)
     high = np.stack([k + 1, k + count, k + count + 1], axis=-1)
     return Mesh(vertices, np.concatenate([low, high]))
-
-
-def _lifted(points: Floats, height: Floats) -> Floats:
-    """Points (n, 3) of a random room's shell: points (n, 2) of its floor plan at heights (n,)."""
-    return np.column_stack([points, height])

@@ -1,5 +1,4 @@
-"""Scene files of Mitsuba 3 and Sionna RT (XML), both ways: `read_scene.py` reads meshes and materials,
-`scene_from_xml.py` makes a scene of them, `write.py` writes one."""
+"""Scene files of Mitsuba 3 and Sionna RT (XML), both ways: reading, making a scene of them, writing."""
 
 from rislam_rt.scene.xml.read_scene import read_xml, sionna_scenes
 from rislam_rt.scene.xml.scene_from_xml import new_from_xml, scene_of_xml

@@ -40,7 +40,11 @@ def read_material(bsdf: Element) -> XmlMaterial:
     plain, kind = name.removeprefix("mat-"), bsdf.get("type", "")
     values = {e.get("name", ""): e for e in children(bsdf, "float", "integer", "string")}
     notes = tuple(f"bsdf '{one_line(name)[:40]}': {key} is not carried over" for key in LEFT_OUT if key in values)
-    if kind == ABSORBER or (kind == "radio-material" and _is_air(values)):
+    own: dict[str, float] = {}
+    if kind == "radio-material":
+        own["permittivity"] = _number(values, "relative_permittivity", 1.0)
+        own["conductivity"] = _number(values, "conductivity", 0.0)
+    if kind == ABSORBER or own == {"permittivity": 1.0, "conductivity": 0.0}:  # nothing, or air
         return XmlMaterial(None, ())
     rough = _number(values, "scattering_coefficient", 0.0)
     thickness = _number(values, "thickness", DEFAULT_THICKNESS)
@@ -50,8 +54,6 @@ def read_material(bsdf: Element) -> XmlMaterial:
             raise Fault(f"an ITU material '{one_line(given)[:40]}'", f"take one of {', '.join(ITU_MATERIALS)}")
         return XmlMaterial(_made(itu=given, thickness=thickness, scattering=rough), notes)
     if kind == "radio-material":
-        permittivity, conductivity = _number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)
-        own = {"permittivity": permittivity, "conductivity": conductivity}
         return XmlMaterial(_made(**own, thickness=thickness, scattering=rough), notes)
     raise Fault(
         f"a material of type '{one_line(kind)[:40]}' says nothing of radio",
@@ -71,23 +73,17 @@ def material_element(material: Material | None, name: str) -> Element:
         return Element("bsdf", {"type": "radio-material", "id": name})
     material = material.as_body()
     bsdf = Element("bsdf", {"type": "itu-radio-material" if material.itu else "radio-material", "id": name})
+    values: dict[str, float] = {}
     if material.itu:
         SubElement(bsdf, "string", {"name": "type", "value": material.itu})
     else:
-        for key, value in (
-            ("relative_permittivity", material.permittivity or 1.0),
-            ("conductivity", material.conductivity),
-        ):
-            SubElement(bsdf, "float", {"name": key, "value": repr(float(value))})
-    SubElement(bsdf, "float", {"name": "thickness", "value": repr(float(material.thickness))})
+        values |= {"relative_permittivity": material.permittivity or 1.0, "conductivity": material.conductivity}
+    values["thickness"] = material.thickness
     if material.scattering > 0.0:
-        SubElement(bsdf, "float", {"name": "scattering_coefficient", "value": repr(float(material.scattering))})
+        values["scattering_coefficient"] = material.scattering
+    for key, value in values.items():
+        SubElement(bsdf, "float", {"name": key, "value": repr(float(value))})
     return bsdf
-
-
-def _is_air(values: dict[str, Element]) -> bool:
-    """Whether the values of a Sionna material are those of air."""
-    return (_number(values, "relative_permittivity", 1.0), _number(values, "conductivity", 0.0)) == (1.0, 0.0)
 
 
 def _number(values: dict[str, Element], name: str, default: float) -> float:

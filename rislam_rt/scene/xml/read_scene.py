@@ -15,9 +15,8 @@ from rislam_rt.model import Material
 from rislam_rt.scene.check.triangle_array import without_area
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
-from rislam_rt.scene.xml.clip import clip_mesh
 from rislam_rt.scene.xml.materials import XmlMaterial, read_material
-from rislam_rt.scene.xml.shapes import shape_mesh
+from rislam_rt.scene.xml.shapes import clip_mesh, shape_mesh
 from rislam_rt.scene.xml.untrusted_xml import MAX_XML_BYTES, children, parse_xml
 
 SIONNA = "sionna:"
@@ -103,7 +102,9 @@ def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = Non
             mesh = shape_mesh(shape, path.parent, max_faces)
             count += len(mesh.faces)
             if count > max_faces:
-                raise _too_many(root, number, max_faces)
+                part = f"the first {number + 1} of {sum(1 for _ in _shapes(root))} shapes"
+                mend = "take a part: --within x0,y0,x1,y1 keeps what lies in that window of the plan [m]"
+                raise Fault(f"more than {max_faces} faces in {part}", mend)
             _take(found, identity, mesh if window is None else clip_mesh(mesh, window), materials.of(shape))
         where = ""
         if not found.parts:
@@ -125,8 +126,7 @@ class _XmlMaterials:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """Material of a shape of an XML scene file: its own, or the one it refers to; None where nothing is
-        reflected."""
+        """Material of a shape of an XML scene file: its own, or the one it refers to; None where nothing reflects."""
         for own in children(shape, "bsdf"):
             return self._noted(read_material(own)).material
         for reference in children(shape, "ref"):
@@ -159,13 +159,7 @@ def _root(path: Path) -> Element:
 
 
 def _shapes(parent: Element) -> Iterator[Element]:
-    """All shapes of an XML scene file in order, those within a `merge` too.
-
-    Raises
-    ------
-    Fault
-        An element that is neither a shape, nor a material, nor for cameras alone.
-    """
+    """All shapes of an XML scene file in order, those within a `merge` too; a Fault for an element of no meaning."""
     for element in parent:
         if element.tag == "shape" and element.get("type") == "merge":
             yield from _shapes(element)
@@ -177,14 +171,6 @@ def _shapes(parent: Element) -> Iterator[Element]:
         elif element.tag not in (*PICTURE_ONLY, "bsdf", "alias"):
             name = one_line(str(element.tag))[:40]
             raise Fault(f"an element <{name}>, which means nothing here", "delete it, or make it shapes and bsdfs")
-
-
-def _too_many(root: Element, number: int, max_faces: int) -> Fault:
-    """Error for an XML scene file with too many faces: how far it was read, and what to do."""
-    return Fault(
-        f"more than {max_faces} faces in the first {number + 1} of {sum(1 for _ in _shapes(root))} shapes",
-        "take a part: --within x0,y0,x1,y1 keeps what lies in that window of the plan [m]",
-    )
 
 
 def _take(found: XmlScene, identity: str, mesh: Mesh, material: Material | None) -> None:

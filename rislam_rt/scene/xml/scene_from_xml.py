@@ -100,8 +100,7 @@ def _window(within: Sequence[float]) -> Floats | None:
 
 
 def _exact(read: Material, exact: Material | None) -> Material:
-    """Material of an XML scene as the scene file beside it has it, if the XML file has just what is written for that
-    one; else as it was read."""
+    """An XML scene's material as the scene file beside it has it, if it was written so; else as read."""
     if exact is not None and read_material(material_element(exact, "written")).material == read:
         return exact
     return read
@@ -110,12 +109,9 @@ def _exact(read: Material, exact: Material | None) -> Material:
 def _panel(
     reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory
 ) -> tuple[RisPanel | None, str]:
-    """Propose a RIS panel for an XML scene above or beside the agent's path, where there is a place for one, and a
-    remark on it."""
-    draft = RoomDraft(
-        {r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors},
-        {s.name: Mesh(s.vertices, s.faces) for s in occluders},
-    )
+    """Propose a RIS panel for an XML scene above or beside the agent's path, if there is a place; and a remark."""
+    hiding = {s.name: Mesh(s.vertices, s.faces) for s in occluders}
+    draft = RoomDraft({r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors}, hiding)
     way = agent.position[[0, -1]]
     table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0))
     return (build_panel(RisSection(**table)) if table else None), about

@@ -1,5 +1,4 @@
-"""Parsing of untrusted XML, which may mean harm: a tree without entities, declarations or anything that leads
-elsewhere."""
+"""Parsing of untrusted XML, which may mean harm: a tree without entities, declarations or references."""
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -75,8 +74,7 @@ def _tree(content: bytes) -> Element:
 
 
 def _filled(value: str, defaults: dict[str, str]) -> str:
-    """Value of an XML attribute with its `$name` replaced, longest names first; what a default holds is not looked
-    through again."""
+    """Value of an XML attribute with `$name` replaced once, longest names first."""
     for name in sorted(defaults, key=len, reverse=True):
         if name and f"${name}" in value:
             return value.replace(f"${name}", defaults[name])

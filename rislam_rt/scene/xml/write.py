@@ -53,8 +53,7 @@ def write_xml(scene: Scene, folder: str | Path) -> list[str]:
 
 
 def xml_bytes(scene: Scene) -> bytes:
-    """Content of the XML file that Sionna reads of a scene: one `<shape>` a reflector or occluder, one `<bsdf>` a
-    material."""
+    """Content of a scene's XML file for Sionna: a `<shape>` a reflector or occluder, a `<bsdf>` a material."""
     root = Element("scene", {"version": "2.1.0"})
     shapes: list[tuple[str, Material | None]] = [(r.name, r.material) for r in scene.reflectors]
     shapes += [(shade.name, None) for shade in scene.occluders]
@@ -76,9 +75,8 @@ def left_behind(scene: Scene) -> list[str]:
     notes = []
     if constant:
         few = ", ".join(constant[:6]) + (f" and {len(constant) - 6} more" if len(constant) > 6 else "")
-        notes.append(
-            f"the constant R of {few}: as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
-        )
+        body = "as a body with that |R| at normal incidence, and Fresnel's law elsewhere"
+        notes.append(f"the constant R of {few}: {body}")
     if scene.scatterers:
         notes.append(f"{len(scene.scatterers)} scatterers (of shadows: a shape of air, which hides their centre too)")
     notes += [f"the panel '{panel.name}'" for panel in scene.panels]
@@ -86,8 +84,7 @@ def left_behind(scene: Scene) -> list[str]:
 
 
 def _word(material: Material | None) -> str:
-    """Kind of a material, in a word, for its name in a written XML scene. Sionna reads names that begin with `itu` in a
-    way of its own."""
+    """Kind of a material for its name in a written XML scene; Sionna takes names with `itu` its own way."""
     if material is None:
         return "air"
     return material.itu if material.itu else ("constant" if material.level is not None else "slab")

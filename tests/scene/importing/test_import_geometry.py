@@ -6,10 +6,9 @@ from built_in_rooms.parts import box_walls
 
 from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.importing.free_space import find_free, is_seen
-from rislam_rt.scene.importing.regions.flat_regions import find_facets
+from rislam_rt.scene.importing.regions.flat_regions import find_facets, weld
 from rislam_rt.scene.importing.regions.mesh_simplification import clustered
 from rislam_rt.scene.importing.regions.round_surfaces import find_round, prism, sides_for
-from rislam_rt.scene.importing.regions.welded_mesh import weld
 from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
 from rislam_rt.scene.shapes import block, joined
 

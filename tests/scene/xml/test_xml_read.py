@@ -9,7 +9,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material
 from rislam_rt.scene.meshes import Mesh, ply_bytes
 from rislam_rt.scene.xml import read_xml, sionna_scenes
-from rislam_rt.scene.xml.clip import clip_mesh
+from rislam_rt.scene.xml.shapes import clip_mesh
 
 CONCRETE = '<bsdf type="itu-radio-material" id="c"><string name="type" value="concrete"/></bsdf>'
 SQUARE = '<shape type="rectangle" id="mesh-s"><ref id="c"/>{}</shape>'

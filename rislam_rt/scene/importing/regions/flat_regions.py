@@ -1,17 +1,31 @@
-"""Flat regions of a mesh: neighbouring triangles in one plane joined, with the plane and the size of each."""
+"""Flat regions of a mesh welded at its corners: neighbouring triangles in one plane joined, with plane and size."""
 
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.connected_parts import connected
-from rislam_rt.geometry.triangles import triangle_cross
-from rislam_rt.scene.importing.regions.welded_mesh import Welded
+from rislam_rt.geometry.triangles import triangle_cross, triangle_heights
 
 FLAT_ANGLE = np.radians(0.5)
 """Angle [rad] of neighbouring triangles below which they are one plane: half a degree looks flat to whoever drew it."""
+
+WELD = 2e-5
+"""Distance [m] of corners below which they are one: what float32 leaves open in a file of 100 m."""
+
+
+class Welded(NamedTuple):
+    """A welded mesh, whose triangles share their corners."""
+
+    vertices: Floats
+    """(V, 3) [m]."""
+    faces: Integers
+    """(F, 3) indices into `vertices`."""
+    part: Integers
+    """(F,) part of the file that each comes from."""
 
 
 class Edges(NamedTuple):
@@ -41,13 +55,26 @@ class FlatRegions(NamedTuple):
     residual: Floats
     """(R,) [m] distance of a region's farthest corner from its plane."""
     component: Integers
-    """(R,) connected part of the mesh, by edges, that each region belongs to: a leg that stands on a corner of the
-    floor is none of it."""
+    """(R,) part of the mesh connected by edges that each region is in; one that touches at a corner is none of it."""
     edges: Edges
 
     def faces_of(self, regions: Integers) -> Integers:
         """Triangles (T, 3) of a mesh in given flat regions."""
         return self.mesh.faces[np.isin(self.region, regions)]
+
+
+def weld(triangles: list[Floats]) -> Welded:
+    """Weld parts (T, 3, 3) [m] of a mesh at common corners, without doubles and triangles without area."""
+    corners = np.concatenate([t.reshape(-1, 3) for t in triangles])
+    part = np.repeat(np.arange(len(triangles)), [len(t) for t in triangles])
+    vertices, index = np.unique(corners, axis=0, return_inverse=True)
+    pairs = cKDTree(vertices).query_pairs(WELD, output_type="ndarray")
+    group = connected(pairs, len(vertices))
+    _, first = np.unique(group, return_index=True)
+    vertices, faces = vertices[first], group[index.ravel()].reshape(-1, 3)
+    _, single = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    keep = np.intersect1d(np.flatnonzero(triangle_heights(vertices[faces]) > WELD), single)
+    return Welded(vertices, faces[keep], part[keep])
 
 
 def find_facets(mesh: Welded) -> FlatRegions:
@@ -59,7 +86,8 @@ def find_facets(mesh: Welded) -> FlatRegions:
     flat = (edges.turn < FLAT_ANGLE) & (mesh.part[edges.a] == mesh.part[edges.b])
     region = connected(np.stack([edges.a[flat], edges.b[flat]], axis=-1), len(mesh.faces))
     count = int(region.max(initial=-1)) + 1
-    biggest = _largest(region, area, count)
+    order = np.lexsort((-area, region))
+    biggest = order[np.searchsorted(region[order], np.arange(count))]
     side = np.sign(np.einsum("fi,fi->f", normal, normal[biggest][region]))
     faces = np.where((side < 0.0)[:, None], mesh.faces[:, ::-1], mesh.faces)
     plane, offset, width, residual = _planes(triangles, area, region, normal[biggest])
@@ -77,8 +105,7 @@ def bounds_of(facets: FlatRegions, regions: Integers) -> Floats:
 
 
 def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float) -> Integers:
-    """Group number (R,) of each flat region of a mesh: chosen regions that hang together by edges at which they meet at
-    `low` to `high` [rad] have one."""
+    """Group (R,) of each flat region: chosen ones whose common edges turn by `low` to `high` [rad] have one."""
     edges, region = facets.edges, facets.region
     a, b = region[edges.a], region[edges.b]
     joined = (a != b) & (edges.turn >= low) & (edges.turn <= high) & chosen[a] & chosen[b]
@@ -97,15 +124,8 @@ def _edges(faces: Integers, normal: Floats) -> Edges:
     return Edges(a, b, np.arctan2(sine, cosine))
 
 
-def _largest(region: Integers, area: Floats, count: int) -> Integers:
-    """Index (R,) of the largest triangle of each flat region."""
-    order = np.lexsort((-area, region))
-    return order[np.searchsorted(region[order], np.arange(count))]
-
-
 def _planes(triangles: Floats, area: Floats, region: Integers, side: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Least-squares plane of each flat region by its triangles' second moments, normals on the side of `side` (R, 3):
-    normal, offset, width and residual."""
+    """Least-squares normal (on the side of `side` (R, 3)), offset, width and residual of each flat region."""
     count = len(side)
     total = np.bincount(region, area, count)
     middle = triangles.mean(axis=1)

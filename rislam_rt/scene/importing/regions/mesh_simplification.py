@@ -1,5 +1,4 @@
-"""Simplification of imported meshes: flat regions by their outlines, clutter by cells, each with how far it is off
-[m]."""
+"""Simplification of imported meshes: flat regions by their outlines, clutter by cells, with errors [m]."""
 
 import numpy as np
 
@@ -12,8 +11,7 @@ from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, si
 
 
 def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
-    """Whether (V,) simplification may not move a mesh's corner: three flat regions (numbered by `label` (R,)) meet
-    there, or two at an open edge."""
+    """Whether (V,) a mesh's corner must stay: flat regions `label` (R,), three or two at an open edge, meet there."""
     faces, mine = facets.mesh.faces, label[facets.region]
     pairs = np.unique(np.column_stack([faces.ravel(), np.repeat(mine, 3)]), axis=0)
     count = np.bincount(pairs[:, 0], minlength=len(facets.mesh.vertices))
@@ -51,8 +49,7 @@ def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
 def _filled(
     faces: Integers, points: Floats, normal: Floats, kept: Booleans, tolerance: float
 ) -> tuple[Mesh | None, float]:
-    """Mesh triangulated from the simplified outlines of a flat region (None where that fails), and the largest distance
-    [m] of its corners from them."""
+    """Mesh filled anew from a flat region's simplified outlines (None if that fails), and how far [m] it is off."""
     flat = points @ np.stack(plane_tangents(normal), axis=-1)
     drawn = outline_loops(faces)
     loops = [simplify_loop(loop, points, kept, tolerance) for loop in drawn]
@@ -83,8 +80,7 @@ def _off_loop(corners: Floats, loop: Floats) -> float:
 
 
 def _around(hole: Floats, outers: list[Floats]) -> int | None:
-    """Number of the smallest outer loop of a simplified flat region around a hole, by the middle of the hole's first
-    edge; None if there is none."""
+    """Number of the smallest outer loop of a simplified flat region around a hole; None if there is none."""
     around = [k for k, outer in enumerate(outers) if inside_loop(outer, 0.5 * (hole[0] + hole[1]))]
     return min(around, key=lambda k: signed_area(outers[k])) if around else None
 

@@ -1,5 +1,4 @@
-"""Groups of a mesh's flat regions that belong together, and their names: the shell of the room, and each object in
-it."""
+"""Groups of a mesh's flat regions, and their names: the shell of the room, and each object in it."""
 
 import re
 from typing import NamedTuple
@@ -17,7 +16,7 @@ TOUCH = 5e-3
 """Distance [m] of two objects' boxes below which they are one object."""
 UPRIGHT, LEVEL = np.sin(np.radians(15.0)), np.cos(np.radians(15.0))
 """Largest and smallest vertical component of the normals of a wall and of a floor."""
-
+_SIDES = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 _NAMELESS = re.compile(
     r"(?i)(mesh|object|obj|node|geometry|geom|cube|plane|cylinder|sphere|circle|default|group|scene|root|world|solid|"
     r"polygon|shape|model|untitled|material|mat|surface|part|element|layer|g|o)?[\W_\d]*"
@@ -78,15 +77,13 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
 
 
 def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:
-    """Whether an object is one flat region in the plane of a wall of the shell that it touches, as the wall above a
-    door."""
+    """Whether an object is a flat region in the plane of a shell's wall that it touches, as above a door."""
     if len(regions) != 1:
         return False
     normal, offset = facets.normal[regions[0]], facets.offset[regions[0]]
     along = facets.normal[shell] @ normal
-    near = shell[
-        (np.abs(along) > np.cos(FLAT_ANGLE)) & (np.abs(along * facets.offset[shell] - offset) < COPLANAR_OFFSET)
-    ]
+    apart = np.abs(along * facets.offset[shell] - offset)
+    near = shell[(np.abs(along) > np.cos(FLAT_ANGLE)) & (apart < COPLANAR_OFFSET)]
     low, high = bounds_of(facets, regions)
     boxes = (bounds_of(facets, near[k : k + 1]) for k in range(len(near)))
     return any(bool(((box[0] <= high + TOUCH) & (box[1] >= low - TOUCH)).all()) for box in boxes)
@@ -99,29 +96,26 @@ def _touching(facets: FlatRegions, things: list[Integers]) -> list[Integers]:
     low, high = np.stack([bounds_of(facets, regions) for regions in things], axis=1)
     near = ((low[:, None] <= high + TOUCH) & (high[:, None] >= low - TOUCH)).all(axis=-1)
     group = connected(np.argwhere(near), len(things))
-    return [
-        np.concatenate([things[i] for i in np.flatnonzero(group == number)]) for number in range(int(group.max()) + 1)
-    ]
+    members = [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+    return [np.concatenate([things[i] for i in own]) for own in members]
 
 
 def plain_name(name: str) -> str:
-    """Plain name of an object from its node's name: `Office Chair.002` is `office_chair_002`; empty for a name that
-    says nothing."""
+    """Plain name of a node's object, `Office Chair.002`: `office_chair_002`; empty where the name says nothing."""
     if _NAMELESS.fullmatch(name):
         return ""
     plain = re.sub(r"[^\w.\-]+", "_", name.strip(), flags=re.UNICODE).strip("_.-").lower()
     return re.sub(r"_+", "_", plain.replace(".", "_"))[:48]
 
 
-def place_free_name(name: str) -> str:
+def own_name(name: str) -> str:
     """Plain name of a wall from its node's name; empty too where that says no more than wall, floor or ceiling."""
     plain = plain_name(name)
     return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
 
 
 def kind_by_shape(bounds: Floats, room: Floats) -> str:
-    """Name of an object of an imported room by its size and place (`table`, `cabinet`, ...); nothing that is computed
-    with."""
+    """Name of an object of an imported room by size and place (`table`, ...); nothing is computed with it."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])
     bottom, top = float(bounds[0, 2]) - floor, float(bounds[1, 2]) - floor
     longest, shortest = float(size[:2].max()), float(size[:2].min())
@@ -139,21 +133,22 @@ def kind_by_shape(bounds: Floats, room: Floats) -> str:
 
 
 def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
-    """Name of a wall by where in the shell of an imported room it is: `floor`, `ceiling`, `wall_north` (y to the
-    north)."""
+    """Name of a wall by its place in an imported room's shell: `floor`, `ceiling`, `wall_north` (along y)."""
     center, height = room.mean(axis=0), float(room[1, 2] - room[0, 2])
     if abs(normal[2]) >= LEVEL:
         share = (float(middle[2]) - float(room[0, 2])) / height if height else 0.0
         return "floor" if share < 0.2 else "ceiling" if share > 0.8 else "table_top" if share < 0.5 else "level"
     outward = normal * (1.0 if (middle - center) @ normal >= 0.0 else -1.0)
-    eighth = int(np.round(np.degrees(np.arctan2(outward[1], outward[0])) / 45.0)) % 8
-    side = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")[eighth]
-    return f"wall_{side}" if abs(normal[2]) <= UPRIGHT else f"slope_{side}"
+    return f"{'wall' if abs(normal[2]) <= UPRIGHT else 'slope'}_{compass_side(outward)}"
+
+
+def compass_side(direction: Floats) -> str:
+    """Side of the compass that a horizontal direction points to, `east` along x, in eighths."""
+    return _SIDES[int(np.round(np.degrees(np.arctan2(direction[1], direction[0])) / 45.0)) % 8]
 
 
 def numbered(names: list[str]) -> list[str]:
-    """Names of an imported room's reflectors or occluders made different: the second of one name gets `_2`, and so
-    on."""
+    """Names of an imported room's parts made different: the second of one name gets `_2`, and so on."""
     taken: set[str] = set()
     found = []
     for name in names:

@@ -11,8 +11,7 @@ from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.shapes import joined, quad
 
 CREASE = np.radians(35.0)
-"""Angle [rad] of neighbouring facets above which they meet in an edge: a round thing is drawn with eleven sides or
-more."""
+"""Angle [rad] of facets above which they meet in an edge: a round thing is drawn with eleven sides or more."""
 WIDEST = 0.5
 """Width [m] above which a facet is a wall of a bay, not a drawing of something round."""
 FEWEST = 5
@@ -37,8 +36,7 @@ class RoundPatch(NamedTuple):
 
 
 def find_round(facets: FlatRegions) -> list[RoundPatch]:
-    """Find the round surfaces of a mesh: facets narrower than `WIDEST` that meet their neighbours at less than
-    `CREASE`."""
+    """Find a mesh's round surfaces: facets narrower than `WIDEST` that meet at less than `CREASE`."""
     narrow = facets.width < WIDEST
     group = crease_groups(facets, narrow, float(FLAT_ANGLE), float(CREASE))
     order = np.argsort(group, kind="stable")
@@ -73,8 +71,7 @@ def prism(found: RoundPatch, sagitta: float) -> tuple[Mesh, float]:
 
 
 def _cylinder(facets: FlatRegions, regions: Integers) -> RoundPatch:
-    """Fit a cylinder to the corners of a patch of facets; the radius is 0 where they lie on none, or it is not
-    covered."""
+    """Fit a cylinder to the corners of a patch of facets; radius 0 where they lie on none or do not cover it."""
     normal, area = facets.normal[regions], facets.area[regions]
     values, vectors = np.linalg.eigh(np.einsum("r,ri,rj->ij", area, normal, normal) / area.sum())
     axis = vectors[:, 0] * (1.0 if vectors[np.argmax(np.abs(vectors[:, 0])), 0] > 0.0 else -1.0)

@@ -15,11 +15,9 @@ from rislam_rt.scene.importing.regions.round_surfaces import RoundPatch, prism
 from rislam_rt.scene.meshes import Mesh
 
 RESTING = 5e-3
-"""Distance [m] from a wall of the shell up to which a face on the far side of its object stands on it: nobody sees
-it."""
+"""Distance [m] from a wall of the shell up to which the far side of an object stands on it, unseen."""
 MAX_SHADE_FACES = 3000
-"""Most triangles of all clutter: occluders are tested against every segment of every path; cells grow until no more are
-left."""
+"""Most triangles of all clutter, as every segment of every path is tested against occluders; cells grow for it."""
 OUTLINE = 0.125
 """Tolerance [wavelengths] within which outlines of flat regions are simplified."""
 SAGITTA = 0.25
@@ -70,8 +68,7 @@ class SortedSurfaces(NamedTuple):
 def sort_regions(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
 ) -> SortedSurfaces:
-    """Sort the flat regions of an imported mesh: decide for each whether it reflects, hides what lies behind, or is
-    left out."""
+    """Sort the flat regions of an imported mesh: whether each reflects, hides what lies behind, or is left out."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
         owner[piece.regions] = number
@@ -101,8 +98,7 @@ def sort_regions(
 
 
 def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
-    """Whether (R,) each flat region of an imported mesh reflects like a plane, and the width [m] from which on they
-    do."""
+    """Whether (R,) each flat region of an imported mesh reflects like a plane, and from which width [m] on."""
     flat = ~rounded & (facets.residual <= OUTLINE * options.wavelength)
     width = np.minimum(facets.width, np.sqrt(facets.area))
     narrow = options.narrow
@@ -134,8 +130,7 @@ def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -
 
 
 def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
-    """Number (R,) of the wall that each flat region belongs to: those of the room's shell in one plane and of one part
-    are one wall."""
+    """Wall (R,) that each flat region belongs to: in the shell, those of one plane and part are one wall."""
     group = np.arange(len(mirror))
     rows = shell[mirror[shell]]
     for place, i in enumerate(rows):
@@ -157,8 +152,7 @@ def _with_clutter(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], owner: Integers,
     part: Integers, mirror: Booleans, resting: Booleans, narrow: float, options: ImportOptions,
 ) -> SortedSurfaces:  # fmt: skip
-    """Complete the sorted surfaces of an imported mesh: cylinders as prisms, and all else that does not reflect as
-    clutter."""
+    """Complete the sorted surfaces of an imported mesh: cylinders as prisms, what does not reflect as clutter."""
     wavelength, cylinders, prisms = options.wavelength, [], []
     rest = ~mirror & ~resting
     for found in rounds:
@@ -176,7 +170,8 @@ def _with_clutter(
         else:
             prisms.append(ClutterMesh(thing, mesh.triangles))
     gone = float(facets.area[resting].sum())
-    raw, planes = [], _shell_planes(surfaces)
+    shell = [s for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200]
+    raw, planes = [], [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in shell]
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
         triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
@@ -193,8 +188,7 @@ def _with_clutter(
 
 
 def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
-    """Simplify clutter in cells of one size [m], the smallest with which it is few enough triangles; also the largest
-    error [m] and that size."""
+    """Simplify clutter in the smallest cells [m] that leave few triangles; also the error [m] and the cell."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
         if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:
@@ -202,13 +196,6 @@ def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], fl
         cell *= np.sqrt(2.0)
     error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
     return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
-
-
-def _shell_planes(surfaces: list[Surface]) -> list[tuple[Floats, float]]:
-    """Planes (normal, offset) of the reflecting walls of an imported room's shell."""
-    return [
-        (s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200
-    ]
 
 
 def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:

@@ -9,16 +9,12 @@ from scipy.spatial import cKDTree
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_cross
-from rislam_rt.scene.importing.regions.welded_mesh import Welded
+from rislam_rt.scene.importing.regions.flat_regions import Welded
 
 SPACING = 0.04
 """Side [m] of the cubes in each of which one point of a scanned mesh is kept."""
-
-
 NEIGHBOURS = 30
 """Neighbouring points of a scan for the normal at each: a patch some 12 cm wide."""
-
-
 SMOOTHING = 3
 """Times that the normals at a scanned mesh's corners are averaged over their neighbours."""
 
@@ -62,8 +58,7 @@ def downsample_mesh(mesh: Welded) -> PointCloud:
 
 
 def _facing(mesh: Welded) -> tuple[Floats, Floats]:
-    """Normal (V, 3) of a scanned mesh at each corner, smoothed over its neighbours, and the area (V,) [m^2] that it
-    stands for."""
+    """Smoothed normal (V, 3) of a scanned mesh at each corner, and the area (V,) [m^2] that it stands for."""
     triangles = mesh.vertices[mesh.faces]
     cross = triangle_cross(triangles)
     share, facing = np.zeros(len(mesh.vertices)), np.zeros((len(mesh.vertices), 3))

@@ -38,8 +38,7 @@ class Outline(NamedTuple):
 
 
 class _Edge(NamedTuple):
-    """Edge of a scanned plane's outline, a line in the plane: `normal . x = offset`, and whether another plane gives
-    it."""
+    """Edge of a scanned plane's outline, `normal . x = offset` in the plane, and whether another plane gives it."""
 
     normal: Floats
     offset: float
@@ -48,8 +47,7 @@ class _Edge(NamedTuple):
 
 
 def outline_planes(planes: list[ScanPlane], cloud: PointCloud, fill: float) -> list[Outline | None]:
-    """Meshes of the outlines of a scan's planes; holes up to `fill` [m^2] are closed. None where nothing large enough
-    is left."""
+    """Outlines of a scan's planes as meshes, holes up to `fill` [m^2] closed; None where too little is left."""
     trees = [cKDTree(cloud.points[plane.members]) for plane in planes]
     return [_outline(number, planes, trees, cloud, fill) for number in range(len(planes))]
 
@@ -77,8 +75,7 @@ def _outline(
 
 
 def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats, float, float]:
-    """Line where another plane cuts a scanned plane, in the latter's frame (3, 2): normal, offset [m], and sine of the
-    angle between the planes."""
+    """Normal, offset [m] and sine of the angle of the line where another plane cuts one, in its frame (3, 2)."""
     line = frame.T @ other.normal
     slope = float(np.linalg.norm(line))
     rest = other.offset - plane.offset * float(plane.normal @ other.normal)
@@ -88,12 +85,7 @@ def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats,
 def _meeting_cells(
     number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats, low: Floats, shape: tuple[int, ...]
 ) -> Booleans:
-    """Cells of a scanned plane along the lines where other planes meet it: a hole of the scan that reaches there ends
-    there.
-
-    A line counts from the first to the last of its places where the other plane has points, breaks of up to a metre
-    bridged.
-    """
+    """Cells of a scanned plane along its lines with other planes, where those have points: holes end there."""
     plane, found = planes[number], np.zeros(shape, dtype=np.bool_)
     reach = float(np.hypot(shape[0], shape[1])) * CELL
     ends: list[tuple[Floats, Booleans]] = []
@@ -120,8 +112,7 @@ def _meeting_cells(
 
 
 def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Booleans) -> Booleans:
-    """Whether (S,) points (S, 2) on the line where two scanned planes meet lie between the line's end and its crossing
-    with another such line, if both lines end near there."""
+    """Whether (S,) points (S, 2) of a meeting line lie between its end and its crossing with one that ends there."""
     distance, at = cKDTree(other_flat).query(flat)
     meet = int(np.argmin(distance))
     steps = int(BREAK / (0.5 * CELL))
@@ -169,8 +160,7 @@ def _loops(there: Booleans) -> list[list[Floats]]:
 
 
 def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
-    """Outline (n, 2) of a scanned plane with its edges laid on the lines where other planes meet it, its corners where
-    its edges meet."""
+    """Outline (n, 2) of a scanned plane, edges laid on the lines where other planes meet it."""
     ends = zip(loop, np.roll(loop, -1, axis=0), strict=True)
     edges = [_edge(start, end, number, planes, trees, frame) for start, end in ends]
     # a short edge beside one that another plane gives is the grid's cut through a corner
@@ -195,8 +185,7 @@ def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKD
 def _snapped_corners(
     corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats
 ) -> Floats:
-    """Outline (n, 2) of a scanned plane with the corners that nearly lie on other planes put on them: on two at
-    most."""
+    """Outline (n, 2) of a scanned plane, corners that nearly lie on other planes put on them (on two at most)."""
     plane, moved = planes[number], corners.copy()
     for k, corner in enumerate(corners):
         place = frame @ corner + plane.offset * plane.normal

@@ -64,8 +64,7 @@ def find_planes(cloud: PointCloud) -> list[ScanPlane]:
 
 
 def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | None:
-    """Fit the plane to a scan that holds the most area among its free points, anew as it narrows; None if that is too
-    little."""
+    """Fit the plane that holds the most area among a scan's free points; None if that is too little."""
     rows = np.flatnonzero(free)
     if cloud.area[rows].sum() < LEAST_AREA:
         return None
@@ -98,8 +97,7 @@ def _best_plane(cloud: PointCloud, free: Booleans, reach: float) -> ScanPlane | 
 
 
 def _connected_groups(cloud: PointCloud, rows: Integers) -> list[Integers]:
-    """Groups of a scan's points that are connected over gaps of up to `GAP`: the largest first, then others of at least
-    `LEAST_AREA`."""
+    """Groups of a scan's points connected over gaps of `GAP`: the largest, then those of `LEAST_AREA` or more."""
     cells, box = np.unique(np.floor(cloud.points[rows] / (0.5 * GAP)).astype(np.int64), axis=0, return_inverse=True)
     near = cKDTree(cells).query_pairs(1.8, output_type="ndarray")
     label = connected(near, len(cells))[box.ravel()]
@@ -109,8 +107,7 @@ def _connected_groups(cloud: PointCloud, rows: Integers) -> list[Integers]:
 
 
 def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bool:
-    """Whether scanned points apart from those that a plane was fitted to lie on it too, with no lean or step of their
-    own."""
+    """Whether further scanned points lie on a fitted plane too, with no lean or step of their own."""
     height = cloud.points[rows] @ plane - offset
     own, _ = _fit(cloud.points[rows], cloud.area[rows], plane)
     noise = max(cloud.noise, 1e-3)
@@ -118,8 +115,7 @@ def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bo
 
 
 def _fit(points: Floats, weight: Floats, side: Floats) -> tuple[Floats, float]:
-    """Plane of least weighted squares through scanned points (N, 3), its normal on the side of `side`: normal and
-    offset."""
+    """Normal, on the side of `side`, and offset of the plane of least weighted squares through points (N, 3)."""
     middle = weight @ points / weight.sum()
     local = points - middle
     normal = np.linalg.eigh(np.einsum("n,ni,nj->ij", weight, local, local))[1][:, 0]

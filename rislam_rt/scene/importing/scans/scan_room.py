@@ -6,9 +6,8 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
+from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, Welded
 from rislam_rt.scene.importing.regions.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_planes
-from rislam_rt.scene.importing.regions.welded_mesh import Welded
 from rislam_rt.scene.importing.scans.point_cloud import downsample_mesh
 from rislam_rt.scene.importing.scans.scan_outline import BRIDGE, CELL, Outline, outline_planes
 from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_planes
@@ -16,8 +15,7 @@ from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_
 FLAT_SHARE = 0.3
 """Share of a mesh's area in wide flat regions below which it is a scan."""
 CLOSE = 0.05
-"""Distance [m] from a scanned plane up to which it explains what is there, whatever the noise: skirting boards, frames,
-sockets."""
+"""Distance [m] from a scanned plane up to which it explains what is there: skirting boards, frames, sockets."""
 
 
 def looks_scanned(facets: FlatRegions, options: ImportOptions) -> bool:
@@ -51,22 +49,14 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     walls = [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces]
     clutter, error, cell = in_cells([ClutterMesh(0, triangles)] if len(triangles) else [], 2.0 * options.wavelength)
     clutter = [ClutterMesh(0, off_planes(c.triangles, walls)) for c in clutter]
-    found = SortedSurfaces(
-        surfaces,
-        [c for c in clutter if len(c.triangles)],
-        error,
-        cell,
-        options.narrow,
-        float(triangle_areas(triangles).sum()),
-        0.0,
-        [],
-    )
+    clutter = [c for c in clutter if len(c.triangles)]
+    shading = float(triangle_areas(triangles).sum())
+    found = SortedSurfaces(surfaces, clutter, error, cell, options.narrow, shading, 0.0, [])
     return found, _remarks(kept, cloud.noise)
 
 
 def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline], noise: float) -> bool:
-    """Whether a scanned plane is the back of what stands on a larger one: parallel, nearer than noise can tell, within
-    it."""
+    """Whether a scanned plane is the back of what stands on a larger one: parallel, within noise and outline."""
     (plane, outline), (wall, around) = pair, larger
     corners = outline.mesh.vertices
     if abs(float(plane.normal @ wall.normal)) < np.cos(np.radians(5.0)):

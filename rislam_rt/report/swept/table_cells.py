@@ -1,0 +1,41 @@
+"""Table cells of the studies' pages: lengths, ratios and shares, with or without intervals."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+NOTHING = "-"
+"""Table cell without a value."""
+
+
+def metres(value: float | None) -> str:
+    """Table cell: a length in metres with three decimals."""
+    return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
+
+
+def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
+    """Table cell: an entry's error in metres with its interval."""
+    value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
+    if value is None or low is None:
+        return metres(value)
+    return f"{value:.3f} ({low:.3f} to {high:.3f})"
+
+
+def ratio(value: float | None) -> str:
+    """Table cell: a ratio with two decimals."""
+    return NOTHING if value is None else f"{value:.2f}"
+
+
+def percent_between(entry: Mapping[str, Any], name: str) -> str:
+    """Table cell: a share of an entry in percent with its interval."""
+    if entry[name] is None:
+        return NOTHING
+    found = (entry[name + end] for end in ("", "_low", "_high"))
+    value, low, high = (np.nan if part is None else 100 * part for part in found)
+    return f"{value:.0f} % ({low:.0f} to {high:.0f})"
+
+
+def percent(value: float | None) -> str:
+    """Table cell: a share in percent."""
+    return NOTHING if value is None else f"{100 * value:.0f} %"
