@@ -227,7 +227,7 @@ def slide(window: Window) -> Window:
     first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
     oldest = Quadratic(*(field[0] for field in window.slots))
-    hessian[np.ix_(first, first)] += oldest.hessian
+    hessian[first[:, None], first] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = float(window.step[0]), window.accel[0]
@@ -249,7 +249,7 @@ def slide(window: Window) -> Window:
     covariance = window.covariance.copy()
     covariance[:HEAD] = carry @ covariance[moved]
     covariance[:, :HEAD] = covariance[:, moved] @ carry.T
-    covariance = np.delete(np.delete(covariance, slice(size, size + free), axis=0), slice(size, size + free), axis=1)
+    covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
         head=head,
         accel=window.accel[1:],
@@ -260,7 +260,7 @@ def slide(window: Window) -> Window:
         prior=prior,
         noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
-        covariance=covariance,
+        covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1),
     )
 
 
@@ -301,7 +301,10 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
-    both = back[one] @ (slots[:, one, two].T[..., None] * along[two])
+    weight = slots[:, one, two].T[..., None]
+    both = back[0] @ (weight[:6] * along[0])  # the room's axes share one basis
+    if free > TURN:
+        both = np.concatenate([both, back[TURN] @ (weight[6:] * along)])
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
     inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
