@@ -124,11 +124,10 @@ def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal
     from products (K, S + A + 1, S + A + 1) of the slopes by pose and features, those by attitude, and residuals."""
     axes = len(variance)
     own, by, out = slice(-1 - axes, -1), slice(0, product.shape[-1] - 1 - axes), -1
-    information = product[:, own, own] + np.diag(1.0 / variance)
-    gain = np.linalg.solve(information, product[:, own, by])
-    pull = product[:, own, out] - rotation[:, :axes] / variance
-    change = np.asarray(np.linalg.solve(information, pull[..., None])[..., 0], dtype=np.float64)
-    cross = product[:, by, own]
+    right, cross = product[:, own].copy(), product[:, by, own]
+    right[..., out] -= rotation[:, :axes] / variance
+    found = np.asarray(np.linalg.solve(right[..., own] + np.diag(1.0 / variance), right), dtype=np.float64)
+    gain, change = found[..., by], found[..., out]
     slope = product[:, by, out] - (cross @ change[..., None])[..., 0]
     return Marginal(product[:, by, by] - cross @ gain, slope, change)
 

@@ -25,6 +25,7 @@ from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.motion_basis import (
+    FIRST,
     HEAD,
     ONE,
     POSE,
@@ -132,10 +133,11 @@ def _basis(window: Window) -> Floats:
 def poses(window: Window) -> Floats:
     """Positions [m] and compass offsets [rad] of the window's poses (K, 4)."""
     free = window.accel.shape[1]
-    numbers = np.concatenate([window.head[[0, 1, 2, 6]][:free, None], np.zeros((free, 1)), window.accel.T], axis=1)
-    numbers[:3, 1] = window.head[3:6]
-    found = np.full((window.num_poses, POSE), window.head[6])
-    found[:, :free] = (_basis(window) @ numbers[..., None])[..., 0].T
+    numbers, found = np.zeros((free, window.num_poses + 1, 1)), np.empty((window.num_poses, POSE))
+    numbers[:, 0, 0], numbers[:, 2:, 0] = window.head[FIRST[:free]], window.accel.T
+    numbers[:3, 1, 0] = window.head[3:6]
+    found[:, TURN] = window.head[6]
+    found[:, :free] = (_basis(window) @ numbers)[..., 0].T
     return found
 
 
@@ -291,10 +293,10 @@ def solve(window: Window, *, spread: bool = True) -> Window:
 def _normal(window: Window) -> tuple[Floats, Floats]:
     """Hessian and gradient of the sliding window's whole cost (priors and measurements) by the head and the
     accelerations."""
-    size, (steps, free) = len(window.head), window.accel.shape
-    place = poses(window)
-    spot = np.concatenate([place, np.broadcast_to(window.head[HEAD:], (len(place), size - HEAD))], axis=1)
-    slope, slots = window.slots.slope(spot), window.slots.hessian
+    size, (steps, free), slots = len(window.head), window.accel.shape, window.slots.hessian
+    spot = np.empty(slots.shape[:2])
+    spot[:, :POSE], spot[:, POSE:] = poses(window), window.head[HEAD:]
+    slope = window.slots.slope(spot)
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
     along, start, edge = _basis(window), head_order(free), 2 * free
