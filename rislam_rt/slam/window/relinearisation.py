@@ -9,7 +9,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import linearise_each, poses_of
 from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
-from rislam_rt.slam.window.measurement_log import Residuals, squares
+from rislam_rt.slam.window.measurement_log import Residuals
 from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, poses
@@ -39,7 +39,7 @@ def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]
     state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
     left = found.left - (turned @ one.change[of][..., None])[..., 0]
     return level(state, first, one.change), Residuals(
-        found.row, found.slot, left, slopes, squares(found.row, left, log, 0.0)
+        found.row, found.slot, left, slopes, np.zeros(len(rows))
     )  # fmt: skip
 
 
