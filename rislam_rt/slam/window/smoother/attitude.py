@@ -28,7 +28,7 @@ def levels() -> Floats:
 @lru_cache(maxsize=4)
 def _levels(largest: float) -> Floats:
     """`levels` up to a given one [rad], cached."""
-    return largest * 10.0 ** (-0.5 * np.arange(SWAYS)[::-1])
+    return np.asarray(largest * 10.0 ** (-0.5 * np.arange(SWAYS)[::-1]))
 
 
 def first_levels(*, compass: bool) -> Floats:
