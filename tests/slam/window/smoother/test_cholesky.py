@@ -3,7 +3,8 @@ import numpy as np
 from rislam_rt.slam.window.smoother.cholesky import form_and_log_det, inverse, solution
 
 
-def test_one_factor_gives_inverse_solution_form_and_determinant(rng: np.random.Generator) -> None:
+def test_one_factor_gives_inverse_solution_form_and_determinant() -> None:
+    rng = np.random.default_rng(1)
     root, right = rng.normal(size=(6, 6)), rng.normal(size=6)
     matrix = root @ root.T + 0.1 * np.eye(6)
     form, log_det = form_and_log_det(matrix, right)
