@@ -82,21 +82,14 @@ def within_reach(
 
 
 def squared_distance(gap: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Squared Mahalanobis lengths (...,) of gaps (..., 3), and log determinants of their covariances (..., 3, 3)."""
-    inverse, log_det = inverse_3x3(covariance)
-    return np.vecdot(gap, (inverse @ gap[..., None])[..., 0]), log_det
-
-
-def inverse_3x3(matrix: Floats) -> tuple[Floats, Floats]:
-    """Inverses (..., 3, 3) and log determinants (...,) of symmetric positive matrices, in closed form."""
-    a, b, c = matrix[..., 0, 0], matrix[..., 0, 1], matrix[..., 0, 2]
-    d, e, f = matrix[..., 1, 1], matrix[..., 1, 2], matrix[..., 2, 2]
+    """Squared Mahalanobis lengths (...,) of gaps (..., 3), and log determinants of their covariances (..., 3, 3), in
+    closed form."""
+    x, y, z = gap[..., 0], gap[..., 1], gap[..., 2]
+    a, b, c = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 0, 2]
+    d, e, f = covariance[..., 1, 1], covariance[..., 1, 2], covariance[..., 2, 2]
     ca, cb, cc = d * f - e * e, c * e - b * f, b * e - c * d
     det = np.maximum(a * ca + b * cb + c * cc, 1e-300)
-    inverse = np.empty(matrix.shape)
-    inverse[..., 0, 0], inverse[..., 1, 1], inverse[..., 2, 2] = ca, a * f - c * c, a * d - b * b
-    inverse[..., 0, 1] = inverse[..., 1, 0] = cb
-    inverse[..., 0, 2] = inverse[..., 2, 0] = cc
-    inverse[..., 1, 2] = inverse[..., 2, 1] = b * c - a * e
-    inverse /= det[..., None, None]
-    return inverse, np.log(det)
+    # adjugate times gap
+    one, two = ca * x + cb * y + cc * z, cb * x + (a * f - c * c) * y + (b * c - a * e) * z
+    three = cc * x + (b * c - a * e) * y + (a * d - b * b) * z
+    return np.asarray((x * one + y * two + z * three) / det), np.log(det)

@@ -92,13 +92,13 @@ def bounced(legs: Integers, column: int) -> tuple[Integers, Integers]:
 def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
     """Mirror images (..., G, 3) [m] of the legs' points in their walls, from features (..., F, 3) and Tx (..., 3)."""
     legs = returns.legs
-    moving, base = legs[:, 0] == TX, features[..., legs[:, 0], :]
+    moving, base = legs[:, 0] == TX, features.take(legs[:, 0], axis=-2)
     if moving.any():  # only then do images differ from pose to pose
         base = np.where(moving[:, None], tx[..., None, :], base)
     for column in (1, 2):
         rows, walls = bounced(legs, column)
         if len(rows):
-            base[..., rows, :] = reflect(base[..., rows, :], features[..., walls, :], anchor[walls])
+            base[..., rows, :] = reflect(base.take(rows, axis=-2), features.take(walls, axis=-2), anchor[walls])
     return base
 
 
@@ -106,7 +106,7 @@ def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) ->
     """Predicted lengths and direction cosines of all returns from the map's features (..., F, 3) and agent's poses."""
     image = leg_images(returns, features, anchor, poses.tx)
     # leg by leg, as many returns share one
-    tx_length = _norm(image - poses.tx[..., None, :])[..., returns.tx]
+    tx_length = _norm(image - poses.tx[..., None, :]).take(returns.tx, axis=-1)
     to_rx = image - poses.rx[..., None, :]
     rx_length = np.maximum(_norm(to_rx), 1e-9)
     arrival = to_rx / rx_length[..., None]
@@ -115,9 +115,11 @@ def observe(returns: Returns, features: Floats, anchor: Floats, poses: Poses) ->
     by_leg[..., 0] = rx_length
     by_leg[..., 1] = arrival[..., 0] * cos + arrival[..., 1] * sin
     by_leg[..., 2] = arrival[..., 1] * cos - arrival[..., 0] * sin
-    seen = by_leg[..., returns.rx, :]
+    seen = by_leg.take(returns.rx, axis=-2)
     seen[..., 0] += tx_length
-    return PredictedReturn(seen, tx_length, rx_length[..., returns.rx], arrival[..., returns.rx, 2])
+    return PredictedReturn(
+        seen, tx_length, rx_length.take(returns.rx, axis=-1), arrival[..., 2].take(returns.rx, axis=-1)
+    )
 
 
 class Linear(NamedTuple):
@@ -177,7 +179,7 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
     count = features.shape[-2]
     wide = np.zeros((*seen.shape, spare + 3 * count))
     block = np.swapaxes(wide[..., spare:].reshape(*seen.shape, count, 3), -3, -2)
-    heard, parts = by_rx @ slopes[..., returns.rx, :, :], returns.legs[returns.rx]
+    heard, parts = by_rx @ slopes.take(returns.rx, axis=-3), returns.legs[returns.rx]
     rows, part = (parts >= 0).nonzero()
     each = np.swapaxes(heard.reshape(*heard.shape[:-1], 3, 3), -3, -2)
     block[..., rows, parts[rows, part], :, :] = each[..., rows, part, :, :]
@@ -186,7 +188,7 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
     if len(still):
         parts = returns.legs[returns.tx[still]]
         rows, part = (parts >= 0).nonzero()
-        length = by_tx[..., still, None, :] @ slopes[..., returns.tx[still], :, :]
+        length = by_tx.take(still, axis=-2)[..., None, :] @ slopes.take(returns.tx[still], axis=-3)
         each = length.reshape(*length.shape[:-2], 3, 3)
         block[..., still[rows], parts[rows, part], 0, :] += each[..., rows, part, :]
     # the images of a moving base move with it
@@ -197,7 +199,7 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
 
 def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
     """Lengths and cosines (..., R, 3) of returns, lengths' derivatives by the Tx legs' images, all by the Rx legs'."""
-    to_tx, to_rx = image[..., returns.tx, :] - poses.tx, image[..., returns.rx, :] - poses.rx
+    to_tx, to_rx = image.take(returns.tx, axis=-2) - poses.tx, image.take(returns.rx, axis=-2) - poses.rx
     tx_length, rx_length = _norm(to_tx)[..., None], np.maximum(_norm(to_rx), 1e-9)[..., None]
     by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9), to_rx / rx_length
     body = np.swapaxes(rotation_z(poses.heading), -1, -2)[..., :2, :]
@@ -211,7 +213,7 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
 def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats]:
     """Mirror images (..., G, 3) of the legs' points, and derivatives (..., G, 3, 9) by the point, the wall next to it
     and the other wall."""
-    moving, image = legs[:, 0] == TX, features[..., legs[:, 0], :]
+    moving, image = legs[:, 0] == TX, features.take(legs[:, 0], axis=-2)
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx, image)
     slopes = np.zeros((*image.shape, 9))
@@ -220,13 +222,13 @@ def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) 
         rows, walls = bounced(legs, column)
         if not len(rows):
             continue
-        wall, start = features[..., walls, :], image[..., rows, :]
-        span = wall - anchor[walls]
+        wall, base, start = features.take(walls, axis=-2), anchor[walls], image.take(rows, axis=-2)
+        span = wall - base
         scaled = span / np.vecdot(span, span)[..., None]
-        depth = np.vecdot(scaled, start - 0.5 * (wall + anchor[walls]))[..., None]
+        depth = np.vecdot(scaled, start - 0.5 * (wall + base))[..., None]
         mirrored = start - 2.0 * depth * span
         image[..., rows, :], flip = mirrored, AXES - 2.0 * span[..., :, None] * scaled[..., None, :]
-        slopes[..., rows, :, : 3 * column] = flip if column == 1 else flip @ slopes[..., rows, :, :6]
+        slopes[..., rows, :, : 3 * column] = flip if column == 1 else flip @ slopes.take(rows, axis=-3)[..., :6]
         slopes[..., rows, :, 3 * column : 3 * column + 3] = -2.0 * (
             depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.assignment import Candidates, cheapest, inverse_3x3, pair_costs
+from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, squared_distance
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 
 GATE, CLUTTER = 16.3, 0.016
@@ -107,12 +107,12 @@ def test_nothing_to_assign() -> None:
     assert len(associate(empty, observed(np.zeros((2, 3)), np.zeros(2)))) == 0
 
 
-def test_small_inverses(rng: np.random.Generator) -> None:
-    root = rng.normal(size=(20, 3, 3))
+def test_squared_distances(rng: np.random.Generator) -> None:
+    root, gap = rng.normal(size=(20, 3, 3)), rng.normal(size=(20, 3))
     matrix = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(3)
-    inverse, log_det = inverse_3x3(matrix)
+    square, log_det = squared_distance(gap, matrix)
     # condition numbers up to 1e3: rounding below 1e-12
-    np.testing.assert_allclose(inverse, np.linalg.inv(matrix), rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(square, np.vecdot(gap, np.linalg.solve(matrix, gap[..., None])[..., 0]), rtol=1e-9)
     np.testing.assert_allclose(log_det, np.linalg.slogdet(matrix)[1], atol=1e-12)
 
 

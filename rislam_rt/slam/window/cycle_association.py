@@ -150,7 +150,7 @@ def return_sides(forms: Integers, landmarks: WindowTable) -> Integers:
     held = [panel for panel in enumerate(landmarks.panels) if panel[1] >= 0]
     if not held:
         return np.full(len(forms), UNTOLD)
-    sides = np.where((len(held) == len(landmarks.panels)) | (forms[:, 0] == TX), OTHER, UNTOLD)
+    sides = np.where((len(held) == landmarks.log_ris.shape[1]) | (forms[:, 0] == TX), OTHER, UNTOLD)
     for number, row in held:
         sides[forms[:, 0] == row] = PANEL + number
     return sides

@@ -171,9 +171,9 @@ def _solve(
     """Update the window with a cycle's associated components by two Gauss-Newton steps, the first on the association's
     predictions; re-linearises all poses every few cycles, else the last one. Also returns residuals, squared
     innovation, and the covariance (A, A) [rad^2] of the attitude."""
-    axes = len(state.attitude_variance)
-    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
-    told = attitude.likelihood(innovation, jacobian, view.covariance, turned, state.attitude_variance)
+    expected = state.attitude_variance
+    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, len(expected))
+    told = attitude.likelihood(innovation, jacobian, view.covariance, turned, expected)
     state = state._replace(sway=attitude.next_levels(state.sway, told))
     variance, last = state.attitude_variance, state.window.num_poses - 1
     covariance = np.linalg.inv(told.information[0] + np.diag(1.0 / variance))

@@ -96,7 +96,7 @@ class Residuals(NamedTuple):
     slopes: Floats
     """(A, 3, 4 + 3F) of the predictions by pose and features, in standard deviations."""
     square: Floats
-    """(A,) expected mean squares of the errors, in reported deviations (see `squares`)."""
+    """(A,) expected mean squares of the errors, in reported deviations (see `squares`); 0 before a solution."""
 
     def take(self, rows: Any) -> "Residuals":
         """Only some of the measurements' residuals."""

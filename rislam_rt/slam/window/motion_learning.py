@@ -13,6 +13,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion
+from rislam_rt.slam.window.smoother.cholesky import form_and_log_det, inverse
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
@@ -34,7 +35,8 @@ def learn_motion(state: WindowState) -> WindowState:
         return state
     posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel)), CONSTANTS.stay)
     share = manoeuvre_share(window, motion.expected_precision(posterior[UP]))
-    posterior[UP], level[UP] = nearer_floor(posterior[UP], share), nearer_floor(level[UP], share)
+    nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
+    posterior[UP], level[UP] = nearer[:-1], nearer[-1]
     fresh = precisions(posterior)
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
@@ -66,15 +68,15 @@ def manoeuvre_share(window: Window, precision: Floats) -> float:
     Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare event.
     """
     size, free = len(window.head), window.accel.shape[1]
-    inner = np.linalg.inv(window.covariance[size + 2 :: free, size + 2 :: free])
+    inner = inverse(window.covariance[size + 2 :: free, size + 2 :: free])
     told, slope = inner - np.diag(window.solved[:, 2]), inner @ window.accel[:, 2]
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
     share = np.linspace(0.0, 1.0, PRIORS)
     std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])
     # N(0, P^-1) against what is told, information `told` with the slope `slope`
     inside, pull = np.eye(len(told)) + std[:, :, None] * told * std[:, None, :], std * slope
-    log_like = 0.5 * np.vecdot(pull, np.linalg.solve(inside, pull[..., None])[..., 0])
-    log_like -= 0.5 * np.linalg.slogdet(inside)[1]
+    form, log_det = np.array([form_and_log_det(*each) for each in zip(inside, pull, strict=True)]).T
+    log_like = 0.5 * (form - log_det)
     log_like[1:] += CONSTANTS.log_rare
     weight = np.exp(log_like - log_like.max())
     return float(weight @ share / weight.sum())

@@ -9,7 +9,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import linearise_each, poses_of
 from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
-from rislam_rt.slam.window.measurement_log import Residuals, squares
+from rislam_rt.slam.window.measurement_log import Residuals
 from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, poses
@@ -29,7 +29,8 @@ def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]
     at = np.arange(len(rows)) - np.searchsorted(of, of)
     wide = np.zeros((many, int(at.max(initial=-1)) + 1, 3, size + len(variance) + 1))
     weight = np.sqrt(trust(found.left))[:, None, None]
-    wide[of, at] = weight * np.concatenate([slopes, turned, found.left[..., None]], axis=2)
+    wide[of, at, :, :size], wide[of, at, :, size:-1] = weight * slopes, weight * turned
+    wide[of, at, :, -1] = weight[..., 0] * found.left
     flat = wide.reshape(many, -1, wide.shape[-1])
     one = attitude.marginalise(np.swapaxes(flat, 1, 2) @ flat, state.attitude[first:], variance)
     hessian, gradient, middle = (field.copy() for field in window.slots)
@@ -38,17 +39,17 @@ def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]
     state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
     left = found.left - (turned @ one.change[of][..., None])[..., 0]
     return level(state, first, one.change), Residuals(
-        found.row, found.slot, left, slopes, squares(found.row, left, log, 0.0)
+        found.row, found.slot, left, slopes, np.zeros(len(rows))
     )  # fmt: skip
 
 
 def level(state: WindowState, first: int, change: Floats) -> WindowState:
     """Level the log's measurements of the poses from `first` on by changes (K, A) [rad] of their attitudes."""
-    log, by = state.log, np.zeros((len(change), 3))
+    log, by, begin = state.log, np.zeros((len(change), 3)), state.cycle - state.window.num_poses + 1 + first
     by[:, : change.shape[1]] = change
-    slot = log.cycle - (state.cycle - state.window.num_poses + 1)
-    rows, seen, rotation = (slot >= first).nonzero()[0], log.seen.copy(), state.attitude.copy()
-    seen[rows, 1:] = attitude.levelled(seen[rows, 1:], by[slot[rows] - first])
+    late = slice(np.searchsorted(log.cycle, begin), None)
+    seen, rotation = log.seen.copy(), state.attitude.copy()
+    seen[late, 1:] = attitude.levelled(seen[late, 1:], by[log.cycle[late] - begin])
     rotation[first:] += by
     return state._replace(log=log._replace(seen=seen), attitude=rotation)
 

@@ -39,7 +39,7 @@ def weigh_tracks(
     place, _ = scatterer_positions(looks, poses)
     count = len(rows)
     sight = PanelObservation(
-        place, np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)), np.ones(count),
+        place, poses.tx[None].repeat(count, axis=0), poses.rx[None].repeat(count, axis=0), np.ones(count),
         np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)

@@ -1,6 +1,7 @@
 """Hypotheses of what caused a track: every kind of path with one new feature, with initial values; known walls as
 affine maps."""
 
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,9 +114,9 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
         (BESIDE, level, upright, NONE, NONE, tx, tx),
         (TWO_WALLS, np.full(len(pairs), NONE), image - (pairs @ tx[..., None])[..., 0], NONE, NONE, tx, tx),
     ]
-    kind, walled = _every(kinds, 0, ()), _every(kinds, 1, ())
-    start, *spots = (_every(kinds, column, (count, 3)) for column in (2, 5, 6))
-    legs = np.stack([_every(kinds, column, ()) for column in (3, 4)], axis=1)
+    kind, walled, *ends = (_every(kinds, column, np.int64) for column in (0, 1, 3, 4))
+    start, *spots = (_every(kinds, column, np.float64, count, 3) for column in (2, 5, 6))
+    legs = np.stack(ends, axis=1)
     turns, shifts, spreads = _over(known, legs, np.stack(spots, axis=1), middle)
     turns[kind == TWO_WALLS, :, 0] = pairs
     kind, walled = np.repeat(kind, count), np.repeat(walled, count)
@@ -128,9 +129,13 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
     return Hypotheses(kind, walled, np.full(len(kind), NONE), trials)
 
 
-def _every(kinds: list[Any], column: int, shape: tuple[int, ...]) -> Any:
+def _every(kinds: list[Any], column: int, dtype: Any, *shape: int) -> Any:
     """One column of the table of hypothesis kinds, broadcast to a shape for each of their known walls."""
-    return np.concatenate([np.broadcast_to(kind[column], (len(kind[1]), *shape)) for kind in kinds])
+    stop = list(accumulate(len(kind[1]) for kind in kinds))
+    found = np.empty((stop[-1], *shape), dtype)
+    for kind, begin, end in zip(kinds, [0, *stop], stop, strict=False):
+        found[begin:end] = kind[column]
+    return found
 
 
 def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:

@@ -84,7 +84,8 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         now = _equations(trials, summary, active, place[active], error[active], trust[active])
         cost[active] = now.cost
         if turn == STEPS:
-            covariance[active] = np.linalg.inv(now.normal)[:, common:, common:]
+            last = np.eye(now.normal.shape[-1])[:, common:]
+            covariance[active] = np.linalg.solve(now.normal, last)[:, common:]
             held[active] = np.linalg.inv(now.normal[:, common:, common:])
             log_det[active] = np.linalg.slogdet(now.normal)[1]
             break

@@ -41,33 +41,34 @@ def log_unheard(
     slot = log.cycle - (context.cycle - len(where) + 1)
     seen = log.seen.copy()
     seen[:, 1:] = (rotation_z(ends.heading[slot]) @ rays(log.seen, 0.0)[..., None])[:, :2, 0]
-    for row in rows.tolist():
-        out = reflect(ends.tx, np.broadcast_to(place[row], ends.tx.shape), summary.middle) - ends.rx
-        length = np.linalg.norm(out, axis=1)
-        due = np.concatenate([length[:, None], out[:, :2] / length[:, None]], axis=1)
-        off = seen - due[slot]
-        off[:, 0] = scene.sensor.nearest(off[:, 0])
-        doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[row])[-1])
-        near = scene.sensor.cell_length + doubt * np.array([1.0, 1.0 / length[-1], 1.0 / length[-1]])
-        present = np.zeros(len(where), dtype=np.bool_)
-        present[slot[(np.abs(off) < near).all(axis=1)]] = True
-        shows = _shows(context, table, row, length, summary) * (out[:, 2] > -CONSTANTS.dip * length)
+    out = reflect(ends.tx, place[rows, None], summary.middle) - ends.rx
+    length = np.linalg.norm(out, axis=2)
+    due = np.concatenate([length[..., None], out[..., :2] / length[..., None]], axis=2)
+    off = seen - due[:, slot]
+    off[..., 0] = scene.sensor.nearest(off[..., 0])
+    doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[rows])[:, -1:])
+    near = scene.sensor.cell_length + doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
+    wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()
+    present = np.zeros(length.shape, dtype=np.bool_)
+    present[wall, slot[heard]] = True
+    shows = _shows(context, table, rows, length, summary) * (out[..., 2] > -CONSTANTS.dip * length)
+    for number, row in enumerate(rows.tolist()):
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
-        found[row] = log_silence(shows[span], present[span])
+        found[row] = log_silence(shows[number, span], present[number, span])
     return found
 
 
-def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, summary: TrackSummary) -> Floats:
-    """Detection probability (K,) of single-bounce returns of lengths (K,) [m] over the wall of hypothesis `row`, whose
-    reflectivity follows from the track's amplitude."""
-    radio, track, wall = context.scene.radio, table.trials.track[row], table.known[row]
+def _shows(context: WindowState, table: Hypotheses, rows: Integers, length: Floats, summary: TrackSummary) -> Floats:
+    """Detection probability (N, K) of single-bounce returns of lengths (N, K) [m] over the walls of hypotheses `rows`
+    (N,), whose reflectivity follows from their tracks' amplitudes."""
+    radio, track, wall = context.scene.radio, table.trials.track[rows], table.known[rows]
     told = summary.log_amplitude[track] - free_space(radio) + np.log(summary.mean[0][track, 0])
     noise = context.landmarks.ratio_variance[wall] + CONSTANTS.fading**2
     gain = CONSTANTS.wall_ratio_std**2 / (CONSTANTS.wall_ratio_std**2 + noise)
     ratio = CONSTANTS.wall_ratio + gain * (told - context.landmarks.ratio[wall] - CONSTANTS.wall_ratio)
-    std = np.full(len(length), np.sqrt(gain * noise + CONSTANTS.fading**2))
-    sensor, level = context.scene.sensor, free_space(radio) - np.log(length) + ratio
+    std = np.sqrt(gain * noise + CONSTANTS.fading**2)[:, None]
+    sensor, level = context.scene.sensor, free_space(radio) - np.log(length) + ratio[:, None]
     reported = sensor.in_window(sensor.heard_as(length) / SPEED_OF_LIGHT)
     return np.asarray(CONSTANTS.shown * detection_probability(level, std, sensor) * reported)
 

@@ -164,7 +164,7 @@ def _starts(found: Rates, told: Floats) -> Floats:
     x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
     y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
     every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * CONSTANTS.walk]
-    level, cell = _agreement(found, every, told[2])[0].sum(axis=1), np.round(every / NEAR) @ [1.0, 1e6]
+    level, cell = np.log(_likelihoods(found, every, told[2])[0]).sum(axis=1), np.round(every / NEAR) @ [1.0, 1e6]
     order = np.argsort(-level, kind="stable")
     _, first = np.unique(cell[order], return_index=True)
     return np.concatenate([told[None, :2], every[order[np.sort(first)[:MOST]]]])
@@ -174,9 +174,9 @@ NEAR, MOST = 0.01, 8
 """Difference [m/s] up to which initial velocities are one, and how many of them are refined."""
 
 
-def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
-    """Log likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and the weights (S, T)
-    with which they agree."""
+def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats, Floats]:
+    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, T) of the
+    two ways to agree with their variances (2, S, T)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
@@ -185,20 +185,23 @@ def _agreement(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Fl
     likely = 0.25 * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
     close = likely.sum(axis=0)
     kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
-    either = close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk))
-    return np.log(either), (likely / either_way).sum(axis=0) / either
+    return close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk)), likely, either_way
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
     """Nearest maxima of the velocity's posterior from initial velocities (S, 2), under a prior about `told` (3,) of
     covariance `spread` (2, 2), with Laplace's evidence there."""
     flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * told[2]
-    v, prior = start.copy(), np.linalg.inv(spread)
+    v, prior, squares = start, np.linalg.inv(spread), (flat[:, :, None] * flat[:, None, :]).reshape(-1, 4)
     for last in (False,) * 6 + (True,):
-        either, weight = _agreement(found, v, told[2])
-        normal = np.einsum("st,ti,tj->sij", weight, flat, flat) + prior
+        either, likely, variance = _likelihoods(found, v, told[2])
+        weight = (likely / variance).sum(axis=0) / either  # with which the tracks agree
+        one, both, _, two = (weight @ squares + prior.ravel()).T  # the normal matrix's numbers
+        det = one * two - both**2
         if last:
             break
-        v = np.linalg.solve(normal, ((weight * rate) @ flat + prior @ told[:2])[..., None])[..., 0]
-    evidence = either.sum(axis=1) + np.log(2.0 * np.pi) - 0.5 * np.linalg.slogdet(normal)[1]
-    return _Modes(v, np.linalg.inv(normal), evidence + _log_normal(v - told[:2], spread))
+        x, y = ((weight * rate) @ flat + prior @ told[:2]).T
+        v = np.stack([two * x - both * y, one * y - both * x], axis=1) / det[:, None]
+    evidence = np.log(either).sum(axis=1) + np.log(2.0 * np.pi) - 0.5 * np.log(det)
+    covariance = np.stack([two, -both, -both, one], axis=1).reshape(-1, 2, 2) / det[:, None, None]
+    return _Modes(v, covariance, evidence + _log_normal(v - told[:2], spread))

@@ -181,8 +181,8 @@ def _identities(
     count = len(points)
     amplitude, side = np.append(np.exp(observed.log_amplitude), 1.0), np.append(observed.sides, UNTOLD)
     sight = PanelObservation(
-        spread_places(window.features[points], blocks), np.tile(poses.tx, (count, 1)), np.tile(poses.rx, (count, 1)),
-        np.ones(count), amplitude[heard], side[heard], heard >= 0,
+        spread_places(window.features[points], blocks), poses.tx[None].repeat(count, axis=0),
+        poses.rx[None].repeat(count, axis=0), np.ones(count), amplitude[heard], side[heard], heard >= 0,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
     fresh = weigh(landmarks.identity.take(points), sight, gain, scene.sensor).clipped()

@@ -14,7 +14,7 @@ from rislam_rt.model.sensor import detection_probability as detection_probabilit
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, compact, linearise, observe, reflect
+from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, bounced, compact, linearise, observe, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
@@ -144,15 +144,13 @@ def panel_gains(
     """Magnitudes (R,) of the path gains of returns over one panel under its phase code, with walls that reflect without
     loss."""
     legs, center = returns.legs, features[returns.legs[:, 0]]
-    ends = []
-    for device, gain in ((poses.tx, radio.tx_gain), (poses.rx, radio.rx_gain)):
-        end = np.tile(device, (len(legs), 1))
-        for column in (2, 1):
-            rows = (legs[:, column] != NONE).nonzero()[0]
-            walls = legs[rows, column]
-            end[rows] = reflect(end[rows], features[walls], landmarks.anchor[walls])
-        ends.append(leg_response(spec, center, end, np.sqrt(gain), radio.wavelength))
-    return np.abs(panel_gain(ends[0][returns.tx], ends[1][returns.rx], code))
+    ends = np.repeat([[poses.tx], [poses.rx]], len(legs), axis=1)
+    for column in (2, 1):
+        rows, walls = bounced(legs, column)
+        ends[:, rows] = reflect(ends[:, rows], features[walls], landmarks.anchor[walls])
+    gain = np.sqrt([[radio.tx_gain], [radio.rx_gain]])
+    tx, rx = leg_response(spec, center, ends, gain, radio.wavelength)
+    return np.abs(panel_gain(tx[returns.tx], rx[returns.rx], code))
 
 
 def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorModel) -> Floats:

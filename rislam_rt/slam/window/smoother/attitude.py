@@ -7,6 +7,7 @@ cosines are levelled. The deviations are learnt: each is one of a ladder of leve
 marginal likelihood of each cycle's innovations, as those of the motion modes do.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,13 @@ AXES = np.array([0, 0, 1])
 
 def levels() -> Floats:
     """Standard deviations (L,) [rad] of the attitude's levels, half a decade apart up to the largest."""
-    return np.asarray(CONSTANTS.sway * 10.0 ** (-0.5 * np.arange(SWAYS)[::-1]))
+    return _levels(CONSTANTS.sway)
+
+
+@lru_cache(maxsize=4)
+def _levels(largest: float) -> Floats:
+    """`levels` up to a given one [rad], cached."""
+    return np.asarray(largest * 10.0 ** (-0.5 * np.arange(SWAYS)[::-1]))
 
 
 def first_levels(*, compass: bool) -> Floats:
@@ -54,10 +61,14 @@ def jacobian(cosines: Floats, axes: int) -> Floats:
 
 def levelled(cosines: Floats, rotation: Floats) -> Floats:
     """Cosines (N, 2) turned by rotation vectors (N, 3) [rad] into the axes of a body without these rotations."""
-    x, y = cosines[:, 0], cosines[:, 1]
-    ray = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))], axis=1)
-    once = np.cross(rotation, ray)
-    return np.asarray((ray + once + 0.5 * np.cross(rotation, once))[:, :2])
+    x, y = cosines.T
+    up = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))
+    one, two, three = rotation.T
+    # the first two numbers of r + w x r + w x (w x r) / 2
+    along, across, rise = two * up - three * y, three * x - one * up, one * y - two * x
+    return np.stack(
+        [x + along + 0.5 * (two * rise - three * across), y + across + 0.5 * (three * along - one * rise)], axis=1
+    )
 
 
 def spread(cosines: Floats, covariance: Floats) -> Floats:
@@ -86,9 +97,8 @@ def next_levels(before: Floats, told: Attitude) -> Floats:
     np.fill_diagonal(move, CONSTANTS.stay)
     found, axes = before @ move, AXES[: len(before) + 1]
     expected, size = variance(found), len(axes)
-    every = np.tile(expected, (len(before), SWAYS, 1))
-    for chain in range(len(before)):
-        every[chain][:, axes == chain] = levels()[:, None] ** 2
+    chain = np.arange(len(before))[:, None, None]
+    every = np.where(axes == chain, levels()[:, None] ** 2, expected)
     information, slope = told.information[0], told.slope[0]
     inner = information + np.eye(size) / every[..., None, :]
     gain = slope @ np.linalg.solve(inner, np.broadcast_to(slope[:, None], (*every.shape, 1)))[..., 0][..., None]
@@ -114,11 +124,10 @@ def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal
     from products (K, S + A + 1, S + A + 1) of the slopes by pose and features, those by attitude, and residuals."""
     axes = len(variance)
     own, by, out = slice(-1 - axes, -1), slice(0, product.shape[-1] - 1 - axes), -1
-    information = product[:, own, own] + np.diag(1.0 / variance)
-    gain = np.linalg.solve(information, product[:, own, by])
-    pull = product[:, own, out] - rotation[:, :axes] / variance
-    change = np.asarray(np.linalg.solve(information, pull[..., None])[..., 0], dtype=np.float64)
-    cross = product[:, by, own]
+    right, cross = product[:, own].copy(), product[:, by, own]
+    right[..., out] -= rotation[:, :axes] / variance
+    found = np.asarray(np.linalg.solve(right[..., own] + np.diag(1.0 / variance), right), dtype=np.float64)
+    gain, change = found[..., by], found[..., out]
     slope = product[:, by, out] - (cross @ change[..., None])[..., 0]
     return Marginal(product[:, by, by] - cross @ gain, slope, change)
 

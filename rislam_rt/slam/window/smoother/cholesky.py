@@ -25,6 +25,14 @@ def solution(matrix: Floats, right: Floats) -> Floats:
     return np.asarray(found)
 
 
+def form_and_log_det(matrix: Floats, right: Floats) -> tuple[float, float]:
+    """Quadratic form `b^T A^-1 b` of a symmetric positive definite matrix (D, D) and a vector (D,), and the logarithm
+    of the matrix's determinant."""
+    factor = _factorise(matrix)
+    half, _ = scipy.linalg.lapack.dtrtrs(factor, right, lower=1)
+    return float(half @ half), 2.0 * float(np.log(factor.diagonal()).sum())
+
+
 def inverse(matrix: Floats) -> Floats:
     """Inverse (D, D) of a symmetric positive definite matrix, exactly symmetric."""
     inside, _ = scipy.linalg.lapack.dpotri(_factorise(matrix), lower=1, overwrite_c=1)

@@ -36,7 +36,13 @@ def is_level_only() -> Booleans:
 def first_motion_mode(sigma_a: float) -> Floats:
     """Initial probabilities (L,) of the motion modes: highest for the one nearest to the told acceleration `sigma_a`
     [m/s^2], a third as high for each mode farther off."""
-    nearest = int(np.argmin(np.abs(np.log(ladder() / max(sigma_a, CONSTANTS.level)))))
+    return _first(max(sigma_a, CONSTANTS.level), CONSTANTS.level, CONSTANTS.liveliest)
+
+
+@lru_cache(maxsize=4)
+def _first(sigma_a: float, calmest: float, liveliest: float) -> Floats:
+    """`first_motion_mode` on the ladder between given ends [m/s^2], cached."""
+    nearest = int(np.argmin(np.abs(np.log(_ladder(calmest, liveliest) / sigma_a))))
     weight = 3.0 ** -np.abs(np.arange(MODES) - nearest).astype(np.float64)
     return np.asarray(weight / weight.sum())
 

@@ -24,8 +24,9 @@ def basis(steps: bytes, turns: bool) -> Floats:
     after = np.arange(count)[:, None] > np.arange(len(step))
     reach = np.where(after, 0.5 * step**2 + step * (time[:, None] - time[1:]), 0.0)
     moved = np.concatenate([np.ones((count, 1)), time[:, None], reach], axis=1)
-    turned = np.concatenate([np.ones((count, 1)), np.zeros((count, 1)), np.where(after, step, 0.0)], axis=1)
-    found = np.stack([moved] * 3 + [turned] * turns)
+    found = np.stack([moved] * (3 + turns))
+    if turns:
+        found[TURN, :, 1], found[TURN, :, 2:] = 0.0, np.where(after, step, 0.0)
     found.flags.writeable = False
     return found
 

@@ -25,6 +25,7 @@ from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.motion_basis import (
+    FIRST,
     HEAD,
     ONE,
     POSE,
@@ -132,10 +133,11 @@ def _basis(window: Window) -> Floats:
 def poses(window: Window) -> Floats:
     """Positions [m] and compass offsets [rad] of the window's poses (K, 4)."""
     free = window.accel.shape[1]
-    numbers = np.concatenate([window.head[[0, 1, 2, 6]][:free, None], np.zeros((free, 1)), window.accel.T], axis=1)
-    numbers[:3, 1] = window.head[3:6]
-    found = np.full((window.num_poses, POSE), window.head[6])
-    found[:, :free] = (_basis(window) @ numbers[..., None])[..., 0].T
+    numbers, found = np.zeros((free, window.num_poses + 1, 1)), np.empty((window.num_poses, POSE))
+    numbers[:, 0, 0], numbers[:, 2:, 0] = window.head[FIRST[:free]], window.accel.T
+    numbers[:3, 1, 0] = window.head[3:6]
+    found[:, TURN] = window.head[6]
+    found[:, :free] = (_basis(window) @ numbers)[..., 0].T
     return found
 
 
@@ -227,7 +229,7 @@ def slide(window: Window) -> Window:
     first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
     oldest = Quadratic(*(field[0] for field in window.slots))
-    hessian[np.ix_(first, first)] += oldest.hessian
+    hessian[first[:, None], first] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, accel = float(window.step[0]), window.accel[0]
@@ -249,7 +251,7 @@ def slide(window: Window) -> Window:
     covariance = window.covariance.copy()
     covariance[:HEAD] = carry @ covariance[moved]
     covariance[:, :HEAD] = covariance[:, moved] @ carry.T
-    covariance = np.delete(np.delete(covariance, slice(size, size + free), axis=0), slice(size, size + free), axis=1)
+    covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
         head=head,
         accel=window.accel[1:],
@@ -260,7 +262,7 @@ def slide(window: Window) -> Window:
         prior=prior,
         noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
-        covariance=covariance,
+        covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1),
     )
 
 
@@ -291,17 +293,20 @@ def solve(window: Window, *, spread: bool = True) -> Window:
 def _normal(window: Window) -> tuple[Floats, Floats]:
     """Hessian and gradient of the sliding window's whole cost (priors and measurements) by the head and the
     accelerations."""
-    size, (steps, free) = len(window.head), window.accel.shape
-    place = poses(window)
-    spot = np.concatenate([place, np.broadcast_to(window.head[HEAD:], (len(place), size - HEAD))], axis=1)
-    slope, slots = window.slots.slope(spot), window.slots.hessian
+    size, (steps, free), slots = len(window.head), window.accel.shape, window.slots.hessian
+    spot = np.empty(slots.shape[:2])
+    spot[:, :POSE], spot[:, POSE:] = poses(window), window.head[HEAD:]
+    slope = window.slots.slope(spot)
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
     along, start, edge = _basis(window), head_order(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
-    both = back[one] @ (slots[:, one, two].T[..., None] * along[two])
+    weight = slots[:, one, two].T[..., None]
+    both = back[0] @ (weight[:6] * along[0])  # the room's axes share one basis
+    if free > TURN:
+        both = np.concatenate([both, back[TURN] @ (weight[6:] * along)])
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
     inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
