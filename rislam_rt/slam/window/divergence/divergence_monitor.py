@@ -108,8 +108,8 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
 
 def with_free_compass(window: Window, std: float) -> Window:
     """Sliding window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the
-    least rate of turn."""
-    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
+    least rate of turn where none was estimated."""
+    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, int(not window.turns)))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
     window = window._replace(accel=np.pad(window.accel, still), surplus=np.pad(window.surplus, still))
