@@ -158,9 +158,9 @@ def _associate_over_motions(
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
     if best.surprise > MISSED and window.turns and (window.step[-1:] > 0.0).any():
-        by = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
+        angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
         trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
-        trial = divergence_monitor.turned(trial, by)
+        trial = divergence_monitor.turned(trial, angle)
         view = view_of(trial)
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial
