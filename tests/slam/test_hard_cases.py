@@ -65,15 +65,23 @@ def test_faults_would_be_noticed() -> None:
     assert not hard._not_covariance(np.diag([1.0, 0.0])[None])
 
 
-def _led(kind: str, seed: int, most: int = 12) -> Any:
-    """What the window filter makes of a case at its default settings."""
+def _led(kind: str, seed: int, most: int = 12, **settings: Any) -> Any:
+    """What the window filter makes of a case at its default settings, or others."""
     case = hard.draw_case(kind, seed, "window", most=most)
-    return hard.run_case(case._replace(config=hard.SlamConfig(filter="window", use_vt=True)))
+    return hard.run_case(case._replace(config=hard.SlamConfig(filter="window", **settings)))
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("speed wrong by 0.3 m/s", 2), ("compass wrong by 0.5 rad", 4)])
-def test_a_start_told_wrong_is_said_and_mended(kind: str, seed: int) -> None:
-    verdict = _led(kind, seed)
+@pytest.mark.parametrize(
+    ("kind", "seed", "heading"),
+    [
+        ("speed wrong by 0.3 m/s", 2, "known"),
+        ("speed wrong by 0.3 m/s", 2, "estimated"),
+        ("compass wrong by 0.5 rad", 4, "known"),
+    ],
+)
+def test_a_start_told_wrong_is_said_and_mended(kind: str, seed: int, heading: str) -> None:
+    """With and without a compass: the first tracks tell the velocity in the axes of the body."""
+    verdict = _led(kind, seed, heading=heading)
     assert verdict.said
     assert not verdict.lost
     assert verdict.outcomes[-1] == "ok"
@@ -90,9 +98,16 @@ def test_a_jump_is_said_and_landed_from(seed: int) -> None:
     assert verdict.std < 0.1
 
 
+@pytest.mark.parametrize("heading", ["known", "estimated"])
+def test_a_picture_that_moves_while_no_time_passes_is_said(heading: str) -> None:
+    """No estimate can follow: what does not take any time is no motion."""
+    assert _led("no time passes", 4, heading=heading).said
+
+
+@pytest.mark.parametrize("heading", ["known", "estimated"])
 @pytest.mark.parametrize("seed", [4, 5])
-def test_nothing_wrong_is_not_called_lost(seed: int) -> None:
-    assert not _led("nothing wrong", seed, 20).said
+def test_nothing_wrong_is_not_called_lost(seed: int, heading: str) -> None:
+    assert not _led("nothing wrong", seed, 20, heading=heading).said
 
 
 def test_a_picture_turned_about_ends_the_map_and_begins_another() -> None:

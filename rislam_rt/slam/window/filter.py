@@ -133,8 +133,8 @@ def smoothed(state: WindowState) -> Floats:
 def _associate_over_motions(
     state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
 ) -> tuple[WindowState, CycleAssociation]:
-    """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, or a jump in
-    position, and return the state and association of the likeliest.
+    """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, a turn of the body
+    that no compass tells, or a jump in position, and return the state and association of the likeliest.
 
     A jump has to explain the cycle better than being lost does, which explains nothing.
     """
@@ -157,6 +157,13 @@ def _associate_over_motions(
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
+    if best.surprise > MISSED and window.turns and (window.step[-1:] > 0.0).any():
+        angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
+        trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
+        trial = divergence_monitor.turned(trial, angle)
+        view = view_of(trial)
+        if view.score + divergence_monitor.log_turn() > best.score:
+            best, window = view, trial
     if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best

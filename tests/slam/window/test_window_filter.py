@@ -106,13 +106,14 @@ def test_hindsight_is_no_worse_and_ends_where_the_filter_does(run):
     assert np.sqrt(np.mean(off[0] ** 2)) < np.sqrt(np.mean(off[1] ** 2))
 
 
-def _walk(config, cycles, *, start, turn=0.0, landmarks=True, rng):
-    """Some cycles of the paper's room without its panel: estimates and the true motion, of a body that turns."""
+def _walk(config, cycles, *, start, turned=0.0, landmarks=True, rng):
+    """Some cycles of the paper's room without its panel: estimates and the true motion, of a body that has `turned`
+    (K,) [rad]."""
     scene = load_scene(ROOM)
     motion = scene.agent[:cycles]
     motion = replace(
         motion, position=motion.position + np.array([1.7, 0.9, 0.4]),
-        heading=motion.heading[0] + turn * (motion.time - motion.time[0]),
+        heading=np.broadcast_to(motion.heading[0] + turned, cycles),
     )  # fmt: skip
     radio = with_reference_snr(RadioConfig(), 13.0)
     room = replace(scene, agent=motion, scatterers=scene.scatterers if landmarks else ())
@@ -144,10 +145,22 @@ def test_wall_returns_that_are_thrown_away_move_nothing():
 @pytest.mark.slow
 def test_a_turning_body_needs_no_compass():
     rng, config = np.random.default_rng(6), replace(CONFIG, heading="estimated")
-    found, motion = _walk(config, 40, start=_told, turn=0.2, rng=rng)
+    found, motion = _walk(config, 40, start=_told, turned=0.02 * np.arange(40), rng=rng)
     off = np.array([estimate.heading for estimate in found]) - motion.heading
     # a wall's direction is told to about 0.02 rad by one component; there are four walls and more
     assert np.abs(off[25:]).max() < 0.02
+    assert np.linalg.norm(found[-1].position - motion.position[-1]) < 0.02
+    assert len(found[-1].map.wall_offset) >= 3
+
+
+@pytest.mark.parametrize("rate", [-4.0, 2.5])
+def test_a_turn_on_the_spot_that_no_compass_tells_is_followed(rate):
+    """Radians in a second, from one cycle to the next: beyond all gates, and the map explains all of it."""
+    rng, config = np.random.default_rng(6), replace(CONFIG, heading="estimated")
+    turned = 0.1 * rate * np.clip(np.arange(34) - 25, 0, 4)
+    found, motion = _walk(config, 34, start=_told, turned=turned, rng=rng)
+    off = np.exp(1j * (np.array([estimate.heading for estimate in found]) - motion.heading))
+    assert np.abs(np.angle(off[20:])).max() < 0.02  # as before: what one component tells of a wall's direction
     assert np.linalg.norm(found[-1].position - motion.position[-1]) < 0.02
     assert len(found[-1].map.wall_offset) >= 3
 

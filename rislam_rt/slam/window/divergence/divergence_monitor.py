@@ -16,7 +16,7 @@ from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
-from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 
 CELL = 0.01
@@ -65,6 +65,37 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
     return by if float(by @ by) > CELL**2 else np.zeros(3)
 
 
+def turn(view: CycleAssociation, observed: Observations, cell: float) -> float:
+    """Turn of the body [rad] on which most pairs of predicted and measured directions agree, of paths alike in length
+    (within `cell` [m]), elevation and amplitude; 0 where there is none."""
+    lead = view.groups.leader
+    expected, heard = view.expected.seen[lead], observed.seen
+    alike = np.abs(heard[:, 0] - expected[:, 0, None]) < cell
+    alike &= np.abs(observed.log_amplitude - view.groups.log_amplitude[:, None]) < 10.0 * ALIKE
+    flat, seen = expected[:, 1] + 1j * expected[:, 2], heard[:, 1] + 1j * heard[:, 2]
+    # what arrives from above tells no azimuth
+    alike &= (np.abs(np.abs(seen) - np.abs(flat)[:, None]) < ALIKE) & (np.abs(flat)[:, None] > ALIKE)
+    row, column = alike.nonzero()
+    by = np.exp(1j * np.angle(flat[row] * seen[column].conj()))
+    agree = np.abs(by[:, None] - by) < ALIKE
+    count = [len(np.unique(row[near])) for near in agree]
+    if max(count, default=0) < FEWEST:
+        return 0.0
+    return float(np.angle(by[agree[int(np.argmax(count))]].sum()))
+
+
+def log_turn() -> float:
+    """Prior log probability of an unannounced turn by one certain angle (within `ALIKE`), all alike."""
+    return CONSTANTS.log_rare + float(np.log(ALIKE / (2.0 * np.pi)))
+
+
+def turned(window: Window, by: float) -> Window:
+    """Sliding window with its last heading turned by `by` [rad]: where its next solution is linearised."""
+    accel = window.accel.copy()
+    accel[-1, TURN] += by / window.step[-1]
+    return window._replace(accel=accel)
+
+
 def log_jump() -> float:
     """Prior log probability of a jump to one certain place (`CELL`), as far as the agent walks in a second."""
     return CONSTANTS.log_lost + 2.0 * float(np.log(CELL / CONSTANTS.walk))
@@ -108,8 +139,8 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
 
 def with_free_compass(window: Window, std: float) -> Window:
     """Sliding window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the
-    least rate of turn."""
-    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, 1))
+    least rate of turn where none was estimated."""
+    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, int(not window.turns)))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
     window = window._replace(accel=np.pad(window.accel, still), surplus=np.pad(window.surplus, still))

@@ -12,6 +12,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import CYCLE
@@ -21,8 +22,8 @@ PAST = 10
 
 
 def is_checked(state: WindowState) -> bool:
-    """Whether the motion can be checked: with a compass, whose offset is not estimated, told of in every cycle."""
-    return len(state.level) <= 2 and len(state.heading) == state.window.num_poses
+    """Whether the motion can be checked: with a heading for every pose of the window."""
+    return len(state.heading) == state.window.num_poses
 
 
 def check_start(state: WindowState) -> egomotion.StartCheck | None:
@@ -30,8 +31,7 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
     window = state.window
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
-    place = window_gaussian.poses(window)[:, :3]
-    found = egomotion.rates(state.log, state.heading, place, step, _baseline(state))
+    found = _rates(state, slice(None), step)
     if len(found.rate) < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
@@ -66,10 +66,23 @@ def _latest_rates(state: WindowState) -> egomotion.Rates | None:
     cycles, time = _latest(state.window)
     if cycles < egomotion.MEASURED - 1:
         return None
-    rows = slice(-1 - cycles, None)
-    place = window_gaussian.poses(state.window)[rows, :3]
-    found = egomotion.rates(state.log, state.heading[rows], place, time / cycles, _baseline(state))
+    found = _rates(state, slice(-1 - cycles, None), time / cycles)
     return found if len(found.rate) >= egomotion.FEWEST else None
+
+
+def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
+    """Rates of path lengths over the window's poses `rows`, `step` [s] apart, seen under the estimated headings.
+
+    Where the heading is estimated, its deviation turns all directions: each rate by twice the way across.
+    """
+    window, body = state.window, state.scene.body
+    pose = window_gaussian.poses(window)[rows]
+    baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
+    found = egomotion.rates(state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step, baseline)
+    if not window.turns:
+        return found
+    heading_std = np.sqrt(np.diag(pose_covariance(window, TURN))[rows].max())
+    return found._replace(blur=np.hypot(found.blur, 2.0 * heading_std))
 
 
 def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
@@ -86,8 +99,3 @@ def _latest(window: Window) -> tuple[int, float]:
     """Number of the last `PAST` cycles, or as many as there are, and how long [s] they took."""
     step = window.step[-PAST:]
     return len(step), float(step.sum()) or len(step) * CYCLE  # where the clock stands still, as usual
-
-
-def _baseline(state: WindowState) -> float:
-    """Distance [m] between Tx and Rx."""
-    return float(np.linalg.norm(state.scene.body.tx_offset - state.scene.body.rx_offset))

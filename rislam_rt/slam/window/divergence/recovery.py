@@ -36,11 +36,13 @@ def check_motion(state: WindowState) -> tuple[WindowState, bool]:
         return state._replace(window=divergence_monitor.with_velocity(state.window, told.velocity, told.std)), True
     # a compass that was wrong is not trusted: its offset is estimated from now on
     window = divergence_monitor.with_free_compass(state.window, told.std / float(np.linalg.norm(told.velocity)))
-    still = motion.first_motion_mode(0.0)[None]
-    return state._replace(
-        window=window, heading=state.heading + told.turn, turned=state.turned + told.turn,
-        motion_mode=np.concatenate([state.motion_mode, still]), level=np.concatenate([state.level, still]),
-    ), True  # fmt: skip
+    state = state._replace(heading=state.heading + told.turn, turned=state.turned + told.turn)
+    if not state.window.turns:
+        still = motion.first_motion_mode(0.0)[None]
+        state = state._replace(
+            motion_mode=np.concatenate([state.motion_mode, still]), level=np.concatenate([state.level, still])
+        )
+    return state._replace(window=window), True
 
 
 def restart(state: WindowState) -> WindowState:

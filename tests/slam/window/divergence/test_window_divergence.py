@@ -198,3 +198,28 @@ def test_a_look_elsewhere_moves_the_last_pose_alone():
     )
     np.testing.assert_allclose(window_gaussian.now(there)[0][3:6], window_gaussian.now(window)[0][3:6], atol=1e-9)
     np.testing.assert_allclose(window_gaussian.now(there)[0][HEAD:], window_gaussian.now(window)[0][HEAD:])
+
+
+@pytest.mark.parametrize("by", [-2.8, 0.3, 1.7])
+def test_a_turn_is_read_from_directions_of_paths_alike_in_length(by):
+    """Of eight paths three arrive elsewhere. Mirrored directions are no turn, and what comes from above tells none."""
+    rng = np.random.default_rng(8)
+    length, angle = np.linspace(2.0, 9.0, 8), rng.uniform(-np.pi, np.pi, 8)
+    flat = rng.uniform(0.4, 0.9, 8)
+
+    def cosines(azimuth):
+        return np.stack([length, flat * np.cos(azimuth), flat * np.sin(azimuth)], axis=1)
+
+    view = SimpleNamespace(
+        expected=SimpleNamespace(seen=cosines(angle)),
+        groups=SimpleNamespace(leader=np.arange(8), log_amplitude=np.zeros(8)),
+    )  # fmt: skip
+
+    def heard(azimuth):
+        return SimpleNamespace(seen=cosines(azimuth), log_amplitude=np.zeros(8))
+
+    away = np.where(np.arange(8) < 3, rng.uniform(-np.pi, np.pi, 8), angle - by)
+    assert divergence_monitor.turn(view, heard(away), 0.3) == pytest.approx(by, abs=1e-6)
+    assert divergence_monitor.turn(view, heard(-angle), 0.01) == 0.0
+    flat[:] = 0.05
+    assert divergence_monitor.turn(view, heard(angle - by), 0.3) == 0.0
