@@ -93,13 +93,34 @@ def match(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    share = np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
+    share = _share(tracks, cycle)
     odds = np.log(share / (1.0 + CONSTANTS.rare - share))
+    steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
-        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
+        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady
     )
     rows, columns = cheapest(pair_costs(candidates, observed.take(free), GATE, strangers))
     return rows, free[columns]
+
+
+def _share(tracks: WindowTracks, cycle: int) -> Floats:
+    """Share (T,) of the cycles since a track began, and so the probability, in which it is detected."""
+    return np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
+
+
+def density(tracks: WindowTracks, observed: Observations, sway: Floats, cycle: int) -> Floats:
+    """Expected density (M,) of components that continue the predicted tracks, at each component of a cycle, per metre,
+    unit of each cosine and e-fold of amplitude; tracks that are likely the panel's count for little.
+
+    `sway` (M, 3) is the variance that the body's attitude gives to length and cosines.
+    """
+    variance = tracks.covariance[:, None, :, 0, 0] + observed.std**2 + sway
+    square = ((observed.seen - tracks.mean[:, None, :, 0]) ** 2 / variance).sum(axis=-1)
+    wander = WANDER**2 + observed.log_amplitude_std**2
+    square += (observed.log_amplitude - tracks.log_amplitude[:, None]) ** 2 / wander
+    log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
+    other = 1.0 / (1.0 + np.exp(np.logaddexp.reduce(tracks.log_ris, axis=1)))
+    return np.asarray((other * _share(tracks, cycle)) @ np.exp(-0.5 * square - log_norm))
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
