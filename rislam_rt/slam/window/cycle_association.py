@@ -24,6 +24,7 @@ from rislam_rt.slam.window.smoother import attitude, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
+from rislam_rt.slam.window.tracks import Continuations
 
 
 class CycleAssociation(NamedTuple):
@@ -88,12 +89,12 @@ FAR_STRONGER = 1.0
 def associate_cycle(
     window: Window, landmarks: WindowTable, visibility: VisibilityObservations, heading: float,
     scene: KnownEnvironment, code: RisCode | None,
-    observed: Observations, strangers: Floats, sway: Floats, tracked: Floats | None = None,
+    observed: Observations, strangers: Floats, sway: Floats, beside: Continuations | None = None,
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters.
 
-    `strangers` (M,) is the density of clutter at each component, `tracked` (M,) that of tracks that would go on there,
-    `sway` (A,) the variance of the attitude.
+    `strangers` (M,) is the density of clutter at each component, `sway` (A,) the variance of the attitude; `beside` says
+    where tracks go on, where a panel is known and no component tells whether it ran over it.
     """
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
@@ -105,6 +106,9 @@ def associate_cycle(
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
     lead = groups.leader
+    untold = np.isin(expected.forms[lead, 0], [row for row in landmarks.panels if row >= 0]) & (beside is not None)
+    if beside is not None:
+        groups = _absorbed(groups, expected, untold.nonzero()[0], beside, scene.sensor.cell_length)
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
@@ -113,7 +117,7 @@ def associate_cycle(
     view = CycleAssociation(
         mean, held, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead],
-        *_untold(expected.forms[lead], landmarks, observed, strangers, tracked), nobody, nobody, 0.0, 0.0,
+        untold, _rivals(untold, strangers, beside), nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
     alone, found = groups.by_itself == 1.0, np.zeros(len(lead), dtype=np.bool_)
@@ -123,20 +127,27 @@ def associate_cycle(
     return view._replace(row=row, pick=pick, score=score, surprise=float(surprise))
 
 
-def _untold(
-    forms: Integers, landmarks: WindowTable, observed: Observations, strangers: Floats, tracked: Floats | None
-) -> tuple[Booleans, Floats]:
-    """Which paths (C,) of forms (C, 5) run over a panel where no component tells, and the log factor (C, M) by which
-    components are likelier to be strangers to these, as they may continue tracks.
+def _absorbed(
+    groups: UnresolvedClusters, expected: ExpectedComponents, rows: Integers, beside: Continuations, cell: Floats
+) -> UnresolvedClusters:
+    """Clusters of which those in `rows`, over a panel, come out by themselves only if no louder track goes on in their
+    cell: a wall's return that the map lacks."""
+    lead, alone = groups.leader[rows], groups.by_itself.copy()
+    inside = (np.abs(expected.seen[lead, None] - beside.seen) < cell).all(axis=-1)
+    louder = inside & (beside.log_amplitude > groups.log_amplitude[rows, None])
+    alone[rows] *= np.where(louder, np.maximum(1.0 - beside.share, CONSTANTS.rare), 1.0).prod(axis=1)
+    return groups._replace(by_itself=alone)
+
+
+def _rivals(untold: Booleans, strangers: Floats, beside: Continuations | None) -> Floats:
+    """Log factor (C, M) by which components are likelier to be strangers to clusters over a panel, as they may continue
+    tracks.
 
     The code in force changes such a path's amplitude from cycle to cycle, so that its prediction would fit much: the
     return of a wall that the map lacks, near by and louder, is known by its track.
     """
-    untold = np.isin(forms[:, 0], [row for row in landmarks.panels if row >= 0]) & (observed.side is None)
-    rivals = np.zeros((len(forms), len(observed.seen)))
-    if tracked is not None and untold.any():
-        rivals[untold] = np.log1p(tracked / strangers)
-    return untold, rivals
+    more = np.zeros(len(strangers)) if beside is None else np.log1p(beside.density / strangers)
+    return np.asarray(untold[:, None] * more)
 
 
 def _median(values: Floats) -> Floats:

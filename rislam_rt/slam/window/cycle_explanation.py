@@ -208,15 +208,16 @@ def _predicted(before: WindowTracks, speed: float, dt: float, turn: float, bend:
     return tracks.advance(before, dt, turn, np.array([2.0 * bend + speed**2, 0.1, 0.1]))
 
 
-def tracked_density(state: WindowState, observed: Observations, dt: float, turn: float, bend: float) -> Floats | None:
-    """Density (M,) of tracks that would go on at each component (see `tracks.density`); None where components tell
-    whether they ran over a panel, or none is known."""
+def beside_panels(
+    state: WindowState, observed: Observations, dt: float, turn: float, bend: float
+) -> tracks.Continuations | None:
+    """Where tracks are expected to go on in a cycle that is about to be associated; None where components tell whether
+    they ran over a panel, or none is known."""
     if observed.side is not None or max(state.landmarks.panels) < 0:
         return None
     speed = float(np.linalg.norm(window_gaussian.now(state.window)[0][3:6]))
-    ahead = _predicted(state.tracks, speed, dt, turn, bend)
     sway = attitude.spread(observed.seen[:, 1:], np.diag(state.attitude_variance))
-    return tracks.density(ahead, observed, sway, state.cycle)
+    return tracks.continuations(_predicted(state.tracks, speed, dt, turn, bend), observed, sway, state.cycle)
 
 
 def _follow(

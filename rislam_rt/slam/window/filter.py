@@ -14,6 +14,7 @@ from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import motion_learning, tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
 from rislam_rt.slam.window.cycle_explanation import (
+    beside_panels,
     components_to_explain,
     innovations,
     learn_cycle,
@@ -22,7 +23,6 @@ from rislam_rt.slam.window.cycle_explanation import (
     outcome_of,
     remove_or_add_features,
     reweigh_wall_returns,
-    tracked_density,
     unexplained,
 )
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
@@ -85,8 +85,8 @@ def step(
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
-    tracked = tracked_density(state, observed, dt, turn, bend)
-    state, view = _associate_over_motions(state, heading, code, observed, strangers, tracked)
+    beside = beside_panels(state, observed, dt, turn, bend)
+    state, view = _associate_over_motions(state, heading, code, observed, strangers, beside)
     state, used = log_associations(state, observed, view)
     state, left, nis, uncertain = _solve(state, view, used)
     heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
@@ -134,7 +134,7 @@ def smoothed(state: WindowState) -> Floats:
 
 def _associate_over_motions(
     state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats,
-    tracked: Floats | None,
+    beside: tracks.Continuations | None,
 ) -> tuple[WindowState, CycleAssociation]:  # fmt: skip
     """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, or a jump in
     position, and return the state and association of the likeliest.
@@ -145,7 +145,7 @@ def _associate_over_motions(
     def view_of(window: Window) -> CycleAssociation:
         return associate_cycle(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers,
-            state.attitude_variance, tracked,
+            state.attitude_variance, beside,
         )  # fmt: skip
 
     calm = best = view_of(state.window)

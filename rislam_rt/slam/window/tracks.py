@@ -108,19 +108,29 @@ def _share(tracks: WindowTracks, cycle: int) -> Floats:
     return np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
 
 
-def density(tracks: WindowTracks, observed: Observations, sway: Floats, cycle: int) -> Floats:
-    """Expected density (M,) of components that continue the predicted tracks, at each component of a cycle, per metre,
-    unit of each cosine and e-fold of amplitude; tracks that are likely the panel's count for little.
+class Continuations(NamedTuple):
+    """Components with which T tracks are expected to go on in a cycle of M components, if they are not a panel's."""
 
-    `sway` (M, 3) is the variance that the body's attitude gives to length and cosines.
-    """
+    density: Floats
+    """(M,) their density at each component, per metre, unit of each cosine and e-fold of amplitude."""
+    seen: Floats
+    """(T, 3) predicted length [m] and cosines."""
+    log_amplitude: Floats
+    """(T,) log amplitude of the last measurement."""
+    share: Floats
+    """(T,) probability that the track is detected, and not a panel's."""
+
+
+def continuations(tracks: WindowTracks, observed: Observations, sway: Floats, cycle: int) -> Continuations:
+    """Where tracks, predicted to the cycle of some components, are expected to go on; `sway` (M, 3) is the variance
+    that the body's attitude gives to length and cosines."""
     variance = tracks.covariance[:, None, :, 0, 0] + observed.std**2 + sway
     square = ((observed.seen - tracks.mean[:, None, :, 0]) ** 2 / variance).sum(axis=-1)
     wander = WANDER**2 + observed.log_amplitude_std**2
     square += (observed.log_amplitude - tracks.log_amplitude[:, None]) ** 2 / wander
     log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
-    other = 1.0 / (1.0 + np.exp(np.logaddexp.reduce(tracks.log_ris, axis=1)))
-    return np.asarray((other * _share(tracks, cycle)) @ np.exp(-0.5 * square - log_norm))
+    share = _share(tracks, cycle) / (1.0 + np.exp(tracks.log_ris).sum(axis=1))
+    return Continuations(share @ np.exp(-0.5 * square - log_norm), tracks.mean[..., 0], tracks.log_amplitude, share)
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
