@@ -93,8 +93,8 @@ def associate_cycle(
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters.
 
-    `strangers` (M,) is the density of clutter at each component, `sway` (A,) the variance of the attitude; `beside` says
-    where tracks go on, where a panel is known and no component tells whether it ran over it.
+    `strangers` (M,) is the density of clutter at each component, `sway` (A,) the variance of the attitude. `beside`
+    says where tracks go on, if a panel is known and no component tells whether it ran over it.
     """
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
