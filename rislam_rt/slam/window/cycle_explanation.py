@@ -202,14 +202,30 @@ class _Followed(NamedTuple):
     """...and of those among them that are detected in this one."""
 
 
+def _predicted(before: WindowTracks, speed: float, dt: float, turn: float, bend: float) -> WindowTracks:
+    """Tracks predicted over a step `dt` [s] in which the body turns by `turn` [rad]; `speed` [m/s] and `bend` [m/s^2]
+    are those of the agent."""
+    return tracks.advance(before, dt, turn, np.array([2.0 * bend + speed**2, 0.1, 0.1]))
+
+
+def beside_panels(
+    state: WindowState, observed: Observations, dt: float, turn: float, bend: float
+) -> tracks.Continuations | None:
+    """Where tracks are expected to go on in a cycle that is about to be associated; None where components tell whether
+    they ran over a panel, or none is known."""
+    if observed.side is not None or max(state.landmarks.panels) < 0:
+        return None
+    speed = float(np.linalg.norm(window_gaussian.now(state.window)[0][3:6]))
+    sway = attitude.spread(observed.seen[:, 1:], np.diag(state.attitude_variance))
+    return tracks.continuations(_predicted(state.tracks, speed, dt, turn, bend), observed, sway, state.cycle)
+
+
 def _follow(
     state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
 ) -> _Followed:
     """Continue, begin and end tracks with the components of a cycle that no path of the map explains."""
     speed = float(np.linalg.norm(mean[3:6]))
-    length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
-    drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
-    found = tracks.advance(state.tracks, dt, turn, drift)
+    found = _predicted(state.tracks, speed, dt, turn, bend)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
     found = tracks.extend(found, rows, observed, picks, state.cycle)

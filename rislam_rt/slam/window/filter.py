@@ -14,6 +14,7 @@ from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import motion_learning, tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
 from rislam_rt.slam.window.cycle_explanation import (
+    beside_panels,
     components_to_explain,
     innovations,
     learn_cycle,
@@ -83,8 +84,9 @@ def step(
     heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
-    state, view = _associate_over_motions(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
+    beside = beside_panels(state, observed, dt, turn, bend)
+    state, view = _associate_over_motions(state, heading, code, observed, strangers, beside)
     state, used = log_associations(state, observed, view)
     state, left, nis, uncertain = _solve(state, view, used)
     heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
@@ -131,8 +133,9 @@ def smoothed(state: WindowState) -> Floats:
 
 
 def _associate_over_motions(
-    state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
-) -> tuple[WindowState, CycleAssociation]:
+    state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats,
+    beside: tracks.Continuations | None,
+) -> tuple[WindowState, CycleAssociation]:  # fmt: skip
     """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, a turn of the body
     that no compass tells, or a jump in position, and return the state and association of the likeliest.
 
@@ -142,7 +145,7 @@ def _associate_over_motions(
     def view_of(window: Window) -> CycleAssociation:
         return associate_cycle(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers,
-            state.attitude_variance,
+            state.attitude_variance, beside,
         )  # fmt: skip
 
     calm = best = view_of(state.window)

@@ -93,13 +93,44 @@ def match(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    share = np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
+    share = _share(tracks, cycle)
     odds = np.log(share / (1.0 + CONSTANTS.rare - share))
+    steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
-        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
+        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady
     )
     rows, columns = cheapest(pair_costs(candidates, observed.take(free), GATE, strangers))
     return rows, free[columns]
+
+
+def _share(tracks: WindowTracks, cycle: int) -> Floats:
+    """Share (T,) of the cycles since a track began, and so the probability, in which it is detected."""
+    return np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
+
+
+class Continuations(NamedTuple):
+    """Components with which T tracks are expected to go on in a cycle of M components, if they are not a panel's."""
+
+    density: Floats
+    """(M,) their density at each component, per metre, unit of each cosine and e-fold of amplitude."""
+    seen: Floats
+    """(T, 3) predicted length [m] and cosines."""
+    log_amplitude: Floats
+    """(T,) log amplitude of the last measurement."""
+    share: Floats
+    """(T,) probability that the track is detected, and not a panel's."""
+
+
+def continuations(tracks: WindowTracks, observed: Observations, sway: Floats, cycle: int) -> Continuations:
+    """Where tracks, predicted to the cycle of some components, are expected to go on; `sway` (M, 3) is the variance
+    that the body's attitude gives to length and cosines."""
+    variance = tracks.covariance[:, None, :, 0, 0] + observed.std**2 + sway
+    square = ((observed.seen - tracks.mean[:, None, :, 0]) ** 2 / variance).sum(axis=-1)
+    wander = WANDER**2 + observed.log_amplitude_std**2
+    square += (observed.log_amplitude - tracks.log_amplitude[:, None]) ** 2 / wander
+    log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
+    share = _share(tracks, cycle) / (1.0 + np.exp(tracks.log_ris).sum(axis=1))
+    return Continuations(share @ np.exp(-0.5 * square - log_norm), tracks.mean[..., 0], tracks.log_amplitude, share)
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
