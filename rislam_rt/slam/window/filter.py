@@ -173,7 +173,11 @@ def _solve(
     innovation, and the covariance (A, A) [rad^2] of the attitude."""
     axes = len(state.attitude_variance)
     innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
-    told = attitude.likelihood(innovation, jacobian, view.covariance, turned, state.attitude_variance)
+    sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
+    told = attitude.likelihood(
+        innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
+        state.attitude_variance,
+    )  # fmt: skip
     state = state._replace(sway=attitude.next_levels(state.sway, told))
     variance, last = state.attitude_variance, state.window.num_poses - 1
     covariance = np.linalg.inv(told.information[0] + np.diag(1.0 / variance))

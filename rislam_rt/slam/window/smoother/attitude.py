@@ -123,6 +123,15 @@ def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal
     return Marginal(product[:, by, by] - cross @ gain, slope, change)
 
 
+def change(product: Floats, rotation: Floats, variance: Floats) -> Floats:
+    """Changes (K, A) [rad] of the attitudes of K cycles, whose estimates are `rotation` (K, 3) and whose prior
+    variances are (A,), with poses and features as they are, from products (K, A + 1, A + 1) of the slopes by attitude
+    and residuals."""
+    information = product[:, :-1, :-1] + np.diag(1.0 / variance)
+    pull = product[:, :-1, -1] - rotation[:, : len(variance)] / variance
+    return np.asarray(np.linalg.solve(information, pull[..., None])[..., 0])
+
+
 def likelihood(left: Floats, jacobian: Floats, covariance: Floats, slopes: Floats, prior: Floats) -> Attitude:
     """What innovations `left` (N, 3) tell of the rotation vector of their cycle by slopes (N, 3, A), all in standard
     deviations, while pose and map are uncertain by `covariance` (D, D) through `jacobian` (N, 3, D).
