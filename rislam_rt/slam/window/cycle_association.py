@@ -11,6 +11,7 @@ from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_r
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
+from rislam_rt.slam.window.horizon_detection import expected_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
@@ -21,6 +22,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
+from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
@@ -42,6 +44,8 @@ class CycleAssociation(NamedTuple):
     """Their clusters, C of them."""
     clear: Floats
     """(R,) probability that nothing occludes each return..."""
+    above: Floats
+    """(R,) ...that it arrives above the plane of the array..."""
     scatter: Floats
     """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
@@ -87,7 +91,7 @@ def associate_cycle(
     observed: Observations, strangers: Floats, sway: Floats,
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters;
-    `strangers` is the density of clutter at each component, `sway` (A,) the variance of the attitude."""
+    `strangers` is the density of clutter at each component, `sway` (C, L) the level probabilities of the attitude."""
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
@@ -95,16 +99,17 @@ def associate_cycle(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
     )
     clear, scatter = recall(visibility, expected, landmarks)
+    above = expected_above(expected.elevation, prior_tilts(sway))
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
-    groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
+    groups = cluster(expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER))
     lead = groups.leader
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
-    extra += attitude.spread(expected.seen[lead, 1:], np.diag(sway))
+    extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, held, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
+        mean, held, poses, expected, groups, clear, above, scatter, visible(expected, groups, clear * above), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
@@ -113,6 +118,23 @@ def associate_cycle(
     due = view.shows[alone]
     surprise = (due.sum() - found[alone].sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
     return view._replace(row=row, pick=pick, score=score, surprise=float(surprise))
+
+
+def with_tilts(view: CycleAssociation, tilts: Tilts) -> tuple[CycleAssociation, Floats]:
+    """Association of a cycle whose returns are above the plane of the array as what is heard tells, by one of `tilts`
+    for all; and the level probabilities (L,) of the tilt's deviation.
+
+    Returns that share a cell do not tell which of them is heard, and are not asked.
+    """
+    expected, groups = view.expected, view.groups
+    lone = (groups.partner < 0) & (groups.by_itself == 1.0)
+    asked, heard = np.zeros((2, len(expected.seen)), dtype=np.bool_)
+    asked[groups.leader[lone]] = True
+    heard[groups.leader[view.row]] = True
+    shows = CONSTANTS.shown * expected.detection * view.clear
+    found = weigh_tilts(expected.elevation, shows, asked, heard, tilts)
+    fresh = visible(expected, groups, view.clear * found.above)
+    return view._replace(above=found.above, shows=fresh, score=view.score + found.gain), found.level
 
 
 def _median(values: Floats) -> Floats:

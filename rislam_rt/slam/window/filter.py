@@ -12,7 +12,7 @@ from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import motion_learning, tracks
-from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again, with_tilts
 from rislam_rt.slam.window.cycle_explanation import (
     components_to_explain,
     innovations,
@@ -86,7 +86,7 @@ def step(
     state, view = _associate_over_motions(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
     state, used = log_associations(state, observed, view)
-    state, left, nis, uncertain = _solve(state, view, used)
+    state, view, left, nis, uncertain = _solve(state, view, used)
     heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
     jumped = state.lost_log_odds == 0.0
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
@@ -142,7 +142,7 @@ def _associate_over_motions(
     def view_of(window: Window) -> CycleAssociation:
         return associate_cycle(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers,
-            state.attitude_variance,
+            state.sway,
         )  # fmt: skip
 
     calm = best = view_of(state.window)
@@ -167,10 +167,10 @@ def _associate_over_motions(
 
 def _solve(
     state: WindowState, view: CycleAssociation, used: Booleans
-) -> tuple[WindowState, Residuals, float, Floats]:  # fmt: skip
+) -> tuple[WindowState, CycleAssociation, Residuals, float, Floats]:  # fmt: skip
     """Update the window with a cycle's associated components by two Gauss-Newton steps, the first on the association's
-    predictions; re-linearises all poses every few cycles, else the last one. Also returns residuals, squared
-    innovation, and the covariance (A, A) [rad^2] of the attitude."""
+    predictions; re-linearises all poses every few cycles, else the last one. Also returns the association with what
+    the attitude makes of it, residuals, squared innovation, and the covariance (A, A) [rad^2] of the attitude."""
     axes = len(state.attitude_variance)
     innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
@@ -178,7 +178,9 @@ def _solve(
         innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
         state.attitude_variance,
     )  # fmt: skip
-    state = state._replace(sway=attitude.next_levels(state.sway, told))
+    sway = attitude.next_levels(state.sway, told)
+    view, sway[0] = with_tilts(view, attitude.tilts(sway, told))
+    state = state._replace(sway=sway)
     variance, last = state.attitude_variance, state.window.num_poses - 1
     covariance = np.linalg.inv(told.information[0] + np.diag(1.0 / variance))
     rotation = covariance @ told.slope[0]
@@ -193,4 +195,5 @@ def _solve(
     left = left._replace(
         square=squares(left.row, left.left, state.log, prediction_variance(window, left.slot, left.slopes))
     )
-    return motion_learning.learn_motion(state._replace(window=window)), left, float(np.sum(innovation**2)), covariance
+    state = motion_learning.learn_motion(state._replace(window=window))
+    return state, view, left, float(np.sum(innovation**2)), covariance

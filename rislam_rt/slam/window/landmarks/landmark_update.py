@@ -95,19 +95,20 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
-    groups: UnresolvedClusters, clear: Floats, scatter: Floats, shows: Floats, row: Integers,
+    groups: UnresolvedClusters, clear: Floats, above: Floats, scatter: Floats, shows: Floats, row: Integers,
     pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
     """Update of occlusion, existence, strengths and panel identities after clusters `row` (A,) were detected as
     components `pick` (A,) with residuals of mean square `raw` (A,), and the other clusters missed.
 
-    `clear` (R,) and `scatter` (R,) are what was recalled of the returns.
+    `clear` (R,) and `scatter` (R,) are what was recalled of the returns, `above` (R,) the probability that they arrive
+    above the plane of the array.
     """
     if not len(expected.seen):
         return visibility, landmarks
     hit = np.zeros(len(groups.leader), dtype=np.bool_)
     hit[row] = True
-    detection = CONSTANTS.shown * expected.detection
+    detection = CONSTANTS.shown * expected.detection * above
     missed = clear * (1.0 - detection) / (1.0 - clear * detection)
     after, scatter = clear.copy(), scatter.copy()
     told = hit | (groups.by_itself == 1.0)
