@@ -55,7 +55,8 @@ def init(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
         motion_mode, motion_mode,
-        np.array([start.heading]), np.zeros((1, 3)), attitude.first_levels(compass=not turns),
+        np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
+        attitude.first_levels(compass=not turns),
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
@@ -106,12 +107,12 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
-    rotation = state.attitude
+    rotation, told = state.attitude, state.attitude_information
     while window.num_poses >= CONSTANTS.window:
         motion_mode = motion.forward(motion_mode, motion_learning.likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
-        rotation = rotation[1:]
+        rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
         window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
@@ -121,6 +122,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
         attitude=np.concatenate([rotation, np.zeros((1, 3))]),
+        attitude_information=np.concatenate([told, np.zeros((1, *told.shape[1:]))]),
     )  # fmt: skip
 
 
@@ -180,9 +182,10 @@ def _solve(
     )  # fmt: skip
     sway = attitude.next_levels(state.sway, told)
     view, sway[0] = with_tilts(view, attitude.tilts(sway, told))
-    state = state._replace(sway=sway)
+    known = np.concatenate([state.attitude_information[:-1], told.information])
+    state = state._replace(sway=sway, attitude_information=known)
     variance, last = state.attitude_variance, state.window.num_poses - 1
-    covariance = np.linalg.inv(told.information[0] + np.diag(1.0 / variance))
+    covariance = state.attitude_covariance[-1]
     rotation = covariance @ told.slope[0]
     state = level(state, last, rotation[None])
     innovation = innovation - turned @ rotation

@@ -15,6 +15,7 @@ from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.horizon_detection import Elevations, above, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.state import WindowState
@@ -52,10 +53,22 @@ def log_unheard(
         present = np.zeros(len(where), dtype=np.bool_)
         present[slot[(np.abs(off) < near).all(axis=1)]] = True
         shows = _shows(context, table, row, length, summary) * (out[:, 2] > -CONSTANTS.dip * length)
+        rise, std = out[:, 2] / length, np.sqrt(spread[row, 2, 2]) / length
+        ray = (rotation_z(-ends.heading) @ (out / length[:, None])[..., None])[..., 0]
+        shows = shows * _above(context, elevations(rise, std, ray[:, :2]))
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
         found[row] = log_silence(shows[span], present[span])
     return found
+
+
+def _above(context: WindowState, returns: Elevations) -> Floats:
+    """Probability (K,) that the returns of the window's cycles, one each, arrive above the plane of the array."""
+    if context.scene.radio.array.pattern != "upper":
+        return np.ones(len(returns.rise))
+    lift = np.vecdot(returns.slopes, context.attitude[:, :2])
+    variance = (returns.slopes[:, None] @ context.attitude_covariance[:, :2, :2] @ returns.slopes[..., None])[:, 0, 0]
+    return above(returns, lift, variance)
 
 
 def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, summary: TrackSummary) -> Floats:
