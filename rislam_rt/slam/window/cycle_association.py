@@ -13,7 +13,7 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
 from rislam_rt.slam.window.horizon_detection import expected_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, recall_rises, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -46,6 +46,8 @@ class CycleAssociation(NamedTuple):
     """(R,) probability that nothing occludes each return..."""
     above: Floats
     """(R,) ...that it arrives above the plane of the array..."""
+    rises: Floats
+    """(R, Z) ...the log likelihoods of its elevation (`horizon_detection`)..."""
     scatter: Floats
     """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
@@ -99,7 +101,8 @@ def associate_cycle(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
     )
     clear, scatter = recall(visibility, expected, landmarks)
-    above = expected_above(expected.elevation, prior_tilts(sway))
+    rises = recall_rises(visibility, expected, landmarks)
+    above = expected_above(expected.elevation, rises, prior_tilts(sway))
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     groups = cluster(expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER))
     lead = groups.leader
@@ -109,7 +112,7 @@ def associate_cycle(
     extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, held, poses, expected, groups, clear, above, scatter, visible(expected, groups, clear * above), extra,
+        mean, held, poses, expected, groups, clear, above, rises, scatter, visible(expected, groups, clear * above), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
@@ -132,9 +135,10 @@ def with_tilts(view: CycleAssociation, tilts: Tilts) -> tuple[CycleAssociation, 
     asked[groups.leader[lone]] = True
     heard[groups.leader[view.row]] = True
     shows = CONSTANTS.shown * expected.detection * view.clear
-    found = weigh_tilts(expected.elevation, shows, asked, heard, tilts)
+    found = weigh_tilts(expected.elevation, view.rises, shows, asked, heard, tilts)
     fresh = visible(expected, groups, view.clear * found.above)
-    return view._replace(above=found.above, shows=fresh, score=view.score + found.gain), found.level
+    view = view._replace(above=found.above, rises=found.log_like, shows=fresh, score=view.score + found.gain)
+    return view, found.level
 
 
 def _median(values: Floats) -> Floats:

@@ -119,7 +119,7 @@ def learn_cycle(
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
     visibility, landmarks = update_landmarks(
-        state.visibility, landmarks, state.window, expected, groups, view.clear, view.above, view.scatter, view.shows, row, pick,
+        state.visibility, landmarks, state.window, expected, groups, view.clear, view.above, view.rises, view.scatter, view.shows, row, pick,
         raw, observed, view.poses,
         state.scene, code,
     )  # fmt: skip

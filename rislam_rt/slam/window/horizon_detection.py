@@ -1,9 +1,9 @@
 """Horizon detection: whether a return arrives above the plane of an array that looks up, while the body sways.
 
 An array that looks up is blind below its own plane. Returns of upright walls are level: a body that sways turns some of
-them below that plane, those of one side at a time. A return whose elevation is known within a normal deviation, and
-that a level body hears, arrives above the plane of a tilted one with a probability in closed form. Which returns are
-heard in a cycle and which are not tells, the other way round, how the body is tilted in it.
+them below that plane, those of one side at a time. Which returns are heard in a cycle and which are not tells how the
+body is tilted in it; and over the cycles, whether a return comes in level or from a little above, of which direction
+cosines know next to nothing.
 """
 
 from typing import NamedTuple
@@ -16,12 +16,14 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.attitude import Tilts
 
-FARTHEST = 6.0
-"""Standard deviations of elevation beyond which a return stays above the plane: a limit of computation (1e-9)."""
+RISES = 1e-3 * np.array([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 27.0, 33.0, 40.0])
+"""Sines (Z,) of elevation at which a density of it is held, up to twice the largest deviation of the tilt."""
+WIDTHS = np.gradient(RISES)
+"""Width (Z,) that each stands for."""
 
 
 class Elevations(NamedTuple):
-    """Predicted elevations of returns for a level body."""
+    """Predicted elevations of R returns for a level body, by the map alone."""
 
     rise: Floats
     """(R,) sine of the elevation..."""
@@ -30,44 +32,59 @@ class Elevations(NamedTuple):
     slopes: Floats
     """(R, 2) derivatives by roll and pitch."""
 
-    def near(self, largest: float) -> Booleans:
-        """Which returns (R,) a tilt of up to `largest` [rad] may turn below the plane of the array."""
-        return np.asarray(self.rise < largest + FARTHEST * self.std)
-
 
 def elevations(rise: Floats, std: Floats, cosines: Floats) -> Elevations:
     """Predicted elevations of returns of sines (R,), standard deviations (R,) and direction cosines (R, 2)."""
     return Elevations(rise, std, np.stack([-cosines[:, 1], cosines[:, 0]], axis=1))
 
 
-def above(returns: Elevations, lift: Floats, variance: Floats | float = 0.0) -> Floats:
-    """Probability (..., R) that returns which a level body hears arrive above the plane of one whose tilt lifts them by
-    sines `lift` (..., R), of that `variance`.
+def nothing_heard(count: int) -> Floats:
+    """Log likelihoods (R, Z) of the elevations of so many returns that were not looked for so far."""
+    return np.zeros((count, len(RISES)))
 
-    That a level body hears them cuts the normal density of their elevation off at the plane.
+
+class _Near(NamedTuple):
+    """Those returns whose detection a tilt may change."""
+
+    row: Floats
+    share: Floats
+    """(N, Z) probabilities of their elevations."""
+    slopes: Floats
+
+
+def _near(returns: Elevations, log_like: Floats) -> _Near:
+    """Returns that may come in nearly level, by the map and by the log likelihoods (R, Z) of what was heard of them.
+
+    A level body hears them: their elevation is at the plane at least.
     """
-    std = np.maximum(returns.std, ROUNDING)
-    margin = returns.rise + CONSTANTS.grazing
-    heard = scipy.special.log_ndtr(margin / std)
-    return np.exp(np.minimum(scipy.special.log_ndtr((margin + lift) / np.sqrt(std**2 + variance)) - heard, 0.0))
+    row = (returns.rise < RISES[-1] + 3.0 * returns.std).nonzero()[0]
+    off = (RISES - returns.rise[row, None]) / np.maximum(returns.std[row], WIDTHS[0])[:, None]
+    log_share = log_like[row] - 0.5 * off**2
+    share = WIDTHS * np.exp(log_share - log_share.max(axis=1, keepdims=True))
+    return _Near(row, share / share.sum(axis=1, keepdims=True), returns.slopes[row])
 
 
-ROUNDING = 1e-5
-"""Least standard deviation of an elevation: a tenth of a millimetre at ten metres."""
+def _above(near: _Near, tilts: Tilts) -> tuple[Floats, Booleans]:
+    """Probability (L, N, R) that near returns arrive above the plane of the array under each tilt, and whether they do
+    so at each elevation (L, N, R, Z)."""
+    over = (tilts.point @ near.slopes.T)[..., None] >= -CONSTANTS.grazing - RISES
+    return (over * near.share).sum(axis=-1), over
 
 
-def above_under(returns: Elevations, tilts: Tilts) -> Floats:
-    """Probability (L, N, R) that returns arrive above the plane of the array under each of some tilts."""
-    found = np.ones((*tilts.point.shape[:2], len(returns.rise)))
-    near = returns.near(float(np.abs(tilts.point).max())).nonzero()[0]
-    some = Elevations._make(field[near] for field in returns)
-    found[..., near] = above(some, tilts.point @ some.slopes.T)
+def expected_above(returns: Elevations, log_like: Floats, tilts: Tilts) -> Floats:
+    """Probability (R,) that returns arrive above the plane of the array, averaged over its tilts."""
+    near, found = _near(returns, log_like), np.ones(len(returns.rise))
+    found[near.row] = np.tensordot(tilts.weight, _above(near, tilts)[0], 2)
     return found
 
 
-def expected_above(returns: Elevations, tilts: Tilts) -> Floats:
-    """Probability (R,) that returns arrive above the plane of the array, averaged over its tilts."""
-    return np.tensordot(tilts.weight, above_under(returns, tilts), 2)
+def above_within(returns: Elevations, lift: Floats, variance: Floats) -> Floats:
+    """Probability (R,) that returns of which nothing was heard arrive above the plane of an array whose tilt lifts each
+    by a sine of mean `lift` (R,) and that `variance` (R,)."""
+    near, found = _near(returns, nothing_heard(len(returns.rise))), np.ones(len(returns.rise))
+    margin = lift[near.row, None] + CONSTANTS.grazing + RISES
+    found[near.row] = (near.share * scipy.special.ndtr(margin / np.sqrt(variance[near.row, None]))).sum(axis=1)
+    return found
 
 
 class HorizonEvidence(NamedTuple):
@@ -77,27 +94,40 @@ class HorizonEvidence(NamedTuple):
     """(L,) probabilities of the levels of the tilt's deviation."""
     above: Floats
     """(R,) probability that each return arrives above the plane, given what is heard of the other ones."""
+    log_like: Floats
+    """(R, Z) log likelihoods of the returns' elevations by all that was heard of them."""
     gain: float
     """Log likelihood of what is heard and what is not, all under one tilt, over that of each under a tilt of its
     own."""
 
 
-def weigh_tilts(returns: Elevations, shows: Floats, asked: Booleans, heard: Booleans, tilts: Tilts) -> HorizonEvidence:
+def weigh_tilts(
+    returns: Elevations, log_like: Floats, shows: Floats, asked: Booleans, heard: Booleans, tilts: Tilts
+) -> HorizonEvidence:
     """Weigh the tilts of a cycle by which of the returns that are `asked` (R,), and detected with probabilities
     `shows` (R,) were they above the plane, are `heard` (R,)."""
-    over = above_under(returns, tilts)
-    show, hit = shows * over, asked & heard
-    # what is heard may be something else there
-    chance = np.where(hit, CONSTANTS.rare + (1.0 - CONSTANTS.rare) * over, np.where(asked, 1.0 - show, 1.0))
-    apart = np.log(np.tensordot(tilts.weight, chance, 2)).sum()
-    log_like = np.log(chance).sum(axis=2)
-    weight = tilts.weight * np.exp(log_like - log_like.max())
+    near, above = _near(returns, log_like), np.ones(len(returns.rise))
+    (each, over), row, fresh = _above(near, tilts), near.row, log_like.copy()
+    chance = _chance(each, shows[row], asked[row], heard[row])
+    joint = np.log(chance).sum(axis=2)
+    weight = tilts.weight * np.exp(joint - joint.max())
     total = weight.sum()
-    weight /= total
-    silent = 1.0 / np.tensordot(weight, 1.0 / np.where(asked & ~heard, 1.0 - show, 1.0), 2)
-    rest = (1.0 - silent) / np.maximum(shows, CONSTANTS.rare)
-    found = np.where(asked & ~heard, np.minimum(rest, 1.0), np.tensordot(weight, over, 2))
-    return HorizonEvidence(weight.sum(axis=1), found, float(np.log(total) + log_like.max() - apart))
+    # each return by what the others tell
+    others = weight[..., None] / chance
+    others /= others.sum(axis=(0, 1))
+    above[row] = np.einsum("lnr,lnr->r", others, each)
+    by_rise = np.einsum("lnr,lnrz->zr", others, over)
+    fresh[row] += np.log(_chance(by_rise, shows[row], asked[row], heard[row])).T
+    apart = np.log(np.tensordot(tilts.weight, chance, 2)).sum()
+    gain = float(np.log(total) + joint.max() - apart)
+    return HorizonEvidence(weight.sum(axis=1) / total, above, fresh, gain)
+
+
+def _chance(above: Floats, shows: Floats, asked: Booleans, heard: Booleans) -> Floats:
+    """Probability (..., R) of what was heard of returns that arrive above the plane with probabilities `above`; what is
+    heard where a return should be may be something else."""
+    hit = CONSTANTS.rare + (1.0 - CONSTANTS.rare) * above
+    return np.where(asked, np.where(heard, hit, 1.0 - shows * above), 1.0)
 
 
 def prior_tilts(probability: Floats) -> Tilts:

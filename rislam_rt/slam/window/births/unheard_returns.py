@@ -15,7 +15,7 @@ from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.horizon_detection import Elevations, above, elevations
+from rislam_rt.slam.window.horizon_detection import Elevations, above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.state import WindowState
@@ -68,7 +68,7 @@ def _above(context: WindowState, returns: Elevations) -> Floats:
         return np.ones(len(returns.rise))
     lift = np.vecdot(returns.slopes, context.attitude[:, :2])
     variance = (returns.slopes[:, None] @ context.attitude_covariance[:, :2, :2] @ returns.slopes[..., None])[:, 0, 0]
-    return above(returns, lift, variance)
+    return above_within(returns, lift, variance)
 
 
 def _shows(context: WindowState, table: Hypotheses, row: int, length: Floats, summary: TrackSummary) -> Floats:
