@@ -48,6 +48,8 @@ class CycleAssociation(NamedTuple):
     """(R,) ...that it arrives above the plane of the array..."""
     rises: Floats
     """(R, Z) ...the log likelihoods of its elevation (`horizon_detection`)..."""
+    tilts: Tilts
+    """(of all) ...the tilts of the body..."""
     scatter: Floats
     """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
@@ -102,7 +104,8 @@ def associate_cycle(
     )
     clear, scatter = recall(visibility, expected, landmarks)
     rises = recall_rises(visibility, expected, landmarks)
-    above = expected_above(expected.elevation, rises, prior_tilts(sway))
+    tilts = prior_tilts(sway)
+    above = expected_above(expected.elevation, rises, tilts)
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     groups = cluster(expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER))
     lead = groups.leader
@@ -112,7 +115,7 @@ def associate_cycle(
     extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, held, poses, expected, groups, clear, above, rises, scatter, visible(expected, groups, clear * above), extra,
+        mean, held, poses, expected, groups, clear, above, rises, tilts, scatter, visible(expected, groups, clear * above), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
@@ -123,9 +126,9 @@ def associate_cycle(
     return view._replace(row=row, pick=pick, score=score, surprise=float(surprise))
 
 
-def with_tilts(view: CycleAssociation, tilts: Tilts) -> tuple[CycleAssociation, Floats]:
+def with_tilts(view: CycleAssociation, tilts: Tilts) -> CycleAssociation:
     """Association of a cycle whose returns are above the plane of the array as what is heard tells, by one of `tilts`
-    for all; and the level probabilities (L,) of the tilt's deviation.
+    for all.
 
     Returns that share a cell do not tell which of them is heard, and are not asked.
     """
@@ -137,8 +140,9 @@ def with_tilts(view: CycleAssociation, tilts: Tilts) -> tuple[CycleAssociation, 
     shows = CONSTANTS.shown * expected.detection * view.clear
     found = weigh_tilts(expected.elevation, view.rises, shows, asked, heard, tilts)
     fresh = visible(expected, groups, view.clear * found.above)
-    view = view._replace(above=found.above, rises=found.log_like, shows=fresh, score=view.score + found.gain)
-    return view, found.level
+    return view._replace(
+        above=found.above, rises=found.log_like, shows=fresh, score=view.score + found.gain, tilts=found.tilts
+    )
 
 
 def _median(values: Floats) -> Floats:

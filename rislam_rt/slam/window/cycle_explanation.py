@@ -18,6 +18,13 @@ from rislam_rt.slam.window.births.feature_removal import features_to_remove, rem
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
+from rislam_rt.slam.window.horizon_detection import (
+    Elevations,
+    level_above,
+    nothing_heard,
+    prior_tilts,
+    weigh_tilts,
+)
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
@@ -25,6 +32,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
+from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -111,8 +119,9 @@ def learn_cycle(
     taken[pick] = True
     if state.window.turns:
         turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
-    followed = _follow(state, view.mean, observed, (~taken).nonzero()[0], dt, turn, bend)
-    state = state._replace(tracks=followed.tracks, log=followed.log)
+    followed = _follow(state, view, observed, (~taken).nonzero()[0], dt, turn, bend)
+    sway = np.concatenate([followed.level[None], state.sway[1:]])
+    state = state._replace(tracks=followed.tracks, log=followed.log, sway=sway)
     if len(expected.seen) and len(observed.seen):
         odds = divergence_monitor.advance(state.lost_log_odds, view.score, followed.followed, followed.kept)
         state = state._replace(lost_log_odds=odds)
@@ -200,18 +209,24 @@ class _Followed(NamedTuple):
     """Number of tracks that were detected in the last cycle..."""
     kept: int
     """...and of those among them that are detected in this one."""
+    level: Floats
+    """(L,) probabilities of the levels of the tilt's deviation, by what the tracks tell as well."""
 
 
 def _follow(
-    state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
-) -> _Followed:
+    state: WindowState, view: CycleAssociation, observed: Observations, free: Integers, dt: float, turn: float,
+    bend: float,
+) -> _Followed:  # fmt: skip
     """Continue, begin and end tracks with the components of a cycle that no path of the map explains."""
-    speed = float(np.linalg.norm(mean[3:6]))
+    speed = float(np.linalg.norm(view.mean[3:6]))
     length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
     drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
     found = tracks.advance(state.tracks, dt, turn, drift)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
+    rise, tilts = tracks.nearly_level(found), view.tilts
+    if state.scene.radio.array.pattern == "upper":
+        tilts = _told_by_tracks(found, rise, rows, tilts)
     found = tracks.extend(found, rows, observed, picks, state.cycle)
     left = np.zeros(len(observed.seen), dtype=np.bool_)
     left[free], left[picks] = True, False
@@ -224,8 +239,22 @@ def _follow(
     base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
-    found = found.keep(tracks.alive(found, state.cycle))
-    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
+    above = level_above(tracks.nearly_level(found), prior_tilts(state.sway)) if len(found.ident) else np.ones((len(tilts.weight), 0))
+    level = tilts.weight.sum(axis=1)
+    found = found.keep(tracks.alive(found, state.cycle, above, level))
+    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()), level)
+
+
+def _told_by_tracks(found: WindowTracks, rise: Elevations, rows: Integers, tilts: Tilts) -> Tilts:
+    """Tilts of the cycle by which of the tracks go on, `rows` (A,), of those that were heard lately and more than
+    once; the panel's codes silence it for reasons of their own."""
+    if not len(found.ident):
+        return tilts
+    heard = np.zeros(len(found.ident), dtype=np.bool_)
+    heard[rows] = True
+    asked = (found.hits >= 2) & ~(found.log_ris > 0.0).any(axis=1)
+    shows = np.full(len(found.ident), CONSTANTS.shown * CONSTANTS.steady)
+    return weigh_tilts(rise, nothing_heard(len(shows)), shows, asked, heard, tilts).tilts
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:

@@ -181,7 +181,8 @@ def _solve(
         state.attitude_variance,
     )  # fmt: skip
     sway = attitude.next_levels(state.sway, told)
-    view, sway[0] = with_tilts(view, attitude.tilts(sway, told))
+    view = with_tilts(view, attitude.tilts(sway, told))
+    sway[0] = view.tilts.weight.sum(axis=1)
     known = np.concatenate([state.attitude_information[:-1], told.information])
     state = state._replace(sway=sway, attitude_information=known)
     variance, last = state.attitude_variance, state.window.num_poses - 1

@@ -87,11 +87,19 @@ def above_within(returns: Elevations, lift: Floats, variance: Floats) -> Floats:
     return found
 
 
+def level_above(returns: Elevations, tilts: Tilts) -> Floats:
+    """Probability (L, R) that returns of which nothing was heard arrive above the plane of the array, under each level
+    of the tilt's deviation."""
+    near, found = _near(returns, nothing_heard(len(returns.rise))), np.ones((len(tilts.weight), len(returns.rise)))
+    found[:, near.row] = _above(near, tilts)[0].mean(axis=1)
+    return found
+
+
 class HorizonEvidence(NamedTuple):
     """What the returns that were heard in a cycle, and those that were not, tell of the tilt, and the tilt of them."""
 
-    level: Floats
-    """(L,) probabilities of the levels of the tilt's deviation."""
+    tilts: Tilts
+    """The tilts with the weights that this leaves them."""
     above: Floats
     """(R,) probability that each return arrives above the plane, given what is heard of the other ones."""
     log_like: Floats
@@ -120,7 +128,7 @@ def weigh_tilts(
     fresh[row] += np.log(_chance(by_rise, shows[row], asked[row], heard[row])).T
     apart = np.log(np.tensordot(tilts.weight, chance, 2)).sum()
     gain = float(np.log(total) + joint.max() - apart)
-    return HorizonEvidence(weight.sum(axis=1) / total, above, fresh, gain)
+    return HorizonEvidence(tilts._replace(weight=weight / total), above, fresh, gain)
 
 
 def _chance(above: Floats, shows: Floats, asked: Booleans, heard: Booleans) -> Floats:

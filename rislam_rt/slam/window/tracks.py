@@ -9,6 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.window.horizon_detection import Elevations, elevations
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.solver_limits import GATE
 
@@ -136,16 +137,30 @@ def start(
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident
 
 
-def alive(tracks: WindowTracks, cycle: int) -> Booleans:
+def alive(tracks: WindowTracks, cycle: int, above: Floats, level: Floats) -> Booleans:
     """Whether each track (T,) has been missed for no longer than its share of detections lets expect: 3 cycles, or more
     for what comes and goes.
 
-    What is likelier the panel than not may be silent for long: its codes make it so.
+    A body that sways turns it below the plane of the array: it is above that with probabilities `above` (L, T) under
+    the levels of the tilt's deviation, of probabilities `level` (L,). What is likelier the panel than not may be silent
+    for long: its codes make it so.
     """
-    share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
-    patience = np.where(tracks.hits >= 4, CONSTANTS.log_rare / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
-    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), CONSTANTS.window, patience)
-    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
+    usual = 1.0 - CONSTANTS.rare ** (1.0 / 3.0)
+    share = np.minimum((tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0) / (level @ above), 1.0)
+    share = np.where(tracks.hits >= 4, np.clip(share, 1e-6, usual), usual)
+    silent = level @ (1.0 - share * above) ** np.maximum(cycle - tracks.last - 1e-6, 0.0)
+    coded = (tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2)
+    found = (silent >= CONSTANTS.rare) & (cycle - tracks.last <= CONSTANTS.window)
+    return np.asarray(found | (coded & (cycle - tracks.last <= CONSTANTS.window)))
+
+
+def nearly_level(tracks: WindowTracks) -> Elevations:
+    """Elevations of the tracks: those at the rim of the unit disc, within a deviation, are level as far as upright
+    walls are."""
+    seen, std = tracks.mean[..., 0], np.sqrt(tracks.covariance[:, 1, 0, 0])
+    radius = np.hypot(seen[:, 1], seen[:, 2]) + std
+    rise = np.sqrt(np.maximum(1.0 - radius**2, 0.0))
+    return elevations(rise, np.full(len(rise), CONSTANTS.lean), seen[:, 1:])
 
 
 def due(tracks: WindowTracks, cycle: int) -> Integers:
