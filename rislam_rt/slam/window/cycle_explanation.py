@@ -18,13 +18,7 @@ from rislam_rt.slam.window.births.feature_removal import features_to_remove, rem
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
-from rislam_rt.slam.window.horizon_detection import (
-    Elevations,
-    level_above,
-    nothing_heard,
-    prior_tilts,
-    weigh_tilts,
-)
+from rislam_rt.slam.window.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
@@ -123,7 +117,7 @@ def learn_cycle(
     sway = np.concatenate([followed.level[None], state.sway[1:]])
     state = state._replace(tracks=followed.tracks, log=followed.log, sway=sway)
     if len(expected.seen) and len(observed.seen):
-        odds = divergence_monitor.advance(state.lost_log_odds, view.score, followed.followed, followed.kept)
+        odds = divergence_monitor.advance(state.lost_log_odds, view.score, followed.silent, followed.kept)
         state = state._replace(lost_log_odds=odds)
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
@@ -201,14 +195,15 @@ def unexplained(state: WindowState, observed: Observations) -> float:
 
 
 class _Followed(NamedTuple):
-    """Tracks after a cycle, the log that names them, and how many of the last cycle's tracks went on."""
+    """Tracks after a cycle, the log that names them, and which of the last cycle's tracks went on."""
 
     tracks: WindowTracks
     log: Log
-    followed: int
-    """Number of tracks that were detected in the last cycle..."""
+    silent: Floats
+    """(S,) probabilities that tracks which were detected in the last cycle, and are not in this one, arrive above the
+    plane of the array..."""
     kept: int
-    """...and of those among them that are detected in this one."""
+    """...and the number of those that are detected in this one."""
     level: Floats
     """(L,) probabilities of the levels of the tilt's deviation, by what the tracks tell as well."""
 
@@ -224,9 +219,10 @@ def _follow(
     found = tracks.advance(state.tracks, dt, turn, drift)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
-    rise, tilts = tracks.nearly_level(found), view.tilts
-    if state.scene.radio.array.pattern == "upper":
-        tilts = _told_by_tracks(found, rise, rows, tilts)
+    horizon = _told_by_tracks(found, rows, view.tilts)
+    silent = late.copy()
+    silent[rows] = False
+    found = found._replace(rises=horizon.log_like)
     found = tracks.extend(found, rows, observed, picks, state.cycle)
     left = np.zeros(len(observed.seen), dtype=np.bool_)
     left[free], left[picks] = True, False
@@ -239,22 +235,21 @@ def _follow(
     base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
-    above = level_above(tracks.nearly_level(found), prior_tilts(state.sway)) if len(found.ident) else np.ones((len(tilts.weight), 0))
-    level = tilts.weight.sum(axis=1)
+    level = horizon.tilts.weight.sum(axis=1)
+    above = level_above(tracks.nearly_level(found), found.rises, prior_tilts(state.sway))
     found = found.keep(tracks.alive(found, state.cycle, above, level))
-    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()), level)
+    log = state.log._replace(track=track)
+    return _Followed(found, log, horizon.above[silent], int(late[rows].sum()), level)
 
 
-def _told_by_tracks(found: WindowTracks, rise: Elevations, rows: Integers, tilts: Tilts) -> Tilts:
-    """Tilts of the cycle by which of the tracks go on, `rows` (A,), of those that were heard lately and more than
-    once; the panel's codes silence it for reasons of their own."""
-    if not len(found.ident):
-        return tilts
+def _told_by_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonEvidence:
+    """Tilts of the cycle by which of the tracks go on, `rows` (A,), of those that were heard more than once; the
+    panel's codes silence it for reasons of their own."""
     heard = np.zeros(len(found.ident), dtype=np.bool_)
     heard[rows] = True
     asked = (found.hits >= 2) & ~(found.log_ris > 0.0).any(axis=1)
     shows = np.full(len(found.ident), CONSTANTS.shown * CONSTANTS.steady)
-    return weigh_tilts(rise, nothing_heard(len(shows)), shows, asked, heard, tilts).tilts
+    return weigh_tilts(tracks.nearly_level(found), found.rises, shows, asked, heard, tilts)
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:

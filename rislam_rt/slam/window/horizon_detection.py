@@ -87,10 +87,10 @@ def above_within(returns: Elevations, lift: Floats, variance: Floats) -> Floats:
     return found
 
 
-def level_above(returns: Elevations, tilts: Tilts) -> Floats:
-    """Probability (L, R) that returns of which nothing was heard arrive above the plane of the array, under each level
-    of the tilt's deviation."""
-    near, found = _near(returns, nothing_heard(len(returns.rise))), np.ones((len(tilts.weight), len(returns.rise)))
+def level_above(returns: Elevations, log_like: Floats, tilts: Tilts) -> Floats:
+    """Probability (L, R) that returns arrive above the plane of the array, under each level of the tilt's deviation,
+    before anything is heard in the cycle."""
+    near, found = _near(returns, log_like), np.ones((len(tilts.weight), len(returns.rise)))
     found[:, near.row] = _above(near, tilts)[0].mean(axis=1)
     return found
 

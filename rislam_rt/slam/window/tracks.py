@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window.horizon_detection import Elevations, elevations
+from rislam_rt.slam.window.horizon_detection import Elevations, elevations, nothing_heard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.solver_limits import GATE
 
@@ -48,6 +48,8 @@ class WindowTracks(NamedTuple):
     """(T, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
     """(T, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
+    rises: Floats
+    """(T, Z) log likelihoods of its elevation, by when it was heard (see `horizon_detection`)."""
     next_ident: int
     """Number of the next track."""
 
@@ -66,7 +68,7 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
-        *unknown(0, panels), 0,
+        *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
 
 
@@ -131,7 +133,7 @@ def start(
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
         observed.log_amplitude[picks],
         observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
+        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident
