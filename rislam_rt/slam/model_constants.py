@@ -63,10 +63,6 @@ class ModelConstants(NamedTuple):
     liveliest: float = 1.0
     """Standard deviation [m/s^2] of the horizontal acceleration in the liveliest mode: a person turns on the spot."""
 
-    grazing: float = 0.001
-    """Sine of the depth below its own plane down to which an array that looks up receives: level returns come in level,
-    as far as the array's elements lie in one plane (0.01 mm of 15)."""
-
     @property
     def stay(self) -> float:
         """Probability that the motion mode of a step is that of the step before."""

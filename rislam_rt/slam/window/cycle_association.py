@@ -49,7 +49,7 @@ class CycleAssociation(NamedTuple):
     rises: Floats
     """(R, Z) ...the log likelihoods of its elevation (`horizon_detection`)..."""
     tilts: Tilts
-    """(of all) ...the tilts of the body..."""
+    """...under these tilts of the body..."""
     scatter: Floats
     """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
@@ -107,7 +107,9 @@ def associate_cycle(
     tilts = prior_tilts(sway)
     above = expected_above(expected.elevation, rises, tilts)
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
-    groups = cluster(expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER))
+    groups = cluster(
+        expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER)
+    )
     lead = groups.leader
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
@@ -115,7 +117,8 @@ def associate_cycle(
     extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, held, poses, expected, groups, clear, above, rises, tilts, scatter, visible(expected, groups, clear * above), extra,
+        mean, held, poses, expected, groups, clear, above, rises, tilts, scatter,
+        visible(expected, groups, clear * above), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)

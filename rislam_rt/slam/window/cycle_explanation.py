@@ -122,8 +122,8 @@ def learn_cycle(
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
     visibility, landmarks = update_landmarks(
-        state.visibility, landmarks, state.window, expected, groups, view.clear, view.above, view.rises, view.scatter, view.shows, row, pick,
-        raw, observed, view.poses,
+        state.visibility, landmarks, state.window, expected, groups, view.clear, view.above, view.rises,
+        view.scatter, view.shows, row, pick, raw, observed, view.poses,
         state.scene, code,
     )  # fmt: skip
     landmark = heard.landmark.copy()
@@ -219,7 +219,7 @@ def _follow(
     found = tracks.advance(state.tracks, dt, turn, drift)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
-    horizon = _told_by_tracks(found, rows, view.tilts)
+    horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()
     silent[rows] = False
     found = found._replace(rises=horizon.log_like)
@@ -242,7 +242,7 @@ def _follow(
     return _Followed(found, log, horizon.above[silent], int(late[rows].sum()), level)
 
 
-def _told_by_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonEvidence:
+def _weigh_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonEvidence:
     """Tilts of the cycle by which of the tracks go on, `rows` (A,), of those that were heard more than once; the
     panel's codes silence it for reasons of their own."""
     heard = np.zeros(len(found.ident), dtype=np.bool_)

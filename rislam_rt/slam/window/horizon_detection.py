@@ -16,7 +16,12 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.attitude import Tilts
 
-RISES = 1e-3 * np.array([0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 27.0, 33.0, 40.0])
+GRAZING = 1e-3
+"""Sine of the depth below its own plane down to which an array that looks up still hears: level returns come in
+level."""
+RISES = 1e-3 * np.array(
+    [0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 18.0, 22.0, 27.0, 33.0, 40.0]
+)
 """Sines (Z,) of elevation at which a density of it is held, up to twice the largest deviation of the tilt."""
 WIDTHS = np.gradient(RISES)
 """Width (Z,) that each stands for."""
@@ -67,7 +72,7 @@ def _near(returns: Elevations, log_like: Floats) -> _Near:
 def _above(near: _Near, tilts: Tilts) -> tuple[Floats, Booleans]:
     """Probability (L, N, R) that near returns arrive above the plane of the array under each tilt, and whether they do
     so at each elevation (L, N, R, Z)."""
-    over = (tilts.point @ near.slopes.T)[..., None] >= -CONSTANTS.grazing - RISES
+    over = (tilts.point @ near.slopes.T)[..., None] >= -GRAZING - RISES
     return (over * near.share).sum(axis=-1), over
 
 
@@ -82,7 +87,7 @@ def above_within(returns: Elevations, lift: Floats, variance: Floats) -> Floats:
     """Probability (R,) that returns of which nothing was heard arrive above the plane of an array whose tilt lifts each
     by a sine of mean `lift` (R,) and that `variance` (R,)."""
     near, found = _near(returns, nothing_heard(len(returns.rise))), np.ones(len(returns.rise))
-    margin = lift[near.row, None] + CONSTANTS.grazing + RISES
+    margin = lift[near.row, None] + GRAZING + RISES
     found[near.row] = (near.share * scipy.special.ndtr(margin / np.sqrt(variance[near.row, None]))).sum(axis=1)
     return found
 

@@ -72,4 +72,4 @@ class WindowState(NamedTuple):
     def attitude_covariance(self) -> Floats:
         """Covariance (K, A, A) [rad^2] of the attitude in the window's cycles, under the deviations that are known by
         now."""
-        return np.linalg.inv(self.attitude_information + np.diag(1.0 / self.attitude_variance))
+        return np.asarray(np.linalg.inv(self.attitude_information + np.diag(1.0 / self.attitude_variance)))

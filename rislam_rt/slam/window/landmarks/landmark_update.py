@@ -90,10 +90,14 @@ def add_clear_paths(
     """Record of paths' occlusion and scatter with the forms (N, 5) by which a new feature was found: not occluded, and
     of mean squared residual `scatter`."""
     count = len(forms)
-    return _joined(visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter), nothing_heard(count)))
+    return _joined(
+        visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter), nothing_heard(count))
+    )
 
 
-def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
+def _joined(
+    visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats, Floats]
+) -> VisibilityObservations:
     """Two records of paths' occlusion and scatter as one, sorted by code."""
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
@@ -109,8 +113,9 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
-    groups: UnresolvedClusters, clear: Floats, above: Floats, rises: Floats, scatter: Floats, shows: Floats, row: Integers,
-    pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+    groups: UnresolvedClusters, clear: Floats, above: Floats, rises: Floats, scatter: Floats, shows: Floats,
+    row: Integers, pick: Integers, raw: Floats, observed: Observations, poses: Poses,
+    scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
     """Update of occlusion, existence, strengths and panel identities after clusters `row` (A,) were detected as
     components `pick` (A,) with residuals of mean square `raw` (A,), and the other clusters missed.
