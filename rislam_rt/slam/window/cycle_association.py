@@ -11,8 +11,9 @@ from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_r
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
+from rislam_rt.slam.window.horizon_detection import expected_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, recall_rises, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -21,6 +22,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
+from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
@@ -43,6 +45,12 @@ class CycleAssociation(NamedTuple):
     """Their clusters, C of them."""
     clear: Floats
     """(R,) probability that nothing occludes each return..."""
+    above: Floats
+    """(R,) ...that it arrives above the plane of the array..."""
+    rises: Floats
+    """(R, Z) ...the log likelihoods of its elevation (`horizon_detection`)..."""
+    tilts: Tilts
+    """...under these tilts of the body..."""
     scatter: Floats
     """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
@@ -93,8 +101,8 @@ def associate_cycle(
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters.
 
-    `strangers` (M,) is the density of clutter at each component, `sway` (A,) the variance of the attitude. `beside`
-    says where tracks go on, if a panel is known and no component tells whether it ran over it.
+    `strangers` (M,) is the density of clutter at each component, `sway` (C, L) the level probabilities of the attitude.
+    `beside` says where tracks go on, if a panel is known and no component tells whether it ran over it.
     """
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
@@ -103,8 +111,13 @@ def associate_cycle(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
     )
     clear, scatter = recall(visibility, expected, landmarks)
+    rises = recall_rises(visibility, expected, landmarks)
+    tilts = prior_tilts(sway)
+    above = expected_above(expected.elevation, rises, tilts)
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
-    groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
+    groups = cluster(
+        expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER)
+    )
     lead = groups.leader
     untold = np.isin(expected.forms[lead, 0], [row for row in landmarks.panels if row >= 0]) & (beside is not None)
     if beside is not None:
@@ -112,10 +125,11 @@ def associate_cycle(
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
-    extra += attitude.spread(expected.seen[lead, 1:], np.diag(sway))
+    extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, held, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
+        mean, held, poses, expected, groups, clear, above, rises, tilts, scatter,
+        visible(expected, groups, clear * above), extra,
         np.full(len(lead), UNTOLD) if sides is None else sides[lead],
         untold, _rivals(untold, strangers, beside), nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
@@ -148,6 +162,25 @@ def _rivals(untold: Booleans, strangers: Floats, beside: Continuations | None) -
     """
     more = np.zeros(len(strangers)) if beside is None else np.log1p(beside.density / strangers)
     return np.asarray(untold[:, None] * more)
+
+
+def with_tilts(view: CycleAssociation, tilts: Tilts) -> CycleAssociation:
+    """Association of a cycle whose returns are above the plane of the array as what is heard tells, by one of `tilts`
+    for all.
+
+    Returns that share a cell do not tell which of them is heard, and are not asked.
+    """
+    expected, groups = view.expected, view.groups
+    lone = (groups.partner < 0) & (groups.by_itself == 1.0)
+    asked, heard = np.zeros((2, len(expected.seen)), dtype=np.bool_)
+    asked[groups.leader[lone]] = True
+    heard[groups.leader[view.row]] = True
+    shows = CONSTANTS.shown * expected.detection * view.clear
+    found = weigh_tilts(expected.elevation, view.rises, shows, asked, heard, tilts)
+    fresh = visible(expected, groups, view.clear * found.above)
+    return view._replace(
+        above=found.above, rises=found.log_like, shows=fresh, score=view.score + found.gain, tilts=found.tilts
+    )
 
 
 def _median(values: Floats) -> Floats:

@@ -9,6 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.window.horizon_detection import Elevations, elevations, nothing_heard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.solver_limits import GATE
 
@@ -47,6 +48,8 @@ class WindowTracks(NamedTuple):
     """(T, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
     """(T, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
+    rises: Floats
+    """(T, Z) log likelihoods of its elevation, by when it was heard (see `horizon_detection`)."""
     next_ident: int
     """Number of the next track."""
 
@@ -65,7 +68,7 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
-        *unknown(0, panels), 0,
+        *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
 
 
@@ -161,22 +164,36 @@ def start(
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
         observed.log_amplitude[picks],
         observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
+        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident
 
 
-def alive(tracks: WindowTracks, cycle: int) -> Booleans:
+def alive(tracks: WindowTracks, cycle: int, above: Floats, level: Floats) -> Booleans:
     """Whether each track (T,) has been missed for no longer than its share of detections lets expect: 3 cycles, or more
     for what comes and goes.
 
-    What is likelier the panel than not may be silent for long: its codes make it so.
+    A body that sways turns it below the plane of the array: it is above that with probabilities `above` (L, T) under
+    the levels of the tilt's deviation, of probabilities `level` (L,). What is likelier the panel than not may be silent
+    for long: its codes make it so.
     """
-    share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
-    patience = np.where(tracks.hits >= 4, CONSTANTS.log_rare / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
-    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), CONSTANTS.window, patience)
-    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
+    usual = 1.0 - CONSTANTS.rare ** (1.0 / 3.0)
+    share = np.minimum((tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0) / (level @ above), 1.0)
+    share = np.where(tracks.hits >= 4, np.clip(share, 1e-6, usual), usual)
+    silent = level @ (1.0 - share * above) ** np.maximum(cycle - tracks.last - 1e-6, 0.0)
+    coded = (tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2)
+    found = (silent >= CONSTANTS.rare) & (cycle - tracks.last <= CONSTANTS.window)
+    return np.asarray(found | (coded & (cycle - tracks.last <= CONSTANTS.window)))
+
+
+def nearly_level(tracks: WindowTracks) -> Elevations:
+    """Elevations of the tracks: those at the rim of the unit disc, within a deviation, are level as far as upright
+    walls are."""
+    seen, std = tracks.mean[..., 0], np.sqrt(tracks.covariance[:, 1, 0, 0])
+    radius = np.hypot(seen[:, 1], seen[:, 2]) + std
+    rise = np.sqrt(np.maximum(1.0 - radius**2, 0.0))
+    return elevations(rise, np.full(len(rise), CONSTANTS.lean), seen[:, 1:])
 
 
 def due(tracks: WindowTracks, cycle: int) -> Integers:

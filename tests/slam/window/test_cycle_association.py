@@ -6,7 +6,9 @@ from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window import cycle_association, tracks
 from rislam_rt.slam.window.cycle_association import _absorbed, _rivals
+from rislam_rt.slam.window.horizon_detection import elevations, nothing_heard, prior_tilts
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
+from rislam_rt.slam.window.smoother.attitude import first_levels
 
 CELL = np.array([0.3, 0.5, 0.5])
 
@@ -19,17 +21,18 @@ def test_returns_out_of_reach_change_nothing(monkeypatch):
     expected = ExpectedComponents(
         np.column_stack([np.arange(count), np.full((count, 4), -1)]), seen, rng.standard_normal((count, 3, 10)),
         rng.uniform(-12.0, -9.0, count), np.full(count, 0.2), np.zeros(count), np.ones(count),
+        elevations(np.ones(count), np.zeros(count), seen[:, 1:]),
     )  # fmt: skip
     std, own = np.full((heard, 3), 0.01), np.arange(heard)
     level = expected.log_amplitude[own] + 0.1 * rng.standard_normal(heard)
     place, one = seen[own] + 0.02 * rng.standard_normal((heard, 3)), np.ones(heard)
     observed = Observations(place, std, level, 0.1 * one, one)
-    groups = cluster(expected, CELL, np.ones(count))
+    groups, tilts = cluster(expected, CELL, np.ones(count)), prior_tilts(first_levels(compass=True))
     size, none = len(groups.leader), np.zeros(0, dtype=np.int64)
     view = cycle_association.CycleAssociation(
         np.zeros(10), root @ root.T, Poses(*np.zeros((2, 3)), np.zeros(())), expected, groups, np.ones(count),
-        np.ones(count), np.full(size, 0.9), groups.disturbance, np.full(size, UNTOLD), np.zeros(size, dtype=np.bool_),
-        np.zeros((size, heard)), none, none, 0.0, 0.0,
+        np.ones(count), nothing_heard(count), tilts, np.ones(count), np.full(size, 0.9), groups.disturbance,
+        np.full(size, UNTOLD), np.zeros(size, dtype=np.bool_), np.zeros((size, heard)), none, none, 0.0, 0.0,
     )  # fmt: skip
     given = view, seen, root @ root.T, observed, np.full(heard, 1e-3)
     near = cycle_association._associate(*given)
