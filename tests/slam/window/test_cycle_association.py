@@ -66,7 +66,7 @@ def test_a_louder_track_absorbs_the_panel_in_its_cell_and_claims_its_own_compone
     seen = np.array([[5.1, 0.1, 0.0], [5.1, 0.7, 0.0], [7.0, 0.0, 0.0]])  # in the track's cell, across, behind
     expected = ExpectedComponents(
         np.full((count, 5), -1), seen, np.zeros((count, 3, 10)), np.full(count, -10.0), np.full(count, 0.2),
-        np.zeros(count), np.ones(count),
+        np.zeros(count), np.ones(count), elevations(np.ones(count), np.zeros(count), seen[:, 1:]),
     )  # fmt: skip
     groups = cluster(expected, CELL, np.ones(count))
     beside, rows = _ceiling(-9.0), np.arange(count)
