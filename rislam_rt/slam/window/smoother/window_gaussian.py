@@ -35,6 +35,7 @@ from rislam_rt.slam.window.smoother.motion_basis import (
     last_pose_matrix,
     step_transition,
 )
+from rislam_rt.slam.window.smoother.rate_factor import RateFactor
 
 
 class Quadratic(NamedTuple):
@@ -78,6 +79,8 @@ class Window(NamedTuple):
     """(D, D) of head and accelerations, at the last solution."""
     holds: DirectionPriors
     """Direction priors of the walls."""
+    rates: RateFactor | None = None
+    """What tracks that no feature explains tell of the poses, until a pose comes or leaves."""
 
     @property
     def num_poses(self) -> int:
@@ -218,6 +221,7 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
         step=np.append(window.step, dt),
         slots=slots,
         covariance=covariance,
+        rates=None,
     )
 
 
@@ -237,6 +241,11 @@ def slide(window: Window) -> Window:
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
+    if window.rates:
+        step = np.zeros((3, size + free))
+        step[:, 3:6], step[:, size : size + 3] = dt * np.eye(3), -0.5 * dt**2 * np.eye(3)
+        information, pull = window.rates.first_step(dt * window.head[3:6] + 0.5 * dt**2 * accel[:3])
+        wide, steep = wide + step.T @ information @ step, steep + step.T @ pull
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
@@ -261,6 +270,7 @@ def slide(window: Window) -> Window:
         noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=covariance,
+        rates=None,
     )
 
 
@@ -303,9 +313,15 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
     both = back[one] @ (slots[:, one, two].T[..., None] * along[two])
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
+    if window.rates:
+        own = window.rates.normal(place[:, :3], along[:3])
+        inner[:, :3, :, :3] += own[0]
     inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
-    pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
+    pull = (back @ slope[:, :free].T[..., None])[..., 0].T
+    if window.rates:
+        pull[:, :3] += own[1]
+    pull = pull.ravel()
     hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]
     hessian[start, size:], hessian[size:, start] = inner[:many, edge:], inner[edge:, :many]
     hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
