@@ -55,6 +55,10 @@ class _Histories(NamedTuple):
         """Sums (T,) of values (N,) over each track."""
         return np.asarray(np.bincount(self.which, value, len(self.span)), dtype=np.float64)
 
+    def mean(self, value: Floats) -> Floats:
+        """Weighted means (T,) of values (N,) over each track."""
+        return self.total(self.weight * value) / self.total(self.weight)
+
     def slope(self, value: Floats) -> tuple[Floats, Floats]:
         """Slopes (T,) [m/s] of weighted line fits to values (N,), and their variances."""
         information = self.total(self.weight * self.time**2)
@@ -141,7 +145,7 @@ def _shares(found: _Histories, state: WindowState) -> Floats:
     wide = np.stack([pose_covariance(state.window, axis) for axis in range(3)])
     one, two = found.ends.T
     pose = np.maximum(wide[:, one, one] + wide[:, two, two] - 2.0 * wide[:, one, two], 0.0)
-    mean = np.stack([found.total(found.weight * side) for side in found.toward.T]) / found.total(found.weight)
+    mean = np.stack([found.mean(side) for side in found.toward.T])
     doubt = (mean**2 * pose).sum(axis=0) / found.span**2
     along = 0.5 * _normal(rate, spread + found.own_variance + doubt)
     kept = 0.5 / 4.0 * _normal(whole, spread)
@@ -150,28 +154,20 @@ def _shares(found: _Histories, state: WindowState) -> Floats:
 
 def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
     """Quadratic cost on the window's positions by tracks that follow them with probabilities `share` (T,)."""
-    count, many = len(found.span), state.window.num_poses
-    rate, spread = found.slope(found.left)
-    off = found.left - (found.total(found.weight * found.left) / found.total(found.weight))[found.which]
-    off -= rate[found.which] * found.time
-    weight = share[found.which] * found.weight
-    weight *= (CONSTANTS.tail + 1.0) / (CONSTANTS.tail + found.weight * off**2)
+    count, many, left = len(found.span), state.window.num_poses, found.left - found.mean(found.left)[found.which]
+    rate, spread = found.slope(left)
+    trust = (CONSTANTS.tail + 1.0) / (CONSTANTS.tail + found.weight * (left - rate[found.which] * found.time) ** 2)
+    weight = share[found.which] * found.weight * trust
     s, sx, sxx = (found.total(weight * found.time**power) for power in range(3))
     inner = np.stack([s + FREE**-2.0, sx, sx, sxx + 1.0 / found.own_variance], axis=1).reshape(count, 2, 2)
-    # the tracks' own unknowns, eliminated: less B inner^-1 B^T with inner^-1 = root root^T
-    root = np.linalg.cholesky(np.linalg.inv(inner))
-    design = np.stack([np.ones(len(weight)), found.time], axis=1)
-    pure = (design[:, None] @ root[found.which])[:, 0]
-    gained = np.stack([found.total(weight * side * off) for side in pure.T], axis=1)
-    single, gradient = np.zeros((many, 3, 3)), np.zeros((many, 3))
-    common = np.zeros((many, 3, count, 2))
-    np.add.at(single, found.slot, weight[:, None, None] * found.toward[:, :, None] * found.toward[:, None])
-    np.add.at(
-        common, (found.slot, slice(None), found.which), weight[:, None, None] * found.toward[:, :, None] * pure[:, None]
-    )
-    whole = found.left - (found.total(found.weight * found.left) / found.total(found.weight))[found.which]
-    gained = np.stack([found.total(weight * side * whole) for side in pure.T], axis=1)
-    pull = weight * (whole - np.vecdot(pure, gained[found.which]))
+    # the tracks' own unknowns, a constant and a rate, in numbers of unit information, to be eliminated
+    root = np.linalg.cholesky(np.linalg.inv(inner))[found.which]
+    own = root[:, 0] + found.time[:, None] * root[:, 1]
+    taken = np.stack([found.total(weight * side * left) for side in own.T], axis=1)
+    pull, heavy = weight * (left - np.vecdot(own, taken[found.which])), weight[:, None] * found.toward
+    single, common, gradient = (np.zeros((many, 3, *rest)) for rest in ((3,), (count, 2), ()))
+    np.add.at(single, found.slot, heavy[:, :, None] * found.toward[:, None])
+    common[found.slot, :, found.which] = heavy[:, :, None] * own[:, None]  # one component of a track in a cycle
     np.add.at(gradient, found.slot, -pull[:, None] * found.toward)
     return RateFactor(
         single, common.reshape(many, 3, 2 * count), gradient, window_gaussian.poses(state.window)[:, :3],

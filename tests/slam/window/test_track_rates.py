@@ -71,7 +71,7 @@ def test_wall_returns_that_are_thrown_away_move_nothing():
 def test_a_lone_path_of_another_kind_is_held_for_that():
     """Of one track a rate ten deviations off what the velocity may be: half of all tracks are something else."""
     rate = -2.0 * RAYS @ TOLD
-    rate[1:] = rate[1:] + [0.4, -0.4, 0.4]
+    rate[1:] += [0.4, -0.4, 0.4]
     mean, _ = _solved(_state(_log(rate)))
     np.testing.assert_allclose(mean[3:5], TOLD[:2], atol=2e-3)
 

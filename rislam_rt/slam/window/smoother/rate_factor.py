@@ -40,8 +40,12 @@ class RateFactor(NamedTuple):
         )
         return hessian, (back @ slope.T[..., None])[..., 0].T
 
-    def first_step(self, moved: Floats) -> tuple[Floats, Floats]:
-        """Hessian (3, 3) and gradient (3,) of the cost by the first step's displacement, where it is `moved` (3,)
-        [m]."""
-        off = moved - (self.middle[1] - self.middle[0])
-        return self.step_hessian, self.step_gradient + self.step_hessian @ off
+    def first_step(self, dt: float, velocity: Floats, accel: Floats) -> tuple[Floats, Floats]:
+        """Hessian (6, 6) and gradient (6,) of the first step's cost by the velocity after it and its acceleration.
+
+        The step takes `dt` [s], from a velocity (3,) [m/s] with an acceleration (3,) [m/s^2].
+        """
+        off = dt * velocity + 0.5 * dt**2 * accel - (self.middle[1] - self.middle[0])
+        design = np.concatenate([dt * np.eye(3), -0.5 * dt**2 * np.eye(3)], axis=1)
+        slope = self.step_gradient + self.step_hessian @ off
+        return design.T @ self.step_hessian @ design, design.T @ slope

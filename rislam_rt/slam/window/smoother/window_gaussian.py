@@ -242,10 +242,10 @@ def slide(window: Window) -> Window:
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     if window.rates:
-        step = np.zeros((3, size + free))
-        step[:, 3:6], step[:, size : size + 3] = dt * np.eye(3), -0.5 * dt**2 * np.eye(3)
-        information, pull = window.rates.first_step(dt * window.head[3:6] + 0.5 * dt**2 * accel[:3])
-        wide, steep = wide + step.T @ information @ step, steep + step.T @ pull
+        at = np.concatenate([[3, 4, 5], size + np.arange(3)])
+        information, pull = window.rates.first_step(dt, window.head[3:6], accel[:3])
+        wide[np.ix_(at, at)] += information
+        steep[at] += pull
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
@@ -260,18 +260,10 @@ def slide(window: Window) -> Window:
     covariance[:, :HEAD] = covariance[:, moved] @ carry.T
     covariance = np.delete(np.delete(covariance, slice(size, size + free), axis=0), slice(size, size + free), axis=1)
     return window._replace(
-        head=head,
-        accel=window.accel[1:],
-        precision=window.precision[1:],
-        solved=window.solved[1:],
-        surplus=window.surplus[1:],
-        step=window.step[1:],
-        prior=prior,
-        noise=_eliminated_noise(shaken, size, gain),
-        slots=Quadratic(*(field[1:] for field in window.slots)),
-        covariance=covariance,
-        rates=None,
-    )
+        head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
+        surplus=window.surplus[1:], step=window.step[1:], prior=prior, noise=_eliminated_noise(shaken, size, gain),
+        slots=Quadratic(*(field[1:] for field in window.slots)), covariance=covariance, rates=None,
+    )  # fmt: skip
 
 
 def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
@@ -313,21 +305,19 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
     both = back[one] @ (slots[:, one, two].T[..., None] * along[two])
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
-    if window.rates:
-        own = window.rates.normal(place[:, :3], along[:3])
-        inner[:, :3, :, :3] += own[0]
-    inner = inner.reshape(edge + steps * free, -1)
-    cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T
     if window.rates:
-        pull[:, :3] += own[1]
-    pull = pull.ravel()
+        by_rates = window.rates.normal(place[:, :3], along[:3])
+        inner[:, :3, :, :3] += by_rates[0]
+        pull[:, :3] += by_rates[1]
+    inner = inner.reshape(edge + steps * free, -1)
+    cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
     hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]
     hessian[start, size:], hessian[size:, start] = inner[:many, edge:], inner[edge:, :many]
     hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
     hessian[HEAD:size, start], hessian[HEAD:size, size:] = cross[:many].T, cross[edge:].T
     hessian[HEAD:size, HEAD:size] = slots.sum(axis=0)[POSE:, POSE:]
-    gradient[start], gradient[size:] = pull[:many], pull[edge:]
+    gradient[start], gradient[size:] = pull.ravel()[:many], pull.ravel()[edge:]
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
