@@ -94,12 +94,11 @@ def _histories(state: WindowState, rows: Integers, which: Integers, slot: Intege
     place, clock = window_gaussian.poses(window)[:, :3], np.concatenate([[0.0], np.cumsum(window.step)])
     first = np.searchsorted(which, np.arange(which[-1] + 1))
     ends = np.stack([slot[first], slot[np.append(first[1:], len(slot)) - 1]], axis=1)
-    # as of a new return of the map that has shown no scatter yet
-    weight = log.std[rows, 0] ** -2.0 / (1.0 + CONSTANTS.memory * (CONSTANTS.crowd - 1.0))
 
     def total(value: Floats) -> Floats:
         return np.asarray(np.bincount(which, value), dtype=np.float64)
 
+    weight = log.std[rows, 0] ** -2.0
     time = clock[slot] - (total(weight * clock[slot]) / total(weight))[which]
     toward, doubt = _directions(state, rows, which, slot, time)
     moved, joined = np.diff(place[slot], axis=0), np.diff(which) == 0
@@ -115,6 +114,7 @@ def _histories(state: WindowState, rows: Integers, which: Integers, slot: Intege
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     apart = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
     own = (apart**2 + doubt) * speed**2 + turning**2 + STIFF**2
+    weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
     return _Histories(
         which, slot, time, length, weight, toward, length - (follow - follow[first][which]), ends, span, speed, own
     )  # fmt: skip
@@ -136,6 +136,24 @@ def _directions(
     smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1.0)
     up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
     return -2.0 * np.concatenate([smooth, up[:, None]], axis=1), 4.0 / s
+
+
+def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:
+    """Mean square (T,) to expect of tracks' errors of length, in reported deviations, from what they show about a
+    quadratic in time; what is expected of any return beforehand counts as `memory` components."""
+    count = np.bincount(which)
+    rows = np.stack([np.ones(len(time)), time, time**2], axis=1)
+    start = length - length[np.searchsorted(which, np.arange(len(count)))][which]
+
+    def total(value: Floats) -> Floats:
+        return np.stack([np.bincount(which, weight * side) for side in value.reshape(len(time), -1).T], axis=1)
+
+    normal = total(rows[:, :, None] * rows[:, None]).reshape(-1, 3, 3) + 1e-9 * np.eye(3)
+    best = np.linalg.solve(normal, total(rows * start[:, None])[..., None])[..., 0]
+    square = np.bincount(which, weight * (start - np.vecdot(rows, best[which])) ** 2)
+    free = count - 3.0
+    shown = np.maximum(square / free, 1.0)
+    return np.asarray((CONSTANTS.memory * CONSTANTS.crowd + free * shown) / (CONSTANTS.memory + free))
 
 
 def _shares(found: _Histories, state: WindowState) -> Floats:
