@@ -17,12 +17,8 @@ from rislam_rt.slam.window.divergence.egomotion import MEASURED
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
+from rislam_rt.slam.window.solver_limits import FREE, STIFF
 from rislam_rt.slam.window.state import WindowState
-
-FREE = 1e3
-"""Standard deviation [m] of the constant of a track's length."""
-STIFF = 1e-5
-"""Least standard deviation [m/s] of the rate of its own."""
 
 
 class _Histories(NamedTuple):

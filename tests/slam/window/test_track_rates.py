@@ -47,6 +47,14 @@ def test_tracks_that_are_no_features_tell_the_velocity():
     np.testing.assert_allclose(mean[3:5], TRUE[:2], atol=5e-3)
 
 
+def test_a_long_track_that_scatters_as_reported_counts_more_than_one_that_scatters_more():
+    log = _log(-2.0 * RAYS @ TRUE)
+    wild = 4e-3 * np.random.default_rng(1).standard_normal(len(log.cycle))
+    rough = log._replace(seen=log.seen + wild[:, None] * [1.0, 0.0, 0.0])
+    calm, shaken = (np.sqrt(np.diag(_solved(_state(each))[1])[3:5]).max() for each in (log, rough))
+    assert shaken > 1.3 * calm
+
+
 def test_a_path_that_keeps_its_length_moves_nothing():
     """As over opposite walls, to and fro along the way: it speaks against no motion."""
     rate = -2.0 * RAYS @ TRUE
