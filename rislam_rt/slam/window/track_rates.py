@@ -172,11 +172,7 @@ def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
     rate, spread = found.slope(left)
     trust = (CONSTANTS.tail + 1.0) / (CONSTANTS.tail + found.weight * (left - rate[found.which] * found.time) ** 2)
     weight = share[found.which] * found.weight * trust
-    s, sx, sxx = (found.total(weight * found.time**power) for power in range(3))
-    inner = np.stack([s + FREE**-2.0, sx, sx, sxx + 1.0 / found.own_variance], axis=1).reshape(count, 2, 2)
-    # the tracks' own unknowns, a constant and a rate, in numbers of unit information, to be eliminated
-    root = np.linalg.cholesky(np.linalg.inv(inner))[found.which]
-    own = root[:, 0] + found.time[:, None] * root[:, 1]
+    own = _own_numbers(found, weight)
     taken = np.stack([found.total(weight * side * left) for side in own.T], axis=1)
     pull, heavy = weight * (left - np.vecdot(own, taken[found.which])), weight[:, None] * found.toward
     single, common, gradient = (np.zeros((many, 3, *rest)) for rest in ((3,), (count, 2), ()))
@@ -187,6 +183,16 @@ def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
         single, common.reshape(many, 3, 2 * count), gradient, window_gaussian.poses(state.window)[:, :3],
         *_first_step(found, share, rate, spread, float(state.window.step[0])),
     )  # fmt: skip
+
+
+def _own_numbers(found: _Histories, weight: Floats) -> Floats:
+    """Derivatives (N, 2) of the components' lengths by the two unknowns of their track, a constant and a rate, as
+    numbers of unit information under weights (N,) and what is known beforehand: to be eliminated."""
+    s, sx, sxx = (found.total(weight * found.time**power) for power in range(3))
+    s, sxx = s + FREE**-2.0, sxx + 1.0 / found.own_variance
+    constant, rate, lean = np.sqrt(sxx / (s * sxx - sx**2)), 1.0 / np.sqrt(sxx), sx / sxx
+    which, time = found.which, found.time
+    return np.stack([constant[which] * (1.0 - lean[which] * time), rate[which] * time], axis=1)
 
 
 def _first_step(found: _Histories, share: Floats, rate: Floats, spread: Floats, step: float) -> tuple[Floats, Floats]:
