@@ -313,7 +313,7 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T
     if window.rates:
-        by_rates = window.rates.normal(place[:, :3], along[:3])
+        by_rates = window.rates.normal(spot[:, :3], along[:3])
         inner[:, :3, :, :3] += by_rates[0]
         pull[:, :3] += by_rates[1]
     inner = inner.reshape(edge + steps * free, -1)
