@@ -36,6 +36,7 @@ from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import MISSED, REFRESH
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.track_rates import with_rates
 
 
 def init(
@@ -79,7 +80,7 @@ def step(
     else:
         heading += state.turned
     turn = heading - float(state.heading[-1])
-    state = _move(state, dt, heading)
+    state = with_rates(_move(state, dt, heading))
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
     heard = components_to_explain(measurement, scene)

@@ -14,12 +14,14 @@ from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.track_rates import with_rates
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def resolve(context: WindowState, steps: int) -> tuple[WindowState, Residuals]:
     """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns the state and the last
     step's residuals."""
+    context = with_rates(context)
     for _ in range(steps):
         fresh, left = relinearise(context, 0)
         context = fresh._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(fresh.window)))
