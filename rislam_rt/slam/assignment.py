@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.observations import UNTOLD, Observations
 
 DIAGONAL = np.arange(3)
@@ -27,6 +27,9 @@ class Candidates(NamedTuple):
     """Log odds (C,) that the return is detected in this cycle."""
     side: Integers
     """Side of the panels (C,): `OTHER`, `PANEL` + q or `UNTOLD` (see `slam.observations`)."""
+    fades: Booleans
+    """Whether the amplitude (C,) is that of a Rayleigh variable about the predicted log amplitude, as a panel's whose
+    phases are not known; else it is log-normal."""
 
 
 def cheapest(cost: Floats) -> tuple[Integers, Integers]:
@@ -53,12 +56,20 @@ def pair_costs(
     spread[:, DIAGONAL, DIAGONAL] += observations.std[column] ** 2
     distance, log_det = squared_distance(candidates.seen[row] - observations.seen[column], spread)
     variance = candidates.log_amplitude_std[row] ** 2 + observations.log_amplitude_std[column] ** 2
-    fade = (observations.log_amplitude[column] - candidates.log_amplitude[row]) ** 2 / variance
-    cost = distance + fade + log_det + np.log(variance) + 4.0 * np.log(2.0 * np.pi)
+    surplus = observations.log_amplitude[column] - candidates.log_amplitude[row]
+    loudness = surplus**2 / variance + np.log(variance) + np.log(2.0 * np.pi)
+    loudness = np.where(candidates.fades[row], -2.0 * log_rayleigh(surplus), loudness)
+    cost = distance + log_det + 3.0 * np.log(2.0 * np.pi) + loudness
     costs = np.zeros((len(candidates.seen), len(observations.seen)))
     cost += 2.0 * np.log(np.broadcast_to(strangers, costs.shape[1])[column]) - 2.0 * candidates.log_odds[row]
     costs[row, column] = np.where(distance < gate, np.minimum(cost, 0.0), 0.0)
     return costs
+
+
+def log_rayleigh(surplus: Floats) -> Floats:
+    """Log density (...,) of a log amplitude that lies `surplus` (...,) above its mean, of a Rayleigh variable."""
+    twice = 2.0 * surplus - np.euler_gamma
+    return np.asarray(np.log(2.0) + twice - np.exp(np.minimum(twice, 50.0)))
 
 
 def within_reach(

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, squared_distance
+from rislam_rt.slam.assignment import Candidates, cheapest, log_rayleigh, pair_costs, squared_distance
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
+from rislam_rt.slam.window.landmarks.measurement_prediction import PANEL_STD
 
 GATE, CLUTTER = 16.3, 0.016
 
@@ -27,6 +28,7 @@ def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
         np.full(count, 0.3),
         np.log(rng.uniform(0.3, 0.95, count)),
         np.full(count, UNTOLD),
+        np.zeros(count, dtype=np.bool_),
     )
 
 
@@ -87,7 +89,8 @@ def test_cost_is_the_likelihood_ratio_against_clutter(rng: np.random.Generator) 
 def test_beyond_the_gate_nothing_is_paired(axis: int) -> None:
     """Just inside the squared distance in delay, either cosine or log amplitude, and just outside."""
     found = Candidates(
-        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, UNTOLD)
+        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, UNTOLD),
+        np.zeros(1, dtype=np.bool_),
     )  # fmt: skip
     for factor, paired in ((0.99, True), (1.01, False)):
         seen, fade = np.zeros((1, 3)), np.zeros(1)
@@ -121,7 +124,21 @@ def test_squared_distances(rng: np.random.Generator) -> None:
 )
 def test_what_runs_over_the_panel_is_not_paired_with_what_does_not(mine: int, other: int, paired: bool) -> None:
     found = Candidates(
-        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, mine)
-    )
+        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, mine),
+        np.zeros(1, dtype=np.bool_),
+    )  # fmt: skip
     seen = observed(np.zeros((1, 3)), np.zeros(1))._replace(side=np.full(1, other))
     assert (associate(found, seen, 1e-9)[0] == 0) == paired
+
+
+def test_a_panel_under_unknown_phases_is_a_rayleigh_variable_and_never_far_louder() -> None:
+    surplus = np.linspace(-12.0, 4.0, 20001)
+    density = np.exp(log_rayleigh(surplus)) * (surplus[1] - surplus[0])
+    moments = [density.sum(), (density * surplus).sum(), (density * surplus**2).sum()]
+    np.testing.assert_allclose(moments, [1.0, 0.0, PANEL_STD**2], atol=1e-5)
+    for fades, louder, paired in ((True, 0.5, True), (True, 2.0, False), (False, 2.0, True)):
+        found = Candidates(
+            np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, PANEL_STD), np.zeros(1),
+            np.full(1, UNTOLD), np.full(1, fades),
+        )  # fmt: skip
+        assert (associate(found, observed(np.zeros((1, 3)), np.full(1, louder)))[0] == 0) == paired

@@ -164,6 +164,7 @@ def _move(
     front = front._replace(
         window=front.window._replace(step=step), heading=headings, codes=(*front.codes, code)[-keep:],
         attitude=np.zeros((len(headings), 3)),
+        attitude_information=np.zeros((len(headings), *front.attitude_information.shape[1:])),
     )  # fmt: skip
     return _refresh_view(front, belief, config), belief
 

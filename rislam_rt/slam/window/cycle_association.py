@@ -11,8 +11,9 @@ from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_r
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
+from rislam_rt.slam.window.horizon_detection import expected_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, visible
+from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, recall_rises, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
     KnownEnvironment,
@@ -21,9 +22,11 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
+from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
+from rislam_rt.slam.window.tracks import Continuations
 
 
 class CycleAssociation(NamedTuple):
@@ -42,6 +45,12 @@ class CycleAssociation(NamedTuple):
     """Their clusters, C of them."""
     clear: Floats
     """(R,) probability that nothing occludes each return..."""
+    above: Floats
+    """(R,) ...that it arrives above the plane of the array..."""
+    rises: Floats
+    """(R, Z) ...the log likelihoods of its elevation (`horizon_detection`)..."""
+    tilts: Tilts
+    """...under these tilts of the body..."""
     scatter: Floats
     """(R,) ...and the mean square of its past residuals, in reported deviations."""
     shows: Floats
@@ -50,6 +59,10 @@ class CycleAssociation(NamedTuple):
     """(C, 3) variance of each cluster's prediction besides the belief's own and the reported one."""
     side: Integers
     """(C,) panel that each cluster's path runs over, `OTHER` or `UNTOLD` (see `slam.observations`)."""
+    untold: Booleans
+    """(C,) whether each cluster's path runs over a panel, and no component tells whether it did."""
+    rivals: Floats
+    """(C, M) log factor by which a component is likelier a stranger to each cluster as it may continue a track."""
     row: Integers
     """(A,) clusters that were detected..."""
     pick: Integers
@@ -84,10 +97,13 @@ FAR_STRONGER = 1.0
 def associate_cycle(
     window: Window, landmarks: WindowTable, visibility: VisibilityObservations, heading: float,
     scene: KnownEnvironment, code: RisCode | None,
-    observed: Observations, strangers: Floats, sway: Floats,
+    observed: Observations, strangers: Floats, sway: Floats, beside: Continuations | None = None,
 ) -> CycleAssociation:  # fmt: skip
-    """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters;
-    `strangers` is the density of clutter at each component, `sway` (A,) the variance of the attitude."""
+    """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters.
+
+    `strangers` (M,) is the density of clutter at each component, `sway` (C, L) the level probabilities of the attitude.
+    `beside` says where tracks go on, if a panel is known and no component tells whether it ran over it.
+    """
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
@@ -95,17 +111,27 @@ def associate_cycle(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
     )
     clear, scatter = recall(visibility, expected, landmarks)
+    rises = recall_rises(visibility, expected, landmarks)
+    tilts = prior_tilts(sway)
+    above = expected_above(expected.elevation, rises, tilts)
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
-    groups = cluster(expected, scene.sensor.cell_length, clear, None if sides is None else np.maximum(sides, OTHER))
+    groups = cluster(
+        expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER)
+    )
     lead = groups.leader
+    untold = np.isin(expected.forms[lead, 0], [row for row in landmarks.panels if row >= 0]) & (beside is not None)
+    if beside is not None:
+        groups = _absorbed(groups, expected, untold.nonzero()[0], beside, scene.sensor.cell_length)
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
-    extra += attitude.spread(expected.seen[lead, 1:], np.diag(sway))
+    extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
-        mean, held, poses, expected, groups, clear, scatter, visible(expected, groups, clear), extra,
-        np.full(len(lead), UNTOLD) if sides is None else sides[lead], nobody, nobody, 0.0, 0.0,
+        mean, held, poses, expected, groups, clear, above, rises, tilts, scatter,
+        visible(expected, groups, clear * above), extra,
+        np.full(len(lead), UNTOLD) if sides is None else sides[lead],
+        untold, _rivals(untold, strangers, beside), nobody, nobody, 0.0, 0.0,
     )  # fmt: skip
     row, pick, score = _associate(view, expected.seen, covariance, observed, strangers)
     alone, found = groups.by_itself == 1.0, np.zeros(len(lead), dtype=np.bool_)
@@ -113,6 +139,48 @@ def associate_cycle(
     due = view.shows[alone]
     surprise = (due.sum() - found[alone].sum()) / np.sqrt((due * (1.0 - due)).sum() + 0.25)
     return view._replace(row=row, pick=pick, score=score, surprise=float(surprise))
+
+
+def _absorbed(
+    groups: UnresolvedClusters, expected: ExpectedComponents, rows: Integers, beside: Continuations, cell: Floats
+) -> UnresolvedClusters:
+    """Clusters of which those in `rows`, over a panel, come out by themselves only if no louder track goes on in their
+    cell: a wall's return that the map lacks."""
+    lead, alone = groups.leader[rows], groups.by_itself.copy()
+    inside = (np.abs(expected.seen[lead, None] - beside.seen) < cell).all(axis=-1)
+    louder = inside & (beside.log_amplitude > groups.log_amplitude[rows, None])
+    alone[rows] *= np.where(louder, np.maximum(1.0 - beside.share, CONSTANTS.rare), 1.0).prod(axis=1)
+    return groups._replace(by_itself=alone)
+
+
+def _rivals(untold: Booleans, strangers: Floats, beside: Continuations | None) -> Floats:
+    """Log factor (C, M) by which components are likelier to be strangers to clusters over a panel, as they may continue
+    tracks.
+
+    The code in force changes such a path's amplitude from cycle to cycle, so that its prediction would fit much: the
+    return of a wall that the map lacks, near by and louder, is known by its track.
+    """
+    more = np.zeros(len(strangers)) if beside is None else np.log1p(beside.density / strangers)
+    return np.asarray(untold[:, None] * more)
+
+
+def with_tilts(view: CycleAssociation, tilts: Tilts) -> CycleAssociation:
+    """Association of a cycle whose returns are above the plane of the array as what is heard tells, by one of `tilts`
+    for all.
+
+    Returns that share a cell do not tell which of them is heard, and are not asked.
+    """
+    expected, groups = view.expected, view.groups
+    lone = (groups.partner < 0) & (groups.by_itself == 1.0)
+    asked, heard = np.zeros((2, len(expected.seen)), dtype=np.bool_)
+    asked[groups.leader[lone]] = True
+    heard[groups.leader[view.row]] = True
+    shows = CONSTANTS.shown * expected.detection * view.clear
+    found = weigh_tilts(expected.elevation, view.rises, shows, asked, heard, tilts)
+    fresh = visible(expected, groups, view.clear * found.above)
+    return view._replace(
+        above=found.above, rises=found.log_like, shows=fresh, score=view.score + found.gain, tilts=found.tilts
+    )
 
 
 def _median(values: Floats) -> Floats:
@@ -172,7 +240,7 @@ def _associate(
     most = (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra
     doubt = np.hypot(groups.log_amplitude_std, 0.5 * CONSTANTS.fading)
     odds = np.log(shows / (1.0 - np.minimum(shows, 1.0 - 1e-3)))
-    candidates = Candidates(seen, np.zeros((len(lead), 3, 3)), groups.log_amplitude, doubt, odds, side)
+    candidates = Candidates(seen, np.zeros((len(lead), 3, 3)), groups.log_amplitude, doubt, odds, side, view.untold)
     row, column = within_reach(seen, most, candidates, observed, GATE)
     near = np.flatnonzero(np.bincount(row, minlength=len(lead)))
     lead, mate, share = lead[near], mate[near], share[near]
@@ -182,6 +250,7 @@ def _associate(
     spread[:, [0, 1, 2], [0, 1, 2]] += extra[near]
     some = Candidates._make(field[near] for field in candidates)._replace(covariance=spread)
     cost = pair_costs(some, observed, GATE, strangers, (np.searchsorted(near, row), column))
+    cost = np.minimum(cost + 2.0 * view.rivals[near], 0.0)
     rows, columns = cheapest(cost)
     # the cost counts what is missed: seen against missed, both against strangers
     gain = -0.5 * float(cost[rows, columns].sum()) + float(np.log1p(-shows[near[rows]]).sum())

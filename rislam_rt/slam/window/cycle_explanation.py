@@ -18,6 +18,7 @@ from rislam_rt.slam.window.births.feature_removal import features_to_remove, rem
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
+from rislam_rt.slam.window.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
@@ -25,6 +26,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
+from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -111,16 +113,17 @@ def learn_cycle(
     taken[pick] = True
     if state.window.turns:
         turn += float(np.diff(window_gaussian.poses(state.window)[-2:, 3]).sum())
-    followed = _follow(state, view.mean, observed, (~taken).nonzero()[0], dt, turn, bend)
-    state = state._replace(tracks=followed.tracks, log=followed.log)
+    followed = _follow(state, view, observed, (~taken).nonzero()[0], dt, turn, bend)
+    sway = np.concatenate([followed.level[None], state.sway[1:]])
+    state = state._replace(tracks=followed.tracks, log=followed.log, sway=sway)
     if len(expected.seen) and len(observed.seen):
-        odds = divergence_monitor.advance(state.lost_log_odds, view.score, followed.followed, followed.kept)
+        odds = divergence_monitor.advance(state.lost_log_odds, view.score, followed.silent, followed.kept)
         state = state._replace(lost_log_odds=odds)
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
     visibility, landmarks = update_landmarks(
-        state.visibility, landmarks, state.window, expected, groups, view.clear, view.scatter, view.shows, row, pick,
-        raw, observed, view.poses,
+        state.visibility, landmarks, state.window, expected, groups, view.clear, view.above, view.rises,
+        view.scatter, view.shows, row, pick, raw, observed, view.poses,
         state.scene, code,
     )  # fmt: skip
     landmark = heard.landmark.copy()
@@ -192,26 +195,50 @@ def unexplained(state: WindowState, observed: Observations) -> float:
 
 
 class _Followed(NamedTuple):
-    """Tracks after a cycle, the log that names them, and how many of the last cycle's tracks went on."""
+    """Tracks after a cycle, the log that names them, and which of the last cycle's tracks went on."""
 
     tracks: WindowTracks
     log: Log
-    followed: int
-    """Number of tracks that were detected in the last cycle..."""
+    silent: Floats
+    """(S,) probabilities that tracks which were detected in the last cycle, and are not in this one, arrive above the
+    plane of the array..."""
     kept: int
-    """...and of those among them that are detected in this one."""
+    """...and the number of those that are detected in this one."""
+    level: Floats
+    """(L,) probabilities of the levels of the tilt's deviation, by what the tracks tell as well."""
+
+
+def _predicted(before: WindowTracks, speed: float, dt: float, turn: float, bend: float) -> WindowTracks:
+    """Tracks predicted over a step `dt` [s] in which the body turns by `turn` [rad]; `speed` [m/s] and `bend` [m/s^2]
+    are those of the agent."""
+    return tracks.advance(before, dt, turn, np.array([2.0 * bend + speed**2, 0.1, 0.1]))
+
+
+def beside_panels(
+    state: WindowState, observed: Observations, dt: float, turn: float, bend: float
+) -> tracks.Continuations | None:
+    """Where tracks are expected to go on in a cycle that is about to be associated; None where components tell whether
+    they ran over a panel, or none is known."""
+    if observed.side is not None or max(state.landmarks.panels) < 0:
+        return None
+    speed = float(np.linalg.norm(window_gaussian.now(state.window)[0][3:6]))
+    sway = attitude.spread(observed.seen[:, 1:], np.diag(state.attitude_variance))
+    return tracks.continuations(_predicted(state.tracks, speed, dt, turn, bend), observed, sway, state.cycle)
 
 
 def _follow(
-    state: WindowState, mean: Floats, observed: Observations, free: Integers, dt: float, turn: float, bend: float
-) -> _Followed:
+    state: WindowState, view: CycleAssociation, observed: Observations, free: Integers, dt: float, turn: float,
+    bend: float,
+) -> _Followed:  # fmt: skip
     """Continue, begin and end tracks with the components of a cycle that no path of the map explains."""
-    speed = float(np.linalg.norm(mean[3:6]))
-    length = np.maximum(state.tracks.mean[:, 0, 0], 0.5) if len(state.tracks.ident) else np.ones(1)
-    drift = np.array([2.0 * bend + speed**2, 0.1, 0.1]) if len(length) else np.zeros(3)
-    found = tracks.advance(state.tracks, dt, turn, drift)
+    speed = float(np.linalg.norm(view.mean[3:6]))
+    found = _predicted(state.tracks, speed, dt, turn, bend)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
+    horizon = _weigh_tracks(found, rows, view.tilts)
+    silent = late.copy()
+    silent[rows] = False
+    found = found._replace(rises=horizon.log_like)
     found = tracks.extend(found, rows, observed, picks, state.cycle)
     left = np.zeros(len(observed.seen), dtype=np.bool_)
     left[free], left[picks] = True, False
@@ -224,8 +251,21 @@ def _follow(
     base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh
-    found = found.keep(tracks.alive(found, state.cycle))
-    return _Followed(found, state.log._replace(track=track), int(late.sum()), int(late[rows].sum()))
+    level = horizon.tilts.weight.sum(axis=1)
+    above = level_above(tracks.nearly_level(found), found.rises, prior_tilts(state.sway))
+    found = found.keep(tracks.alive(found, state.cycle, above, level))
+    log = state.log._replace(track=track)
+    return _Followed(found, log, horizon.above[silent], int(late[rows].sum()), level)
+
+
+def _weigh_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonEvidence:
+    """Tilts of the cycle by which of the tracks go on, `rows` (A,), of those that were heard more than once; the
+    panel's codes silence it for reasons of their own."""
+    heard = np.zeros(len(found.ident), dtype=np.bool_)
+    heard[rows] = True
+    asked = (found.hits >= 2) & ~(found.log_ris > 0.0).any(axis=1)
+    shows = np.full(len(found.ident), CONSTANTS.shown * CONSTANTS.steady)
+    return weigh_tilts(tracks.nearly_level(found), found.rises, shows, asked, heard, tilts)
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:

@@ -12,8 +12,9 @@ from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import motion_learning, tracks
-from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again
+from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again, with_tilts
 from rislam_rt.slam.window.cycle_explanation import (
+    beside_panels,
     components_to_explain,
     innovations,
     learn_cycle,
@@ -35,6 +36,7 @@ from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import MISSED, REFRESH
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.track_rates import with_rates
 
 
 def init(
@@ -55,7 +57,8 @@ def init(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
         motion_mode, motion_mode,
-        np.array([start.heading]), np.zeros((1, 3)), attitude.first_levels(compass=not turns),
+        np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
+        attitude.first_levels(compass=not turns),
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
@@ -77,16 +80,17 @@ def step(
     else:
         heading += state.turned
     turn = heading - float(state.heading[-1])
-    state = _move(state, dt, heading)
+    state = with_rates(_move(state, dt, heading))
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
     heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
-    state, view = _associate_over_motions(state, heading, code, observed, strangers)
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
+    beside = beside_panels(state, observed, dt, turn, bend)
+    state, view = _associate_over_motions(state, heading, code, observed, strangers, beside)
     state, used = log_associations(state, observed, view)
-    state, left, nis, uncertain = _solve(state, view, used)
+    state, view, left, nis, uncertain = _solve(state, view, used)
     heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
     jumped = state.lost_log_odds == 0.0
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
@@ -106,12 +110,12 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     if dt <= 0.0 and state.cycle == 0:
         return state._replace(heading=np.array([heading]))
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
-    rotation = state.attitude
+    rotation, told = state.attitude, state.attitude_information
     while window.num_poses >= CONSTANTS.window:
         motion_mode = motion.forward(motion_mode, motion_learning.likelihoods(window, 1)[:, 0], CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
-        rotation = rotation[1:]
+        rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
         window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
@@ -121,6 +125,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
         attitude=np.concatenate([rotation, np.zeros((1, 3))]),
+        attitude_information=np.concatenate([told, np.zeros((1, *told.shape[1:]))]),
     )  # fmt: skip
 
 
@@ -131,8 +136,9 @@ def smoothed(state: WindowState) -> Floats:
 
 
 def _associate_over_motions(
-    state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats
-) -> tuple[WindowState, CycleAssociation]:
+    state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats,
+    beside: tracks.Continuations | None,
+) -> tuple[WindowState, CycleAssociation]:  # fmt: skip
     """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, a turn of the body
     that no compass tells, or a jump in position, and return the state and association of the likeliest.
 
@@ -142,7 +148,7 @@ def _associate_over_motions(
     def view_of(window: Window) -> CycleAssociation:
         return associate_cycle(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers,
-            state.attitude_variance,
+            state.sway, beside,
         )  # fmt: skip
 
     calm = best = view_of(state.window)
@@ -174,16 +180,24 @@ def _associate_over_motions(
 
 def _solve(
     state: WindowState, view: CycleAssociation, used: Booleans
-) -> tuple[WindowState, Residuals, float, Floats]:  # fmt: skip
+) -> tuple[WindowState, CycleAssociation, Residuals, float, Floats]:  # fmt: skip
     """Update the window with a cycle's associated components by two Gauss-Newton steps, the first on the association's
-    predictions; re-linearises all poses every few cycles, else the last one. Also returns residuals, squared
-    innovation, and the covariance (A, A) [rad^2] of the attitude."""
-    expected = state.attitude_variance
-    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, len(expected))
-    told = attitude.likelihood(innovation, jacobian, view.covariance, turned, expected)
-    state = state._replace(sway=attitude.next_levels(state.sway, told))
+    predictions; re-linearises all poses every few cycles, else the last one. Also returns the association with what
+    the attitude makes of it, residuals, squared innovation, and the covariance (A, A) [rad^2] of the attitude."""
+    axes = len(state.attitude_variance)
+    innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
+    sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
+    told = attitude.likelihood(
+        innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
+        state.attitude_variance,
+    )  # fmt: skip
+    sway = attitude.next_levels(state.sway, told)
+    view = with_tilts(view, attitude.tilts(sway, told))
+    sway[0] = view.tilts.weight.sum(axis=1)
+    known = np.concatenate([state.attitude_information[:-1], told.information])
+    state = state._replace(sway=sway, attitude_information=known)
     variance, last = state.attitude_variance, state.window.num_poses - 1
-    covariance = np.linalg.inv(told.information[0] + np.diag(1.0 / variance))
+    covariance = state.attitude_covariance[-1]
     rotation = covariance @ told.slope[0]
     state = level(state, last, rotation[None])
     innovation = innovation - turned @ rotation
@@ -196,4 +210,5 @@ def _solve(
     left = left._replace(
         square=squares(left.row, left.left, state.log, prediction_variance(window, left.slot, left.slopes))
     )
-    return motion_learning.learn_motion(state._replace(window=window)), left, float(np.sum(innovation**2)), covariance
+    state = motion_learning.learn_motion(state._replace(window=window))
+    return state, view, left, float(np.sum(innovation**2)), covariance

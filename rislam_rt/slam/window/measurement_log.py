@@ -58,6 +58,12 @@ class Log(NamedTuple):
         its sign for as many cycles."""
         return np.asarray(self.std**2 + self.shared + (self.extra - self.shared) / CONSTANTS.memory)
 
+    def sharper(self, rows: Integers) -> Floats:
+        """Factor (A, 3) by which residuals of the components `rows` (A,) grow where they are measured in deviations of
+        their own cycle (`momentary`), not in those by which they are weighed in the window."""
+        whole = self.std[rows] ** 2 + self.extra[rows]
+        return np.asarray(np.sqrt(whole / self.momentary[rows]))
+
     @property
     def explained(self) -> Booleans:
         """Whether each component (N,) was associated with a path of the map."""

@@ -33,12 +33,16 @@ def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]
     wide[of, at, :, -1] = weight[..., 0] * found.left
     flat = wide.reshape(many, -1, wide.shape[-1])
     one = attitude.marginalise(np.swapaxes(flat, 1, 2) @ flat, state.attitude[first:], variance)
+    own = np.zeros((many, wide.shape[1], 3, len(variance) + 1))
+    own[of, at] = wide[of, at, :, size:] * log.sharper(rows)[..., None]
+    own = own.reshape(many, -1, own.shape[-1])
+    change = attitude.change(np.swapaxes(own, 1, 2) @ own, state.attitude[first:], variance)
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[first:], gradient[first:] = one.hessian, -one.slope
     middle[first:, :POSE], middle[first:, POSE:] = place[first:], window.features.ravel()
     state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
-    left = found.left - (turned @ one.change[of][..., None])[..., 0]
-    return level(state, first, one.change), Residuals(
+    left = found.left - (turned @ change[of][..., None])[..., 0]
+    return level(state, first, change), Residuals(
         found.row, found.slot, left, slopes, np.zeros(len(rows))
     )  # fmt: skip
 

@@ -70,3 +70,6 @@ SWAYS = 5
 """Number of levels of the body's attitude, half a decade of angle apart."""
 PRIORS = 5
 """Number of priors of the vertical motion that are compared, from a level floor to what each step alone asks for."""
+FREE, STIFF = 1e3, 1e-5
+"""Standard deviation [m] of the constant that an unexplained track adds to its length, and the least one [m/s] of the
+rate that it adds, in `track_rates`."""

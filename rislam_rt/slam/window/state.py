@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from rislam_rt.arrays import Floats
 from rislam_rt.model import RisCode
 from rislam_rt.slam.config import SlamConfig
@@ -42,6 +44,8 @@ class WindowState(NamedTuple):
     attitude: Floats
     """(K, 3) [rad] estimated rotation vectors of the body in the window's cycles, beyond the heading (see
     `attitude`)."""
+    attitude_information: Floats
+    """(K, A, A) [1/rad^2] of these rotations, before their prior."""
     sway: Floats
     """(2, L) probabilities of the levels of the attitude's deviation, of tilt and yaw; (1, L) without a compass."""
     shift: Floats
@@ -63,3 +67,9 @@ class WindowState(NamedTuple):
     def attitude_variance(self) -> Floats:
         """Expected variance (A,) [rad^2] of the attitude about each axis."""
         return attitude.variance(self.sway)
+
+    @property
+    def attitude_covariance(self) -> Floats:
+        """Covariance (K, A, A) [rad^2] of the attitude in the window's cycles, under the deviations that are known by
+        now."""
+        return np.asarray(np.linalg.inv(self.attitude_information + np.diag(1.0 / self.attitude_variance)))

@@ -9,6 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.window.horizon_detection import Elevations, elevations, nothing_heard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.solver_limits import GATE
 
@@ -47,6 +48,8 @@ class WindowTracks(NamedTuple):
     """(T, Q) log odds of each of Q panels against scatterer."""
     hidden: Floats
     """(T, Q + 1) probability that something occludes it, were it each of the panels, and a scatterer."""
+    rises: Floats
+    """(T, Z) log likelihoods of its elevation, by when it was heard (see `horizon_detection`)."""
     next_ident: int
     """Number of the next track."""
 
@@ -65,7 +68,7 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
-        *unknown(0, panels), 0,
+        *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
 
 
@@ -93,13 +96,44 @@ def match(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    share = np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
+    share = _share(tracks, cycle)
     odds = np.log(share / (1.0 + CONSTANTS.rare - share))
+    steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
-        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side
+        tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady
     )
     rows, columns = cheapest(pair_costs(candidates, observed.take(free), GATE, strangers))
     return rows, free[columns]
+
+
+def _share(tracks: WindowTracks, cycle: int) -> Floats:
+    """Share (T,) of the cycles since a track began, and so the probability, in which it is detected."""
+    return np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
+
+
+class Continuations(NamedTuple):
+    """Components with which T tracks are expected to go on in a cycle of M components, if they are not a panel's."""
+
+    density: Floats
+    """(M,) their density at each component, per metre, unit of each cosine and e-fold of amplitude."""
+    seen: Floats
+    """(T, 3) predicted length [m] and cosines."""
+    log_amplitude: Floats
+    """(T,) log amplitude of the last measurement."""
+    share: Floats
+    """(T,) probability that the track is detected, and not a panel's."""
+
+
+def continuations(tracks: WindowTracks, observed: Observations, sway: Floats, cycle: int) -> Continuations:
+    """Where tracks, predicted to the cycle of some components, are expected to go on; `sway` (M, 3) is the variance
+    that the body's attitude gives to length and cosines."""
+    variance = tracks.covariance[:, None, :, 0, 0] + observed.std**2 + sway
+    square = ((observed.seen - tracks.mean[:, None, :, 0]) ** 2 / variance).sum(axis=-1)
+    wander = WANDER**2 + observed.log_amplitude_std**2
+    square += (observed.log_amplitude - tracks.log_amplitude[:, None]) ** 2 / wander
+    log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
+    share = _share(tracks, cycle) / (1.0 + np.exp(tracks.log_ris).sum(axis=1))
+    return Continuations(share @ np.exp(-0.5 * square - log_norm), tracks.mean[..., 0], tracks.log_amplitude, share)
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
@@ -130,22 +164,36 @@ def start(
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
         observed.log_amplitude[picks],
         observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]),
+        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident
 
 
-def alive(tracks: WindowTracks, cycle: int) -> Booleans:
+def alive(tracks: WindowTracks, cycle: int, above: Floats, level: Floats) -> Booleans:
     """Whether each track (T,) has been missed for no longer than its share of detections lets expect: 3 cycles, or more
     for what comes and goes.
 
-    What is likelier the panel than not may be silent for long: its codes make it so.
+    A body that sways turns it below the plane of the array: it is above that with probabilities `above` (L, T) under
+    the levels of the tilt's deviation, of probabilities `level` (L,). What is likelier the panel than not may be silent
+    for long: its codes make it so.
     """
-    share = (tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0)
-    patience = np.where(tracks.hits >= 4, CONSTANTS.log_rare / np.log(np.clip(1.0 - share, 1e-6, 0.999)), 3.0)
-    patience = np.where((tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2), CONSTANTS.window, patience)
-    return np.asarray(cycle - tracks.last <= np.clip(patience, 3.0, CONSTANTS.window))
+    usual = 1.0 - CONSTANTS.rare ** (1.0 / 3.0)
+    share = np.minimum((tracks.hits + 1.0) / (tracks.last - tracks.born + 3.0) / (level @ above), 1.0)
+    share = np.where(tracks.hits >= 4, np.clip(share, 1e-6, usual), usual)
+    silent = level @ (1.0 - share * above) ** np.maximum(cycle - tracks.last - 1e-6, 0.0)
+    coded = (tracks.log_ris > 0.0).any(axis=1) & (tracks.hits >= 2)
+    found = (silent >= CONSTANTS.rare) & (cycle - tracks.last <= CONSTANTS.window)
+    return np.asarray(found | (coded & (cycle - tracks.last <= CONSTANTS.window)))
+
+
+def nearly_level(tracks: WindowTracks) -> Elevations:
+    """Elevations of the tracks: those at the rim of the unit disc, within a deviation, are level as far as upright
+    walls are."""
+    seen, std = tracks.mean[..., 0], np.sqrt(tracks.covariance[:, 1, 0, 0])
+    radius = np.hypot(seen[:, 1], seen[:, 2]) + std
+    rise = np.sqrt(np.maximum(1.0 - radius**2, 0.0))
+    return elevations(rise, np.full(len(rise), CONSTANTS.lean), seen[:, 1:])
 
 
 def due(tracks: WindowTracks, cycle: int) -> Integers:

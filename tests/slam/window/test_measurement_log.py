@@ -4,10 +4,12 @@ import numpy as np
 
 from rislam_rt.model import Body, RadioConfig, SensorModel
 from rislam_rt.slam import SlamConfig
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window import init
+from rislam_rt.slam.window.cycle_explanation import scatter_variance
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
@@ -67,3 +69,13 @@ def test_what_a_residual_has_lost_to_the_estimate_is_given_back():
     # 4000 x 30 squares, each of variance 2 loud^2
     assert found == np.clip(found, loud - 0.15, loud + 0.15)
     assert short == np.clip(short, 0.9 * loud - 0.15, 0.9 * loud + 0.15)
+
+
+def test_scatter_that_keeps_its_sign_counts_once_in_its_own_cycle():
+    log = empty_log()._replace(
+        std=np.full((1, 3), 0.002),
+        shared=np.zeros((1, 3)),
+        extra=scatter_variance(np.array([9.0]), np.full((1, 3), 0.002)),
+    )
+    found = log.sharper(np.array([0]))
+    np.testing.assert_allclose(found**2, (1.0 + CONSTANTS.memory * 8.0) / 9.0)

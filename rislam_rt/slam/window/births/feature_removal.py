@@ -5,6 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE
+from rislam_rt.slam.window.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
@@ -13,12 +14,14 @@ from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.track_rates import with_rates
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def resolve(context: WindowState, steps: int) -> tuple[WindowState, Residuals]:
     """Solve the whole sliding window again by so many re-linearised Gauss-Newton steps; returns the state and the last
     step's residuals."""
+    context = with_rates(context)
     for _ in range(steps):
         fresh, left = relinearise(context, 0)
         context = fresh._replace(window=window_gaussian.weigh_holds(window_gaussian.solve(fresh.window)))
@@ -62,6 +65,7 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
         fresh.append((
             ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
             log.cycle[late[-1]], len(rows), 0, *(field[0] for field in unknown(1, tracks.log_ris.shape[1])),
+            nothing_heard(1)[0],
         ))  # fmt: skip
         ident += 1
     if not fresh:

@@ -7,10 +7,11 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
+from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
-from rislam_rt.slam.predicted_returns import poses_of
+from rislam_rt.slam.predicted_returns import AXES, poses_of
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -87,6 +88,9 @@ def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, 
     spots, ratio = spread_places(fits.place[rows], fits.held[rows]), _ratio(table, context.landmarks, rows)
     level = log.log_amplitude[at]
     anywhere = np.exp(level.mean() + max(float(level.std()), CONSTANTS.fading) * even_draws(spots.shape[1], 1)[:, 0])
+    # over no panel the path has one amplitude, unknown: a point's prior, as far off as makes it as loud
+    unit = float(point_amplitude(np.array(CONSTANTS.strength), np.ones(()), np.ones(()), scene.radio))
+    far = np.sqrt(unit / np.exp(level.mean()))
     first = context.cycle - window.num_poses + 1
     heard = {int(log.cycle[row] - first): row for row in at}
     found = unknown(count, scene.num_panels)
@@ -103,8 +107,11 @@ def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, 
             np.repeat(amplitude, count), np.repeat(side, count), np.repeat(row >= 0, count),
         )  # fmt: skip
         gain = gains(sight, scene.ris, _codes([context.codes[slot] for slot in slots], count), scene.radio)
+        last = slice(count - 1, None, count)
+        sight.tx[last] = sight.rx[last] = sight.place[last].mean(axis=1) + far * AXES[0]
+        sight.ratio[last] = 1.0
         if gain is not None:
-            gain[:, count - 1 :: count] = anywhere
+            gain[:, last] = anywhere
         found = weigh(found, sight, gain, scene.sensor)
     return found
 

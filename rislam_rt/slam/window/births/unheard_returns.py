@@ -15,6 +15,7 @@ from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.horizon_detection import Elevations, above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.state import WindowState
@@ -52,11 +53,23 @@ def log_unheard(
     present = np.zeros(length.shape, dtype=np.bool_)
     present[wall, slot[heard]] = True
     shows = _shows(context, table, rows, length, summary) * (out[..., 2] > -CONSTANTS.dip * length)
+    rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length
+    ray = (rotation_z(-ends.heading) @ (out / length[..., None])[..., None])[..., 0]
     for number, row in enumerate(rows.tolist()):
+        shows[number] *= _above(context, elevations(rise[number], std[number], ray[number, :, :2]))
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
         found[row] = log_silence(shows[number, span], present[number, span])
     return found
+
+
+def _above(context: WindowState, returns: Elevations) -> Floats:
+    """Probability (K,) that the returns of the window's cycles, one each, arrive above the plane of the array."""
+    if context.scene.radio.array.pattern != "upper":
+        return np.ones(len(returns.rise))
+    lift = np.vecdot(returns.slopes, context.attitude[:, :2])
+    variance = (returns.slopes[:, None] @ context.attitude_covariance[:, :2, :2] @ returns.slopes[..., None])[:, 0, 0]
+    return above_within(returns, lift, variance)
 
 
 def _shows(context: WindowState, table: Hypotheses, rows: Integers, length: Floats, summary: TrackSummary) -> Floats:

@@ -32,13 +32,15 @@ ALIKE = 0.1
 that."""
 
 
-def advance(log_odds: float, score: float, followed: int, kept: int) -> float:
+def advance(log_odds: float, score: float, silent: Floats, kept: int) -> float:
     """Log odds of being lost after one more cycle, which the map explains better than clutter by the log likelihood
     ratio `score`.
 
-    Of `followed` tracks `kept` ones go on. They need no pose: if many end at once, the agent may be elsewhere.
+    Of the tracks `kept` ones go on, and others end, which arrive above the plane of the array with probabilities
+    `silent` (S,). They need no pose: if many end at once, the agent may be elsewhere.
     """
-    burst = (followed - kept) * np.log(CUT / END) + kept * np.log((1.0 - CUT) / (1.0 - END))
+    ended = np.log((1.0 - (1.0 - CUT) * silent) / (1.0 - (1.0 - END) * silent)).sum()
+    burst = ended + kept * np.log((1.0 - CUT) / (1.0 - END))
     rate = 1.0 / (1.0 + np.exp(-CONSTANTS.log_lost - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
     lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)

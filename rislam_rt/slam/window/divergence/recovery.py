@@ -63,7 +63,8 @@ def restart(state: WindowState) -> WindowState:
         window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
         motion_mode=state.level,
-        heading=state.heading[-1:], attitude=state.attitude[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
+        heading=state.heading[-1:], attitude=state.attitude[-1:],
+        attitude_information=state.attitude_information[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
     )  # fmt: skip
 
@@ -74,6 +75,7 @@ def after_jump(state: WindowState, by: Floats) -> WindowState:
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
         window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level,
-        heading=state.heading[-1:], attitude=state.attitude[-1:], codes=state.codes[-1:],
+        heading=state.heading[-1:], attitude=state.attitude[-1:],
+        attitude_information=state.attitude_information[-1:], codes=state.codes[-1:],
         passed=passed, lost_log_odds=0.0,
     )  # fmt: skip

@@ -10,6 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses
+from rislam_rt.slam.window.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
@@ -31,11 +32,13 @@ class VisibilityObservations(NamedTuple):
     scatter: Floats
     """(V,) running mean square of its residuals in reported deviations: what paths that the map lacks do in its
     cell."""
+    rises: Floats
+    """(V, Z) log likelihoods of its elevation, by when it was heard (`horizon_detection`)."""
 
 
 def no_observations() -> VisibilityObservations:
     """Empty record of paths' occlusion and scatter."""
-    return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+    return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0), nothing_heard(0))
 
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
@@ -70,16 +73,31 @@ def recall_forms(
     return np.asarray(first * (1.0 - CONSTANTS.rare) + (1.0 - first) * CONSTANTS.cleared), scatter
 
 
+def recall_rises(visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable) -> Floats:
+    """Log likelihoods (R, Z) of the predicted returns' elevations, by what was heard of them so far."""
+    found = nothing_heard(len(expected.forms))
+    if len(visibility.code):
+        code = pack(expected.forms, landmarks)
+        place = np.minimum(np.searchsorted(visibility.code, code), len(visibility.code) - 1)
+        known = visibility.code[place] == code
+        found[known] = visibility.rises[place[known]]
+    return found
+
+
 def add_clear_paths(
     visibility: VisibilityObservations, forms: Integers, landmarks: WindowTable, scatter: float
 ) -> VisibilityObservations:
     """Record of paths' occlusion and scatter with the forms (N, 5) by which a new feature was found: not occluded, and
     of mean squared residual `scatter`."""
     count = len(forms)
-    return _joined(visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter)))
+    return _joined(
+        visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter), nothing_heard(count))
+    )
 
 
-def _joined(visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats]) -> VisibilityObservations:
+def _joined(
+    visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats, Floats]
+) -> VisibilityObservations:
     """Two records of paths' occlusion and scatter as one, sorted by code."""
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
@@ -95,19 +113,21 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
-    groups: UnresolvedClusters, clear: Floats, scatter: Floats, shows: Floats, row: Integers,
-    pick: Integers, raw: Floats, observed: Observations, poses: Poses, scene: KnownEnvironment, code: RisCode | None,
+    groups: UnresolvedClusters, clear: Floats, above: Floats, rises: Floats, scatter: Floats, shows: Floats,
+    row: Integers, pick: Integers, raw: Floats, observed: Observations, poses: Poses,
+    scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
     """Update of occlusion, existence, strengths and panel identities after clusters `row` (A,) were detected as
     components `pick` (A,) with residuals of mean square `raw` (A,), and the other clusters missed.
 
-    `clear` (R,) and `scatter` (R,) are what was recalled of the returns.
+    `clear` (R,) and `scatter` (R,) are what was recalled of the returns, `above` (R,) the probability that they arrive
+    above the plane of the array, `rises` (R, Z) the log likelihoods of their elevations.
     """
     if not len(expected.seen):
         return visibility, landmarks
     hit = np.zeros(len(groups.leader), dtype=np.bool_)
     hit[row] = True
-    detection = CONSTANTS.shown * expected.detection
+    detection = CONSTANTS.shown * expected.detection * above
     missed = clear * (1.0 - detection) / (1.0 - clear * detection)
     after, scatter = clear.copy(), scatter.copy()
     told = hit | (groups.by_itself == 1.0)
@@ -121,7 +141,7 @@ def update_landmarks(
     place, keep = np.searchsorted(visibility.code, fresh), np.ones(len(visibility.code) + 1, dtype=np.bool_)
     keep[place[np.append(visibility.code, -1)[place] == fresh]] = False
     kept = VisibilityObservations._make(field[keep[:-1]] for field in visibility)
-    return _joined(kept, (fresh, after, scatter)), landmarks
+    return _joined(kept, (fresh, after, scatter, rises)), landmarks
 
 
 def _existence(

@@ -15,6 +15,7 @@ from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, bounced, compact, linearise, observe, reflect
+from rislam_rt.slam.window.horizon_detection import Elevations, elevations
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
@@ -64,7 +65,9 @@ class ExpectedComponents(NamedTuple):
     bounces: Integers
     """(R,) number of walls on the path."""
     detection: Floats
-    """(R,) detection probability, were nothing in its way and it alone."""
+    """(R,) detection probability, were nothing in its way, it alone, and above the plane of the array."""
+    elevation: Elevations
+    """Elevations of the R returns for a level body."""
 
 
 def predict_returns(
@@ -87,9 +90,11 @@ def predict_returns(
     reported = scene.sensor.in_window(scene.sensor.heard_as(sight.seen[:, 0]) / SPEED_OF_LIGHT)
     rows = ((sight.up > -CONSTANTS.dip * np.maximum(bounces, 1)) & reported).nonzero()[0]
     returns, bounces, ways = compact(returns, rows), bounces[rows], (sight.tx_length[rows], sight.rx_length[rows])
+    rise = sight.up[rows] if scene.radio.array.pattern == "upper" else np.ones(len(rows))
     level, spread = amplitudes(returns, features, landmarks, *ways, poses, scene, code)
     rows = (scene.radio.integrated_snr(np.exp(level + spread)) > FAINT).nonzero()[0]
     returns, bounces, level, spread = compact(returns, rows), bounces[rows], level[rows], spread[rows]
+    ways, rise = (ways[0][rows], ways[1][rows]), rise[rows]
     linear = linearise(returns, features, landmarks.anchor, poses, HEAD)
     jacobian = linear.wide
     jacobian[..., :3], jacobian[..., 6] = linear.by_pose, linear.by_heading(poses, position)
@@ -97,7 +102,17 @@ def predict_returns(
     return ExpectedComponents(
         forms_of(returns), linear.seen, jacobian, level, spread, bounces,
         detection_probability(level, spread, scene.sensor),
+        elevations(rise, _rise_std(returns, covariance, ways[1]), linear.seen[:, 1:]),
     )  # fmt: skip
+
+
+def _rise_std(returns: Returns, covariance: Floats, rx_length: Floats) -> Floats:
+    """Standard deviations (R,) of the elevations' sines of returns that arrive nearly level, over unfolded Rx legs of
+    lengths (R,) [m], from the covariance (3F, 3F) of the features: an image lifted moves by its height over its
+    distance."""
+    height = np.append(np.diagonal(covariance)[2::3], 0.0)
+    parts = returns.legs[returns.rx]
+    return np.asarray(np.sqrt(height[np.where(parts >= 0, parts, -1)].sum(axis=1)) / rx_length)
 
 
 def amplitudes(

@@ -86,6 +86,13 @@ class Attitude(NamedTuple):
     """(K, A) [1/rad] information times value."""
 
 
+def foreseen(before: Floats) -> Floats:
+    """Level probabilities (C, L) one cycle on, before it is heard."""
+    move = np.full((SWAYS, SWAYS), CONSTANTS.rare / (SWAYS - 1.0))
+    np.fill_diagonal(move, CONSTANTS.stay)
+    return np.asarray(before @ move)
+
+
 def next_levels(before: Floats, told: Attitude) -> Floats:
     """Level probabilities (C, L) after one more cycle, of which `told` (K = 1) knows the rotation with poses and map
     uncertain.
@@ -93,18 +100,59 @@ def next_levels(before: Floats, told: Attitude) -> Floats:
     The marginal likelihood of a level is that of N(0, its variance) under the cycle's likelihood; of the other chain
     it takes the expected variance.
     """
-    move = np.full((SWAYS, SWAYS), CONSTANTS.rare / (SWAYS - 1.0))
-    np.fill_diagonal(move, CONSTANTS.stay)
-    found, axes = before @ move, AXES[: len(before) + 1]
-    expected, size = variance(found), len(axes)
-    chain = np.arange(len(before))[:, None, None]
-    every = np.where(axes == chain, levels()[:, None] ** 2, expected)
-    information, slope = told.information[0], told.slope[0]
-    inner = information + np.eye(size) / every[..., None, :]
+    found = foreseen(before)
+    every = _variances(found)
+    slope, inner = told.slope[0], _precision(every, told)
     gain = slope @ np.linalg.solve(inner, np.broadcast_to(slope[:, None], (*every.shape, 1)))[..., 0][..., None]
     log_like = 0.5 * gain[..., 0] - 0.5 * np.linalg.slogdet(inner)[1] - 0.5 * np.log(every).sum(axis=-1)
     found = found * np.exp(log_like - log_like.max(axis=1, keepdims=True))
     return np.asarray(found / found.sum(axis=1, keepdims=True))
+
+
+def _variances(probability: Floats) -> Floats:
+    """Variances (C, L, A) [rad^2] of the attitude with one chain at one of its levels, the other as expected."""
+    axes, expected = AXES[: len(probability) + 1], variance(probability)
+    every = np.tile(expected, (len(probability), SWAYS, 1))
+    for chain in range(len(probability)):
+        every[chain][:, axes == chain] = levels()[:, None] ** 2
+    return every
+
+
+def _precision(every: Floats, told: Attitude) -> Floats:
+    """Precisions (..., A, A) of a cycle's rotation with prior variances (..., A)."""
+    return np.asarray(told.information[0] + np.eye(every.shape[-1]) / every[..., None, :])
+
+
+class Tilts(NamedTuple):
+    """Roll and pitch of one cycle: N equally likely ones for each of the L levels of their deviation."""
+
+    point: Floats
+    """(L, N, 2) [rad]."""
+    weight: Floats
+    """(L, N) probabilities."""
+
+
+def tilts(probability: Floats, told: Attitude | None) -> Tilts:
+    """Tilts of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if anything."""
+    every = _variances(probability)[0]
+    precision = np.eye(every.shape[1]) / every[:, None, :] if told is None else _precision(every, told)
+    covariance = np.linalg.inv(precision)
+    mean = np.zeros((SWAYS, 2)) if told is None else (covariance @ told.slope[0])[:, :2]
+    root = np.linalg.cholesky(covariance[:, :2, :2])
+    point = mean[:, None] + UNIT_TILTS @ np.swapaxes(root, 1, 2)
+    return Tilts(point, np.tile(probability[0][:, None] / len(UNIT_TILTS), len(UNIT_TILTS)))
+
+
+def _unit_tilts(rings: int, spokes: int) -> Floats:
+    """Pairs (N, 2) that stand for two independent standard normal numbers: rings of equal probability, turned against
+    each other."""
+    radius = np.sqrt(-2.0 * np.log1p(-(np.arange(rings) + 0.5) / rings))
+    angle = 2.0 * np.pi / spokes * (np.arange(spokes) + np.arange(rings)[:, None] / rings)
+    return np.stack([radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)], axis=2).reshape(-1, 2)
+
+
+UNIT_TILTS = _unit_tilts(4, 8)
+"""Pairs (N, 2) of standard normal numbers by which tilts are averaged over: a limit of computation."""
 
 
 class Marginal(NamedTuple):
@@ -130,6 +178,15 @@ def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal
     gain, change = found[..., by], found[..., out]
     slope = product[:, by, out] - (cross @ change[..., None])[..., 0]
     return Marginal(product[:, by, by] - cross @ gain, slope, change)
+
+
+def change(product: Floats, rotation: Floats, variance: Floats) -> Floats:
+    """Changes (K, A) [rad] of the attitudes of K cycles, whose estimates are `rotation` (K, 3) and whose prior
+    variances are (A,), with poses and features as they are, from products (K, A + 1, A + 1) of the slopes by attitude
+    and residuals."""
+    information = product[:, :-1, :-1] + np.diag(1.0 / variance)
+    pull = product[:, :-1, -1] - rotation[:, : len(variance)] / variance
+    return np.asarray(np.linalg.solve(information, pull[..., None])[..., 0])
 
 
 def likelihood(left: Floats, jacobian: Floats, covariance: Floats, slopes: Floats, prior: Floats) -> Attitude:

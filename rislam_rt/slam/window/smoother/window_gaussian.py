@@ -36,6 +36,7 @@ from rislam_rt.slam.window.smoother.motion_basis import (
     last_pose_matrix,
     step_transition,
 )
+from rislam_rt.slam.window.smoother.rate_factor import RateFactor
 
 
 class Quadratic(NamedTuple):
@@ -79,6 +80,8 @@ class Window(NamedTuple):
     """(D, D) of head and accelerations, at the last solution."""
     holds: DirectionPriors
     """Direction priors of the walls."""
+    rates: RateFactor | None = None
+    """What tracks that no feature explains tell of the poses, until a pose comes or leaves."""
 
     @property
     def num_poses(self) -> int:
@@ -220,6 +223,7 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
         step=np.append(window.step, dt),
         slots=slots,
         covariance=covariance,
+        rates=None,
     )
 
 
@@ -239,6 +243,11 @@ def slide(window: Window) -> Window:
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
+    if window.rates:
+        at = np.concatenate([[3, 4, 5], size + np.arange(3)])
+        information, pull = window.rates.first_step(dt, window.head[3:6], accel[:3])
+        wide[np.ix_(at, at)] += information
+        steep[at] += pull
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
@@ -253,17 +262,11 @@ def slide(window: Window) -> Window:
     covariance[:, :HEAD] = covariance[:, moved] @ carry.T
     covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
-        head=head,
-        accel=window.accel[1:],
-        precision=window.precision[1:],
-        solved=window.solved[1:],
-        surplus=window.surplus[1:],
-        step=window.step[1:],
-        prior=prior,
-        noise=_eliminated_noise(shaken, size, gain),
+        head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
+        surplus=window.surplus[1:], step=window.step[1:], prior=prior, noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
-        covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1),
-    )
+        covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
+    )  # fmt: skip
 
 
 def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
@@ -308,15 +311,19 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     if free > TURN:
         both = np.concatenate([both, back[TURN] @ (weight[6:] * along)])
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
+    pull = (back @ slope[:, :free].T[..., None])[..., 0].T
+    if window.rates:
+        by_rates = window.rates.normal(spot[:, :3], along[:3])
+        inner[:, :3, :, :3] += by_rates[0]
+        pull[:, :3] += by_rates[1]
     inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
-    pull = (back @ slope[:, :free].T[..., None])[..., 0].T.ravel()
     hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]
     hessian[start, size:], hessian[size:, start] = inner[:many, edge:], inner[edge:, :many]
     hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
     hessian[HEAD:size, start], hessian[HEAD:size, size:] = cross[:many].T, cross[edge:].T
     hessian[HEAD:size, HEAD:size] = slots.sum(axis=0)[POSE:, POSE:]
-    gradient[start], gradient[size:] = pull[:many], pull[edge:]
+    gradient[start], gradient[size:] = pull.ravel()[:many], pull.ravel()[edge:]
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)

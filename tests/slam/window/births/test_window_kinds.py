@@ -9,6 +9,7 @@ from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
 from rislam_rt.slam.window.births.hypotheses import BESIDE, KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN, known_features
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
+from rislam_rt.slam.window.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, pack
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
@@ -108,7 +109,7 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     scene = SimpleNamespace(sensor=SimpleNamespace(cell_length=np.array([0.75])))
     found = {}
     for clear in (1.0, 0.0):
-        looked = VisibilityObservations(pack(form, landmarks), np.array([clear]), np.ones(1))
+        looked = VisibilityObservations(pack(form, landmarks), np.array([clear]), np.ones(1), nothing_heard(1))
         context = SimpleNamespace(landmarks=landmarks, scene=scene, visibility=looked)
         found[clear] = hypothesis_evidence.log_beside(table, summary, known, context)
     # heard a moment ago, the ceiling throws an edge too; never heard from here, it throws none

@@ -151,7 +151,7 @@ def test_the_chain_is_that_of_two_states():
     least = 1.0 / (1.0 + 1.0 / CONSTANTS.rare**2)
     lost = least
     for score in rng.normal(-0.3, 1.0, 60):
-        odds = divergence_monitor.advance(odds, score, 0, 0)
+        odds = divergence_monitor.advance(odds, score, np.zeros(0), 0)
         passed = lost + (1.0 - lost) * least
         lost = np.clip(passed / (passed + (1.0 - passed) * np.exp(score)), least, 1.0 - least)
         assert odds == pytest.approx(np.log(lost / (1.0 - lost)), abs=1e-6)
@@ -159,11 +159,11 @@ def test_the_chain_is_that_of_two_states():
 
 
 def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_does_not():
-    torn = divergence_monitor.advance(CONSTANTS.log_lost, -3.0, 20, 3)
-    assert torn > 3.0 > divergence_monitor.advance(CONSTANTS.log_lost, -3.0, 20, 18)
+    torn = divergence_monitor.advance(CONSTANTS.log_lost, -3.0, np.ones(17), 3)
+    assert torn > 3.0 > divergence_monitor.advance(CONSTANTS.log_lost, -3.0, np.ones(2), 18)
     assert divergence_monitor.is_lost(torn)
-    assert not divergence_monitor.is_lost(divergence_monitor.advance(CONSTANTS.log_lost, 40.0, 20, 3))
-    assert divergence_monitor.advance(torn, 30.0, 5, 5) == pytest.approx(CONSTANTS.log_lost)
+    assert not divergence_monitor.is_lost(divergence_monitor.advance(CONSTANTS.log_lost, 40.0, np.ones(17), 3))
+    assert divergence_monitor.advance(torn, 30.0, np.zeros(0), 5) == pytest.approx(CONSTANTS.log_lost)
 
 
 def _window(rng):

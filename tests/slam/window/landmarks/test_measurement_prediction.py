@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.horizon_detection import elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
 from rislam_rt.slam.window.solver_limits import EDGE
 
@@ -15,8 +16,9 @@ def returns(count, *, rng):
     seen = rng.uniform([0.0, -1.0, -1.0], [4.0, 1.0, 1.0], (count, 3))
     level = np.round(rng.uniform(-12.0, -9.0, count), 1)  # some are equally strong
     return ExpectedComponents(
-        forms, seen, np.zeros((count, 3, 7)), level, np.full(count, 0.2), np.zeros(count), np.ones(count)
-    )
+        forms, seen, np.zeros((count, 3, 7)), level, np.full(count, 0.2), np.zeros(count), np.ones(count),
+        elevations(np.ones(count), np.zeros(count), seen[:, 1:]),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("told", [False, True])

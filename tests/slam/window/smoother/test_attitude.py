@@ -94,3 +94,25 @@ def test_without_a_compass_there_is_no_yaw():
     probability = attitude.first_levels(compass=False)
     assert attitude.variance(probability).shape == (2,)
     assert attitude.variance(attitude.held_level(probability)) == pytest.approx(np.full(2, attitude.levels()[0] ** 2))
+
+
+def test_tilts_have_the_moments_of_their_levels_and_of_what_is_told():
+    probability = attitude.first_levels(compass=True)
+    found = attitude.tilts(probability, None)
+    assert found.weight.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(found.point.mean(axis=1), 0.0, atol=1e-12)
+    spread = np.sqrt((found.point**2).mean(axis=1))
+    np.testing.assert_allclose(spread, np.tile(attitude.levels()[:, None], 2), rtol=0.1)
+    seen, std = np.array([0.004, -0.002, 0.001]), 1e-4
+    told = attitude.Attitude(np.eye(3)[None] / std**2, seen[None] / std**2)
+    np.testing.assert_allclose(attitude.tilts(probability, told).point.mean(axis=1)[-1], seen[:2], atol=std)
+
+
+def test_the_change_of_an_attitude_is_that_of_least_squares():
+    rng, variance = np.random.default_rng(4), np.array([1e-4, 1e-4])
+    rows, left, rotation = rng.standard_normal((9, 2)), rng.standard_normal(9), 0.01 * rng.standard_normal(3)
+    flat = np.column_stack([rows, left])
+    found = attitude.change((flat.T @ flat)[None], rotation[None], variance)[0]
+    wide = np.vstack([rows, np.diag(variance**-0.5)])
+    aim = np.concatenate([left, -rotation[:2] * variance**-0.5])
+    np.testing.assert_allclose(found, np.linalg.lstsq(wide, aim)[0])

@@ -1,0 +1,209 @@
+"""Rates of the tracks that nothing explains yet, as measurements of the agent's way.
+
+Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
+agent goes towards it (see `egomotion`). So a track tells of the way before it is a feature: its length follows the
+poses along its direction of arrival, but for a constant and a rate of its own, which nobody knows (the length at the
+start, and what the baseline, a turn of the body and errors of the direction do). It counts by its probability of being
+such a path. Once it is born, its history enters with the feature, and the window's rows count here no more.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.divergence.egomotion import MEASURED
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.marginals import pose_covariance
+from rislam_rt.slam.window.smoother.rate_factor import RateFactor
+from rislam_rt.slam.window.solver_limits import FREE, STIFF
+from rislam_rt.slam.window.state import WindowState
+
+
+class _Histories(NamedTuple):
+    """Components of T tracks, N in all, track by track in the order of time, and what the poses leave of them."""
+
+    which: Integers
+    """(N,) track of each component."""
+    slot: Integers
+    """(N,) pose of the window."""
+    time: Floats
+    """(N,) [s] since the track's weighted mean time."""
+    length: Floats
+    """(N,) [m] measured."""
+    weight: Floats
+    """(N,) [1/m^2] one over the variance that a length is expected to have."""
+    toward: Floats
+    """(N, 3) derivative of the length by the position: the direction of arrival in the room's axes, times -2."""
+    left: Floats
+    """(N,) [m] length less what the estimated way since the track's first component makes of it."""
+    ends: Integers
+    """(T, 2) slots of each track's first and last component."""
+    span: Floats
+    """(T,) [s] between these."""
+    speed: Floats
+    """(T,) [m/s] mean speed of the agent in between."""
+    own_variance: Floats
+    """(T,) [m^2/s^2] of the rate of its own."""
+
+    def total(self, value: Floats) -> Floats:
+        """Sums (T,) of values (N,) over each track."""
+        return np.asarray(np.bincount(self.which, value, len(self.span)), dtype=np.float64)
+
+    def mean(self, value: Floats) -> Floats:
+        """Weighted means (T,) of values (N,) over each track."""
+        return self.total(self.weight * value) / self.total(self.weight)
+
+    def slope(self, value: Floats) -> tuple[Floats, Floats]:
+        """Slopes (T,) [m/s] of weighted line fits to values (N,), and their variances."""
+        information = self.total(self.weight * self.time**2)
+        return self.total(self.weight * self.time * value) / information, 1.0 / information
+
+
+def with_rates(state: WindowState) -> WindowState:
+    """State whose window holds what the rates of its unexplained tracks tell of the poses."""
+    return state._replace(window=state.window._replace(rates=rate_factor(state)))
+
+
+def rate_factor(state: WindowState) -> RateFactor | None:
+    """What the lengths of the window's unexplained tracks tell of its poses; None where no track is long enough, where
+    their directions hang on an estimated heading, and without wall returns, which then must move nothing."""
+    window, log = state.window, state.log
+    if window.turns or not state.scene.use_vt or len(state.heading) != window.num_poses:
+        return None
+    first = state.cycle - window.num_poses + 1
+    rows = (~log.explained & (log.track >= 0) & (log.cycle >= first)).nonzero()[0]
+    _, which, count = np.unique(log.track[rows], return_inverse=True, return_counts=True)
+    long = count >= MEASURED
+    rows, which = rows[long[which]], (np.cumsum(long) - 1)[which[long[which]]]
+    if not len(rows) or not (window.step > 0.0).all():
+        return None
+    order = np.argsort(which, kind="stable")
+    found = _histories(state, rows[order], which[order], log.cycle[rows[order]] - first)
+    return _factor(found, _shares(found, state), state)
+
+
+def _histories(state: WindowState, rows: Integers, which: Integers, slot: Integers) -> _Histories:
+    """Histories of tracks, given as rows (N,) of the log with their tracks (N,) and slots (N,)."""
+    window, log, body = state.window, state.log, state.scene.body
+    place, clock = window_gaussian.poses(window)[:, :3], np.concatenate([[0.0], np.cumsum(window.step)])
+    first = np.searchsorted(which, np.arange(which[-1] + 1))
+    ends = np.stack([slot[first], slot[np.append(first[1:], len(slot)) - 1]], axis=1)
+
+    def total(value: Floats) -> Floats:
+        return np.asarray(np.bincount(which, value), dtype=np.float64)
+
+    weight = log.std[rows, 0] ** -2.0
+    time = clock[slot] - (total(weight * clock[slot]) / total(weight))[which]
+    toward, doubt = _directions(state, rows, which, slot, time)
+    moved, joined = np.diff(place[slot], axis=0), np.diff(which) == 0
+    follow = np.append(0.0, np.cumsum(np.where(joined, np.vecdot(0.5 * (toward[1:] + toward[:-1]), moved), 0.0)))
+    way = np.append(0.0, np.cumsum(np.where(joined, np.linalg.norm(moved, axis=1), 0.0)))
+    span = clock[ends[:, 1]] - clock[ends[:, 0]]
+    last = np.append(first[1:], len(slot)) - 1
+    speed = (way[last] - way[first]) / span
+    baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
+    turned = np.append(0.0, np.cumsum(np.abs(np.diff(state.heading))))
+    turning = baseline * (turned[ends[:, 1]] - turned[ends[:, 0]]) / span
+    length = log.seen[rows, 0]
+    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
+    apart = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
+    own = (apart**2 + doubt) * speed**2 + turning**2 + STIFF**2
+    weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
+    return _Histories(
+        which, slot, time, length, weight, toward, length - (follow - follow[first][which]), ends, span, speed, own
+    )  # fmt: skip
+
+
+def _directions(
+    state: WindowState, rows: Integers, which: Integers, slot: Integers, time: Floats
+) -> tuple[Floats, Floats]:
+    """Directions of arrival (N, 3) in the room's axes, times -2, smoothed by a line over time for each track, and the
+    variance (T,) of their error along a way of one metre."""
+    seen, angle = state.log.seen[rows, 1:], state.heading[slot]
+    cos, sin = np.cos(angle), np.sin(angle)
+    flat = np.stack([cos * seen[:, 0] - sin * seen[:, 1], sin * seen[:, 0] + cos * seen[:, 1]], axis=1)
+    weight = state.log.std[rows, 1:].mean(axis=1) ** -2.0
+    s, sx, sxx = (np.bincount(which, weight * time**power) for power in range(3))
+    sy, sxy = (np.stack([np.bincount(which, weight * x * side) for side in flat.T]) for x in (1.0, time))
+    rate = (s * sxy - sx * sy) / (s * sxx - sx**2)
+    smooth = ((sy - rate * sx) / s)[:, which].T + rate[:, which].T * time[:, None]
+    smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1.0)
+    up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
+    return -2.0 * np.concatenate([smooth, up[:, None]], axis=1), 4.0 / s
+
+
+def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:
+    """Mean square (T,) to expect of tracks' errors of length, in reported deviations, from what they show about a
+    quadratic in time; what is expected of any return beforehand counts as `memory` components."""
+    count = np.bincount(which)
+    rows = np.stack([np.ones(len(time)), time, time**2], axis=1)
+    start = length - length[np.searchsorted(which, np.arange(len(count)))][which]
+
+    def total(value: Floats) -> Floats:
+        return np.stack([np.bincount(which, weight * side) for side in value.reshape(len(time), -1).T], axis=1)
+
+    normal = total(rows[:, :, None] * rows[:, None]).reshape(-1, 3, 3) + 1e-9 * np.eye(3)
+    best = np.linalg.solve(normal, total(rows * start[:, None])[..., None])[..., 0]
+    square = np.bincount(which, weight * (start - np.vecdot(rows, best[which])) ** 2)
+    free = count - 3.0
+    shown = np.maximum(square / free, 1.0)
+    return np.asarray((CONSTANTS.memory * CONSTANTS.crowd + free * shown) / (CONSTANTS.memory + free))
+
+
+def _shares(found: _Histories, state: WindowState) -> Floats:
+    """Probability (T,) that each track's length follows the poses, as half of all paths do; of the others a quarter
+    keep their length, as over opposite walls, and the rest have any rate that the agent's speed allows."""
+    (rate, spread), (whole, _) = found.slope(found.left), found.slope(found.length)
+    wide = np.stack([pose_covariance(state.window, axis) for axis in range(3)])
+    one, two = found.ends.T
+    pose = np.maximum(wide[:, one, one] + wide[:, two, two] - 2.0 * wide[:, one, two], 0.0)
+    mean = np.stack([found.mean(side) for side in found.toward.T])
+    doubt = (mean**2 * pose).sum(axis=0) / found.span**2
+    along = 0.5 * _normal(rate, spread + found.own_variance + doubt)
+    kept = 0.5 / 4.0 * _normal(whole, spread)
+    return along / (along + kept + 0.5 * 3.0 / 4.0 / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
+
+
+def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
+    """Quadratic cost on the window's positions by tracks that follow them with probabilities `share` (T,)."""
+    count, many, left = len(found.span), state.window.num_poses, found.left - found.mean(found.left)[found.which]
+    rate, spread = found.slope(left)
+    trust = (CONSTANTS.tail + 1.0) / (CONSTANTS.tail + found.weight * (left - rate[found.which] * found.time) ** 2)
+    weight = share[found.which] * found.weight * trust
+    own = _own_numbers(found, weight)
+    taken = np.stack([found.total(weight * side * left) for side in own.T], axis=1)
+    pull, heavy = weight * (left - np.vecdot(own, taken[found.which])), weight[:, None] * found.toward
+    single, common, gradient = (np.zeros((many, 3, *rest)) for rest in ((3,), (count, 2), ()))
+    np.add.at(single, found.slot, heavy[:, :, None] * found.toward[:, None])
+    common[found.slot, :, found.which] = heavy[:, :, None] * own[:, None]  # one component of a track in a cycle
+    np.add.at(gradient, found.slot, -pull[:, None] * found.toward)
+    return RateFactor(
+        single, common.reshape(many, 3, 2 * count), gradient, window_gaussian.poses(state.window)[:, :3],
+        *_first_step(found, share, rate, spread, float(state.window.step[0])),
+    )  # fmt: skip
+
+
+def _own_numbers(found: _Histories, weight: Floats) -> Floats:
+    """Derivatives (N, 2) of the components' lengths by the two unknowns of their track, a constant and a rate, as
+    numbers of unit information under weights (N,) and what is known beforehand: to be eliminated."""
+    s, sx, sxx = (found.total(weight * found.time**power) for power in range(3))
+    s, sxx = s + FREE**-2.0, sxx + 1.0 / found.own_variance
+    constant, rate, lean = np.sqrt(sxx / (s * sxx - sx**2)), 1.0 / np.sqrt(sxx), sx / sxx
+    which, time = found.which, found.time
+    return np.stack([constant[which] * (1.0 - lean[which] * time), rate[which] * time], axis=1)
+
+
+def _first_step(found: _Histories, share: Floats, rate: Floats, spread: Floats, step: float) -> tuple[Floats, Floats]:
+    """Hessian (3, 3) and gradient (3,) by the displacement over the window's first step of `step` [s], from the line
+    fits (T,) of the tracks that begin there: an equal part of what they tell of the whole way."""
+    old = found.ends[:, 0] == 0
+    toward = found.toward[np.searchsorted(found.which, np.arange(len(old)))][old]
+    precision = (share / ((spread + found.own_variance) * found.span * step))[old]
+    return np.einsum("t,ti,tj->ij", precision, toward, toward), -(precision * rate[old] * step) @ toward
+
+
+def _normal(off: Floats, variance: Floats) -> Floats:
+    """Densities (T,) of centred normals."""
+    return np.asarray(np.exp(-0.5 * off**2 / variance) / np.sqrt(2.0 * np.pi * variance))
