@@ -58,8 +58,6 @@ from rislam_rt.slam.window.tracks import WindowTracks
 
 BROAD = 10.0
 """Prior standard deviation [m] of a landmark's position before its measurements."""
-LEVEL = np.zeros(3)
-"""Variance [rad^2] of the attitude, which particles take as known."""
 WALL_CYCLES = 20
 """Measurements that a track needs before birth where walls are found by points alone: two legs leave room for error."""
 HELD = 1e-4
@@ -121,7 +119,7 @@ def step(
     heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
-    view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers, LEVEL)
+    view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers, None)
     front, used = log_associations(front, observed, view)
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _refresh_view(front, told.belief, config)

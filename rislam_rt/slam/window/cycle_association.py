@@ -22,7 +22,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import (
     predict_returns,
 )
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
-from rislam_rt.slam.window.smoother.attitude import Tilts
+from rislam_rt.slam.window.smoother.attitude import LEVEL_BODY, Tilts
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import GATE
@@ -97,12 +97,13 @@ FAR_STRONGER = 1.0
 def associate_cycle(
     window: Window, landmarks: WindowTable, visibility: VisibilityObservations, heading: float,
     scene: KnownEnvironment, code: RisCode | None,
-    observed: Observations, strangers: Floats, sway: Floats, beside: Continuations | None = None,
+    observed: Observations, strangers: Floats, sway: Floats | None, beside: Continuations | None = None,
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters.
 
-    `strangers` (M,) is the density of clutter at each component, `sway` (C, L) the level probabilities of the attitude.
-    `beside` says where tracks go on, if a panel is known and no component tells whether it ran over it.
+    `strangers` (M,) is the density of clutter at each component, `sway` (C, L) the level probabilities of the attitude,
+    None for a body that is known to be level. `beside` says where tracks go on, if a panel is known and no component
+    tells whether it ran over it.
     """
     mean, held, excess = window_gaussian.now_with_excess(window)
     covariance = _with_height(held, excess, scene)
@@ -112,7 +113,7 @@ def associate_cycle(
     )
     clear, scatter = recall(visibility, expected, landmarks)
     rises = recall_rises(visibility, expected, landmarks)
-    tilts = prior_tilts(sway)
+    tilts = LEVEL_BODY if sway is None else prior_tilts(sway)
     above = expected_above(expected.elevation, rises, tilts)
     sides = return_sides(expected.forms, landmarks) if observed.side is not None else None
     groups = cluster(
@@ -125,7 +126,8 @@ def associate_cycle(
     extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
-    extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
+    if sway is not None:
+        extra += attitude.spread(expected.seen[lead, 1:], np.diag(attitude.variance(sway)))
     nobody = np.zeros(0, dtype=np.int64)
     view = CycleAssociation(
         mean, held, poses, expected, groups, clear, above, rises, tilts, scatter,

@@ -132,6 +132,10 @@ class Tilts(NamedTuple):
     """(L, N) probabilities."""
 
 
+LEVEL_BODY = Tilts(np.zeros((SWAYS, 1, 2)), np.full((SWAYS, 1), 1.0 / SWAYS))
+"""The one tilt of a body that is known to be level, whatever the level of its deviation."""
+
+
 def tilts(probability: Floats, told: Attitude | None) -> Tilts:
     """Tilts of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if anything."""
     every = _variances(probability)[0]

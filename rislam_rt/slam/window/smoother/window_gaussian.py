@@ -120,11 +120,10 @@ def begin_with(
     alone, count = begin(position, velocity, std, turns=turns), len(features)
     spread = scipy.linalg.block_diag(alone.covariance, covariance)
     information = scipy.linalg.block_diag(alone.prior.hessian, inverse(covariance))
-    noise = np.zeros(information.shape)
     head, size = np.concatenate([alone.head, features]), POSE + count
-    pose = np.concatenate([alone.slots.middle[0], features])
-    slots = Quadratic(np.zeros((1, size, size)), np.zeros((1, size)), pose[None])
-    prior = Quadratic(information, np.zeros(len(head)), head)
+    pose = np.concatenate([alone.slots.middle[0], features])[None]
+    slots = Quadratic(np.zeros((1, size, size)), np.zeros((1, size)), pose)
+    prior, noise = Quadratic(information, np.zeros(len(head)), head), np.zeros(information.shape)
     return alone._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=spread)
 
 
@@ -220,11 +219,8 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
         precision=np.concatenate([window.precision, precision[None]]),
         solved=np.concatenate([window.solved, precision[None]]),
         surplus=np.concatenate([window.surplus, np.broadcast_to(surplus, (1, free))]),
-        step=np.append(window.step, dt),
-        slots=slots,
-        covariance=covariance,
-        rates=None,
-    )
+        step=np.append(window.step, dt), slots=slots, covariance=covariance, rates=None,
+    )  # fmt: skip
 
 
 def slide(window: Window) -> Window:
