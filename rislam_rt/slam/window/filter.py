@@ -153,7 +153,8 @@ def _associate_over_motions(
 
     calm = best = view_of(state.window)
     window = state.window
-    if state.config.motion == "learnt" and len(calm.groups.leader) and len(state.window.step):
+    learnt = state.config.motion == "learnt"  # a motion that is told stays told
+    if learnt and len(calm.groups.leader) and len(state.window.step):
         lively = window_gaussian.now_under(
             window, motion_learning.livelier(window.solved), (calm.mean, calm.covariance)
         )
@@ -163,7 +164,7 @@ def _associate_over_motions(
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
-    if best.surprise > MISSED and window.turns and (window.step[-1:] > 0.0).any():
+    if best.surprise > MISSED and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
         trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
         trial = divergence_monitor.turned(trial, angle)
