@@ -100,8 +100,8 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
     direct, alone, pairs = place_on_ray(ray, length, tx, rx), wall_of(image, tx), _pairs(ray)
     tx_image, behind, same = mirror(tx), mirror(image), mirror(direct)
     apparent = place_on_ray(ray, length, tx_image, rx)
-    mirrored, level = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > ALIGNED_TURN]
-    upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])  # what lies higher comes of the edge
+    mirrored, aligned = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > ALIGNED_TURN]
+    square = _square_to(alone, known.place[aligned] - middle, middle)
     # kind, known walls (W,), first guesses (W, T, 3), the walls on either leg, and about where these are met
     kinds: list[Any] = [
         (WALL, once, alone, NONE, NONE, tx, tx),
@@ -111,7 +111,7 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
         (OVER_RX, walls, mirrored, NONE, walls, tx, mirrored),
         (OVER_TX, walls, apparent, walls, NONE, apparent, tx),
         (OVER_SAME, walls, same, walls, walls, same, same),
-        (BESIDE, level, upright, NONE, NONE, tx, tx),
+        (BESIDE, aligned, square, NONE, NONE, tx, tx),
         (TWO_WALLS, np.full(len(pairs), NONE), image - (pairs @ tx[..., None])[..., 0], NONE, NONE, tx, tx),
     ]
     kind, walled, *ends = (_every(kinds, column, np.int64) for column in (0, 1, 3, 4))
@@ -127,6 +127,14 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
         _beyond(kind, walled, known), none, none, none, np.zeros((len(kind), 3)),
     )  # fmt: skip
     return Hypotheses(kind, walled, np.full(len(kind), NONE), trials)
+
+
+def _square_to(alone: Floats, across: Floats, middle: Floats) -> Floats:
+    """Images (W, T, 3) of `middle` in new walls at right angles to W known ones, whose images lie at `across` (W, 3)
+    from it: those of walls `alone` (T, 3), but that what lies towards the known wall comes of the edge with that."""
+    normal = across / np.maximum(np.linalg.norm(across, axis=1), 1e-6)[:, None]
+    along = normal @ (alone - middle).T
+    return np.asarray(alone - along[..., None] * normal[:, None])
 
 
 def _every(kinds: list[Any], column: int, dtype: Any, *shape: int) -> Any:
