@@ -27,7 +27,7 @@ from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
-from rislam_rt.slam.window.solver_limits import LOUDEST, REFRESH
+from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 
@@ -164,7 +164,7 @@ def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
     raw = left.square
     _, which = unique_forms(log.form[left.row, 0])
     total, count = np.zeros((2, num_poses, which.max() + 1))
-    np.add.at(total, (left.slot, which), np.minimum(raw, LOUDEST))
+    np.add.at(total, (left.slot, which), np.minimum(raw, _loudest(log, left.row)))
     np.add.at(count, (left.slot, which), 1.0)
     slots = np.arange(num_poses)
     fade = (1.0 - CONSTANTS.memory / CONSTANTS.window) ** np.abs(slots[:, None] - slots)
@@ -172,6 +172,12 @@ def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
     extra = log.extra.copy()
     extra[left.row] = log.shared[left.row] + scatter_variance(scatter, std)
     return log._replace(extra=extra)
+
+
+def _loudest(log: Log, rows: Integers) -> Floats:
+    """Largest mean squares (A,) that unresolved neighbours give to errors of the log's components `rows` (A,), in
+    reported deviations: those of a neighbour as loud as the component, which its own SNR is worth."""
+    return np.asarray(1.0 + 0.5 * log.log_amplitude_std[rows] ** -2.0)
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:

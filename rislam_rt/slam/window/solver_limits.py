@@ -43,8 +43,6 @@ FAINT = 0.5
 """Integrated SNR below which a return is not predicted: it moves nothing in its cell by more than the noise does."""
 EDGE = 1.15
 """Distance in resolution cells up to which a weaker path moves a stronger one: cells have no sharp edge."""
-LOUDEST = 1e3
-"""Mean square to which residuals are limited, in reported deviations: a neighbour of 30 dB SNR."""
 MODES = 7
 """Number of motion modes, half a decade of acceleration apart."""
 ALIGNED = 0.2

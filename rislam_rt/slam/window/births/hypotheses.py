@@ -101,7 +101,10 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
     tx_image, behind, same = mirror(tx), mirror(image), mirror(direct)
     apparent = place_on_ray(ray, length, tx_image, rx)
     mirrored, aligned = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > ALIGNED_TURN]
+    # what lies higher comes of the edge with a level wall; what rises may itself be level, and its edge an upright one's
+    upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])
     square = _square_to(alone, known.place[aligned] - middle, middle)
+    beside = np.where((ray[:, 2] < UPRIGHT_RISE)[:, None], upright, square)
     # kind, known walls (W,), first guesses (W, T, 3), the walls on either leg, and about where these are met
     kinds: list[Any] = [
         (WALL, once, alone, NONE, NONE, tx, tx),
@@ -111,7 +114,7 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
         (OVER_RX, walls, mirrored, NONE, walls, tx, mirrored),
         (OVER_TX, walls, apparent, walls, NONE, apparent, tx),
         (OVER_SAME, walls, same, walls, walls, same, same),
-        (BESIDE, aligned, square, NONE, NONE, tx, tx),
+        (BESIDE, aligned, beside, NONE, NONE, tx, tx),
         (TWO_WALLS, np.full(len(pairs), NONE), image - (pairs @ tx[..., None])[..., 0], NONE, NONE, tx, tx),
     ]
     kind, walled, *ends = (_every(kinds, column, np.int64) for column in (0, 1, 3, 4))
@@ -166,6 +169,8 @@ def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
     return found
 
 
+UPRIGHT_RISE = 0.35
+"""Vertical share of the way to a wall's image below which the wall may be upright."""
 ALIGNED_TURN = 0.9
 """Vertical part of a reflection, kept or turned over, from which on its wall is upright or level."""
 

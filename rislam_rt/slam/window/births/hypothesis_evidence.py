@@ -16,6 +16,7 @@ from rislam_rt.slam.window.births.hypotheses import (
     OVER_SAME,
     OVER_TX,
     POINT,
+    UPRIGHT_RISE,
     WALL,
     Hypotheses,
     KnownFeatures,
@@ -205,8 +206,8 @@ def log_opacity(
     return total + np.where(wall, CONSTANTS.log_rare, 0.0) * small
 
 
-LEVEL_RISE, UPRIGHT_RISE = 0.9, 0.35
-"""Vertical share of the way to a wall's image above which the wall may be level, and below which it may be upright."""
+LEVEL_RISE = 0.9
+"""Vertical share of the way to a wall's image above which the wall may be level."""
 
 
 def direction_beliefs(
