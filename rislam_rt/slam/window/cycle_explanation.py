@@ -177,7 +177,7 @@ def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
 def _loudest(log: Log, rows: Integers) -> Floats:
     """Largest mean squares (A,) that unresolved neighbours give to errors of the log's components `rows` (A,), in
     reported deviations: those of a neighbour as loud as the component, which its own SNR is worth."""
-    return np.asarray(1.0 + 0.5 * log.log_amplitude_std[rows] ** -2.0)
+    return np.asarray(1.0 + 0.5 / np.maximum(log.log_amplitude_std[rows], 1e-6) ** 2)
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:

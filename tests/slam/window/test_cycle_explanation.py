@@ -13,8 +13,9 @@ from rislam_rt.slam.window.measurement_log import Log, Residuals, squares
 CYCLES = 20
 
 
-def log_of(scatter):
-    """Two forms in each of 20 cycles, weighed with what is known beforehand; residuals by `scatter` (20, 2)."""
+def log_of(scatter, snr=1e3):
+    """Two forms in each of 20 cycles, of so much SNR, weighed with what is known beforehand; residuals by `scatter`
+    (20, 2)."""
     count = 2 * CYCLES
     slot, which = np.repeat(np.arange(CYCLES), 2), np.tile([0, 1], CYCLES)
     forms = np.full((count, 2, 5), UNKNOWN)
@@ -23,7 +24,8 @@ def log_of(scatter):
     std, none = np.full((count, 3), 0.01), np.zeros(count)
     shared = np.where(which == 1, 0.02**2, 0.0)[:, None] * np.ones(3)
     extra = shared + scatter_variance(np.full(count, CONSTANTS.crowd), std)
-    log = Log(slot, np.zeros((count, 3)), std, none, none, slot, slot, forms, none, extra, shared)
+    loud = np.full(count, (2.0 * snr) ** -0.5)
+    log = Log(slot, np.zeros((count, 3)), std, none, loud, slot, slot, forms, none, extra, shared)
     raw = scatter[slot, which][:, None] * np.ones(3)
     left = np.sqrt(raw / (1.0 + extra / std**2))
     rows = np.arange(count)
@@ -59,6 +61,14 @@ def test_a_gross_error_counts_as_the_loudest_neighbour():
     truth[3, 0] = 1e9
     log, left = log_of(truth)
     assert scatter_held(reweigh_wall_returns(log, left, CYCLES)).max() < 1e3
+
+
+def test_a_neighbour_moves_a_component_by_as_much_as_its_own_snr_is_worth():
+    """Two walls of a corridor pull a return of 50 dB by 200 reported deviations, cycle after cycle."""
+    truth = np.tile([200.0**2, 200.0**2], (CYCLES, 1))
+    loud, faint = (scatter_held(reweigh_wall_returns(*log_of(truth, snr), CYCLES)) for snr in (1e5, 1e2))
+    assert (loud > 0.8 * 200.0**2).all()
+    assert (faint < 1.0 + 1e2).all()
 
 
 def test_a_level_ray_moves_nothing_where_it_is_reported_on_average():

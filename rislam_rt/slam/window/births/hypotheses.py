@@ -101,7 +101,7 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
     tx_image, behind, same = mirror(tx), mirror(image), mirror(direct)
     apparent = place_on_ray(ray, length, tx_image, rx)
     mirrored, aligned = mirror(apparent), walls[np.abs(turn[:, 2, 2]) > ALIGNED_TURN]
-    # what lies higher comes of the edge with a level wall; what rises may itself be level, and its edge an upright one's
+    # what lies higher comes of the edge with a level wall; what rises may itself be level, its edge an upright one's
     upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])
     square = _square_to(alone, known.place[aligned] - middle, middle)
     beside = np.where((ray[:, 2] < UPRIGHT_RISE)[:, None], upright, square)

@@ -7,7 +7,16 @@ import numpy as np
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
-from rislam_rt.slam.window.births.hypotheses import BESIDE, KNOWN_WALL, OVER_RX, POINT, WALL, WALL_KNOWN, known_features
+from rislam_rt.slam.window.births.hypotheses import (
+    BESIDE,
+    KNOWN_WALL,
+    OVER_RX,
+    POINT,
+    WALL,
+    WALL_KNOWN,
+    hypotheses,
+    known_features,
+)
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
@@ -118,6 +127,21 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     # by itself, or as one with its edge wherever that is not hidden
     clear = 1.0 - CONSTANTS.rare
     assert np.allclose(np.exp(found[1.0]), [1.0 - CONSTANTS.shown * clear, clear])
+
+
+def test_a_ceiling_beside_an_upright_wall_starts_out_level_and_a_far_wall_upright():
+    middle = np.array([1.0, 1.0, 1.0])
+    landmarks = enter(empty_table(1), True, middle, 10, 5.0, unknown(1, 1))
+    known = known_features(np.array([[3.0, 1.0, 1.0]]), 1e-6 * np.eye(3), landmarks, middle)
+    edge = np.array([0.6, 0.0, 6.0])  # a ceiling's return, pulled towards its edge with that wall
+    seen = np.array([np.append(np.linalg.norm(edge), edge[:2] / np.linalg.norm(edge)), [20.0, 0.0, 0.98]])
+    ray = np.column_stack([seen[:, 1:], np.sqrt(1.0 - (seen[:, 1:] ** 2).sum(axis=1))])
+    both = np.tile(middle, (2, 1))
+    summary = SimpleNamespace(mean=(seen, both, both), direction=ray, seen=np.zeros((2, 8, 3)), middle=middle)
+    table = hypotheses(summary, known, landmarks)
+    start = table.trials.start[table.kind == BESIDE] - middle
+    np.testing.assert_allclose(start[0], [0.0, 0.0, 6.0], atol=1e-9)
+    assert abs(start[1, 2]) < 1e-9
 
 
 def test_without_wall_returns_a_path_of_no_kind_is_as_frequent_as_a_point_and_with_them_rarer_by_two_walls():
