@@ -33,7 +33,7 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
         return context
     names = context.tracks.ident[rows]
     track_rows = [((context.log.track == name) & ~context.log.explained).nonzero()[0] for name in names]
-    full = [place for place, at in enumerate(track_rows) if len(at) >= 5]
+    full = [place for place, at in enumerate(track_rows) if len(at) >= 5 and not _mirrored(context, at)]
     if not full:
         return context
     rows, track_rows = rows[full], [track_rows[place] for place in full]
@@ -77,6 +77,17 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
+
+
+def _mirrored(context: WindowState, at: Integers) -> bool:
+    """Whether a track (rows of the log) may as well arrive from where the array hears the same: one period of its
+    spacing away.
+
+    Near the array's own line the receiver takes now the one and now the other, and counts the period into the variance
+    by the other's probability. A Gaussian about the mean of both is no model of that: it tells of places in between.
+    """
+    period = 1.0 / context.scene.radio.array.spacing
+    return bool((np.median(context.log.std[at, 1:] ** 2, axis=0) > (1.0 - CONSTANTS.born) * period**2).any())
 
 
 def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
