@@ -64,6 +64,15 @@ class Log(NamedTuple):
         whole = self.std[rows] ** 2 + self.extra[rows]
         return np.asarray(np.sqrt(whole / self.momentary[rows]))
 
+    def mirrored(self, spacing: float) -> Booleans:
+        """Whether each component's cosines (N, 2) may as well be one period of the array off, whose antennas stand
+        `spacing` wavelengths apart.
+
+        Near the array's own line the receiver takes now the one and now the other, and counts the period into the
+        variance by the other's probability.
+        """
+        return np.asarray(self.std[:, 1:] ** 2 > (1.0 - CONSTANTS.born) / spacing**2)
+
     @property
     def explained(self) -> Booleans:
         """Whether each component (N,) was associated with a path of the map."""

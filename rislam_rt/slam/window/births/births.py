@@ -80,14 +80,12 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
 
 
 def _mirrored(context: WindowState, at: Integers) -> bool:
-    """Whether a track (rows of the log) may as well arrive from where the array hears the same: one period of its
-    spacing away.
+    """Whether a track (rows of the log) may as well arrive from where the array hears the same.
 
-    Near the array's own line the receiver takes now the one and now the other, and counts the period into the variance
-    by the other's probability. A Gaussian about the mean of both is no model of that: it tells of places in between.
+    A Gaussian about the mean of both directions is no model of that: it tells of places in between.
     """
-    period = 1.0 / context.scene.radio.array.spacing
-    return bool((np.median(context.log.std[at, 1:] ** 2, axis=0) > (1.0 - CONSTANTS.born) * period**2).any())
+    mirrored = context.log.take(at).mirrored(context.scene.radio.array.spacing)
+    return bool((mirrored.mean(axis=0) > 0.5).any())
 
 
 def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:

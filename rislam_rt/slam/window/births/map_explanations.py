@@ -19,7 +19,7 @@ from rislam_rt.slam.window.solver_limits import MOST, NEAR, STRENGTHS
 from rislam_rt.slam.window.state import WindowState
 
 
-class Explanation(NamedTuple):
+class MapExplanation(NamedTuple):
     """Explanation of one track by one cluster of predicted returns."""
 
     track: int
@@ -35,7 +35,7 @@ class Explanation(NamedTuple):
 def explanations(
     context: WindowState, rows: Integers, histories: TrackSummary, view: CycleAssociation, mean: Floats,
     covariance: Floats,
-) -> list[Explanation]:  # fmt: skip
+) -> list[MapExplanation]:  # fmt: skip
     """Explanations of tracks, `rows` (T,) of all, by predicted returns of the map."""
     expected, groups = view.expected, view.groups
     if not len(groups.leader):
@@ -43,7 +43,7 @@ def explanations(
     lead, share = expected.seen[groups.leader], groups.share[:, None]
     inside, wide = covariance[HEAD:, HEAD:], 1e-14 * np.eye(len(mean) - HEAD)
     root = np.asarray(np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + wide), dtype=np.float64)
-    found: list[Explanation] = []
+    found: list[MapExplanation] = []
     for row, place in enumerate(rows):
         off = np.abs(lead + share * groups.gap - context.tracks.mean[place, :, 0]) / NEAR
         near = (off < 1.0).all(axis=1).nonzero()[0]
@@ -55,7 +55,7 @@ def explanations(
 def _explanation(
     context: WindowState, histories: TrackSummary, row: int, view: CycleAssociation, column: int, features: Floats,
     root: Floats,
-) -> Explanation:  # fmt: skip
+) -> MapExplanation:  # fmt: skip
     """Explanation of a track's history by one cluster of returns: all of it, or its leading return alone."""
     groups, lead, mate = view.groups, int(view.groups.leader[column]), int(view.groups.partner[column])
     parts = view.expected.forms[[lead] if mate < 0 else [lead, mate]]
@@ -65,7 +65,7 @@ def _explanation(
     level, doubt = (field[lead] for field in (view.expected.log_amplitude, view.expected.log_amplitude_std))
     if mate < 0:
         value = _log_evidence(history, np.ones(1), around) + _log_level(histories, row, level, doubt)
-        return Explanation(row, value, np.stack([parts[0], nobody]), 0.0)
+        return MapExplanation(row, value, np.stack([parts[0], nobody]), 0.0)
     heard = float(np.clip(view.clear[mate] * view.above[mate], CONSTANTS.rare, 1.0 - CONSTANTS.rare))
     share, variance = float(groups.share[column]), groups.share_variance[column]
     both = _log_evidence(history, np.array([1.0 - share, share]), around + variance * gap**2)
@@ -74,8 +74,8 @@ def _explanation(
     both, alone = both + np.log(heard), alone + np.log1p(-heard)
     value = float(np.logaddexp(both, alone))
     if alone > both:
-        return Explanation(row, value, np.stack([parts[0], nobody]), 0.0)
-    return Explanation(row, value, parts, share)
+        return MapExplanation(row, value, np.stack([parts[0], nobody]), 0.0)
+    return MapExplanation(row, value, parts, share)
 
 
 class _Predicted(NamedTuple):

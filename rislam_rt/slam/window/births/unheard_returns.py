@@ -44,8 +44,8 @@ def log_unheard(
     ray = (rotation_z(-ends.heading) @ (out / length[..., None])[..., None])[..., 0]
     off = log.seen - np.concatenate([length[..., None], ray[..., :2]], axis=2)[:, slot]
     off[..., 0] = scene.sensor.nearest(off[..., 0])
-    period = 1.0 / scene.radio.array.spacing
-    off[..., 1:] -= period * np.round(off[..., 1:] / period)  # from there the array hears the same
+    spacing = scene.radio.array.spacing
+    off[..., 1:] -= np.where(log.mirrored(spacing), np.round(off[..., 1:] * spacing) / spacing, 0.0)
     doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[rows])[:, -1:])
     near = scene.sensor.cell_length + doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
     wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()

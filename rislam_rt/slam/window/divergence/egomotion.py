@@ -34,7 +34,7 @@ class Rates(NamedTuple):
     variance: Floats
     """(T,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(T,) error of the rate by the baseline between Tx and Rx and by that of the direction, as a share of the speed."""
+    """(T,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
 
