@@ -115,22 +115,24 @@ def _log_evidence(history: _Predicted, share: Floats, extra: Floats) -> float:
     slopes = np.einsum("r,brin->bin", share, history.slopes) / history.reported[..., None]
     flat = slopes.reshape(-1, slopes.shape[-1])
     if flat.shape[1] > flat.shape[0]:
-        flat = np.linalg.qr(flat.T, mode="r").T
-    flat = flat / factor.reshape(len(strength), -1, 1)
+        flat = np.asarray(np.linalg.qr(flat.T, mode="r")).T
+    cost = _costs(left, flat / factor.reshape(len(strength), -1, 1)) + 2.0 * np.log(factor).sum(axis=(1, 2))
+    return float(np.logaddexp.reduce(-0.5 * cost) - np.log(len(strength)))
+
+
+def _costs(left: Floats, slopes: Floats) -> Floats:
+    """Costs (S,), -2 log evidence, of residuals (S, B, 3) in deviations, with slopes (S, 3B, N) by unknowns of unit
+    variance: Student's t, by reweighting."""
     trust = np.ones(left.shape[:2])
     for _ in range(2):
-        heavy = flat * np.repeat(trust, 3, axis=1)[..., None]
-        normal = np.swapaxes(heavy, 1, 2) @ flat + np.eye(flat.shape[2])
-        pull = np.swapaxes(heavy, 1, 2) @ left.reshape(len(left), -1, 1)
-        error = np.linalg.solve(normal, pull)
-        rest = left - (flat @ error).reshape(left.shape)
+        heavy = slopes * np.repeat(trust, 3, axis=1)[..., None]
+        normal = np.swapaxes(heavy, 1, 2) @ slopes + np.eye(slopes.shape[2])
+        error = np.linalg.solve(normal, np.swapaxes(heavy, 1, 2) @ left.reshape(len(left), -1, 1))
+        rest = left - (slopes @ error).reshape(left.shape)
         squared = np.vecdot(rest, rest)
         trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + squared)
-    cost = (CONSTANTS.tail + 3.0) * np.log1p(squared / CONSTANTS.tail).sum(axis=1) + np.vecdot(error, error, axis=1)[
-        :, 0
-    ]
-    cost = cost + 2.0 * np.log(factor).sum(axis=(1, 2)) + np.linalg.slogdet(normal)[1]
-    return float(np.logaddexp.reduce(-0.5 * cost) - np.log(len(strength)))
+    cost = (CONSTANTS.tail + 3.0) * np.log1p(squared / CONSTANTS.tail).sum(axis=1) + (error**2).sum(axis=(1, 2))
+    return np.asarray(cost + np.linalg.slogdet(normal)[1])
 
 
 def _log_level(histories: TrackSummary, row: int, log_amplitude: float, std: float) -> float:
