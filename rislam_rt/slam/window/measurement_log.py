@@ -69,9 +69,11 @@ class Log(NamedTuple):
         `spacing` wavelengths apart.
 
         Near the array's own line the receiver takes now the one and now the other, and counts the period into the
-        variance by the other's probability.
+        variance by the other's probability. The other has to lie in the sky, within what the other axis deviates by.
         """
-        return np.asarray(self.std[:, 1:] ** 2 > (1.0 - CONSTANTS.born) / spacing**2)
+        cosine, across, std = np.abs(self.seen[:, 1:]), np.abs(self.seen[:, :0:-1]), self.std[:, 1:]
+        inside = np.hypot(1.0 / spacing - cosine, across) < 1.0 + CONSTANTS.fit * std[:, ::-1]
+        return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
 
     @property
     def explained(self) -> Booleans:

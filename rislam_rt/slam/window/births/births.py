@@ -80,12 +80,14 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
 
 
 def _mirrored(context: WindowState, at: Integers) -> bool:
-    """Whether a track (rows of the log) may as well arrive from where the array hears the same.
+    """Whether a track (rows of the log) was reported now in one and now in the other of two directions that the array
+    hears alike.
 
-    A Gaussian about the mean of both directions is no model of that: it tells of places in between.
+    A Gaussian about the mean of both is no model of that: it tells of places in between.
     """
-    mirrored = context.log.take(at).mirrored(context.scene.radio.array.spacing)
-    return bool((mirrored.mean(axis=0) > 0.5).any())
+    log, spacing = context.log.take(at), context.scene.radio.array.spacing
+    both = np.ptp(log.seen[:, 1:], axis=0) > 0.5 / spacing
+    return bool((both & (log.mirrored(spacing).mean(axis=0) > 0.5)).any())
 
 
 def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:

@@ -46,6 +46,7 @@ def log_unheard(
     off[..., 0] = scene.sensor.nearest(off[..., 0])
     spacing = scene.radio.array.spacing
     off[..., 1:] -= np.where(log.mirrored(spacing), np.round(off[..., 1:] * spacing) / spacing, 0.0)
+    off[..., 1:] = (rotation_z(ends.heading[slot])[:, :2, :2] @ off[..., 1:, None])[..., 0]
     doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[rows])[:, -1:])
     near = scene.sensor.cell_length + doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
     wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()

@@ -48,11 +48,14 @@ def test_evidence_is_the_same_however_many_unknowns_there_are():
 def test_a_direction_that_may_be_one_of_two_is_no_birth():
     """A wall along the array's own line: the cosine reads 1 or -1, its deviation a share of the period between."""
     scene = SimpleNamespace(radio=SimpleNamespace(array=SimpleNamespace(spacing=0.5)))
-    for deviation, expected in ((0.9, True), (0.02, False)):
-        std = np.tile([2e-4, 3e-4, deviation], (6, 1))
-        context = SimpleNamespace(log=empty_log()._replace(std=std), scene=scene)
-        context.log = context.log._replace(**{
-            name: np.zeros((6, *getattr(context.log, name).shape[1:])) for name in context.log._fields if name != "std"
+    turns = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
+    cases = ((0.9998 * turns, 0.9, True), (0.9998 * turns, 0.02, False), (0.9998 + 0.0 * turns, 0.9, False),
+             (0.5 * turns, 0.9, False))  # fmt: skip
+    for cosine, deviation, expected in cases:
+        seen = np.column_stack([np.full(6, 1.8), np.full(6, -0.0115), cosine])
+        log = empty_log()._replace(std=np.tile([2e-4, 3e-4, deviation], (6, 1)), seen=seen)
+        log = log._replace(**{
+            name: np.zeros((6, *getattr(log, name).shape[1:])) for name in log._fields if name not in ("std", "seen")
         })  # fmt: skip
-        assert _mirrored(context, np.arange(6)) == expected
+        assert _mirrored(SimpleNamespace(log=log, scene=scene), np.arange(6)) == expected
     assert 0.02 < np.sqrt(1.0 - CONSTANTS.born) / 0.5 < 0.9
