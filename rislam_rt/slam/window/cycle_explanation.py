@@ -206,8 +206,8 @@ class _Followed(NamedTuple):
     tracks: WindowTracks
     log: Log
     silent: Floats
-    """(S,) probabilities that tracks which were detected in the last cycle, and are not in this one, arrive above the
-    plane of the array..."""
+    """(S,) probabilities with which tracks that were detected in the last cycle, and are not in this one, were due: by
+    the share of cycles in which they are heard, above the plane of the array..."""
     kept: int
     """...and the number of those that are detected in this one."""
     level: Floats
@@ -244,6 +244,7 @@ def _follow(
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()
     silent[rows] = False
+    due = tracks.share(found, state.cycle)[silent] * horizon.above[silent]
     found = found._replace(rises=horizon.log_like)
     found = tracks.extend(found, rows, observed, picks, state.cycle)
     left = np.zeros(len(observed.seen), dtype=np.bool_)
@@ -261,7 +262,7 @@ def _follow(
     above = level_above(tracks.nearly_level(found), found.rises, prior_tilts(state.sway))
     found = found.keep(tracks.alive(found, state.cycle, above, level))
     log = state.log._replace(track=track)
-    return _Followed(found, log, horizon.above[silent], int(late[rows].sum()), level)
+    return _Followed(found, log, due, int(late[rows].sum()), level)
 
 
 def _weigh_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonEvidence:

@@ -64,6 +64,17 @@ class Log(NamedTuple):
         whole = self.std[rows] ** 2 + self.extra[rows]
         return np.asarray(np.sqrt(whole / self.momentary[rows]))
 
+    def mirrored(self, spacing: float) -> Booleans:
+        """Whether each component's cosines (N, 2) may as well be one period of the array off, whose antennas stand
+        `spacing` wavelengths apart.
+
+        Near the array's own line the receiver takes now the one and now the other, and counts the period into the
+        variance by the other's probability. The other has to lie in the sky, within what the other axis deviates by.
+        """
+        cosine, across, std = np.abs(self.seen[:, 1:]), np.abs(self.seen[:, :0:-1]), self.std[:, 1:]
+        inside = np.hypot(1.0 / spacing - cosine, across) < 1.0 + CONSTANTS.fit * std[:, ::-1]
+        return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
+
     @property
     def explained(self) -> Booleans:
         """Whether each component (N,) was associated with a path of the map."""

@@ -96,8 +96,8 @@ def match(
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
-    share = _share(tracks, cycle)
-    odds = np.log(share / (1.0 + CONSTANTS.rare - share))
+    heard = share(tracks, cycle)
+    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard))
     steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady
@@ -106,7 +106,7 @@ def match(
     return rows, free[columns]
 
 
-def _share(tracks: WindowTracks, cycle: int) -> Floats:
+def share(tracks: WindowTracks, cycle: int) -> Floats:
     """Share (T,) of the cycles since a track began, and so the probability, in which it is detected."""
     return np.minimum((tracks.hits + 1.0) / (cycle - tracks.born + 2.0), 1.0)
 
@@ -132,8 +132,8 @@ def continuations(tracks: WindowTracks, observed: Observations, sway: Floats, cy
     wander = WANDER**2 + observed.log_amplitude_std**2
     square += (observed.log_amplitude - tracks.log_amplitude[:, None]) ** 2 / wander
     log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
-    share = _share(tracks, cycle) / (1.0 + np.exp(tracks.log_ris).sum(axis=1))
-    return Continuations(share @ np.exp(-0.5 * square - log_norm), tracks.mean[..., 0], tracks.log_amplitude, share)
+    heard = share(tracks, cycle) / (1.0 + np.exp(tracks.log_ris).sum(axis=1))
+    return Continuations(heard @ np.exp(-0.5 * square - log_norm), tracks.mean[..., 0], tracks.log_amplitude, heard)
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:

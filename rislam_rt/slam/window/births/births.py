@@ -7,21 +7,21 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
-from rislam_rt.slam.predicted_returns import TX, Poses, linearise
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
+from rislam_rt.slam.window.births.map_explanations import explanations
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
-from rislam_rt.slam.window.landmarks.measurement_prediction import UnresolvedClusters
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
-from rislam_rt.slam.window.solver_limits import ALIGNED, MOST, NEAR, STRIDE
+from rislam_rt.slam.window.solver_limits import ALIGNED, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -33,7 +33,7 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
         return context
     names = context.tracks.ident[rows]
     track_rows = [((context.log.track == name) & ~context.log.explained).nonzero()[0] for name in names]
-    full = [place for place, at in enumerate(track_rows) if len(at) >= 5]
+    full = [place for place, at in enumerate(track_rows) if len(at) >= 5 and not _mirrored(context, at)]
     if not full:
         return context
     rows, track_rows = rows[full], [track_rows[place] for place in full]
@@ -46,19 +46,19 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     beside = (
         np.zeros(len(rows)) if context.scene.use_vt else _log_same_direction(context, rows, track_rows, histories, mean)
     )
-    over = [(row, value, panels.index(base) if (base := int(forms[0, 0])) >= 0 and base in panels else -1)
-            for row, value, forms, _ in told]  # fmt: skip
+    bases = [int(one.forms[0, 0]) for one in told]
+    over = [(one.track, one.log_evidence, panels.index(base) if base >= 0 and base in panels else -1)
+            for one, base in zip(told, bases, strict=True)]  # fmt: skip
     decisions, shares = decide_tracks(context, track_rows, histories, known, over, lonely, beside)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
-    for (row, _, forms, column), share in zip(told, shares, strict=True):
+    for (row, _, forms, part), share in zip(told, shares, strict=True):
         if share > CONSTANTS.born:
             if not returns and forms[0, 0] == TX:  # what it is is known, and that is all it is asked for
                 gone[rows[row]] = True
                 continue
             named = idents(context.landmarks, forms)
             if not _taken(context, track_rows[row], named[0]):
-                part = float(view.groups.share[column])
                 context = _assign(context, track_rows[row], named, histories.scatter[row], part)
                 gone[rows[row]] = True
     born = -1
@@ -77,6 +77,17 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
     return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
+
+
+def _mirrored(context: WindowState, at: Integers) -> bool:
+    """Whether a track (rows of the log) was reported now in one and now in the other of two directions that the array
+    hears alike.
+
+    A Gaussian about the mean of both is no model of that: it tells of places in between.
+    """
+    log, spacing = context.log.take(at), context.scene.radio.array.spacing
+    both = np.ptp(log.seen[:, 1:], axis=0) > 0.5 / spacing
+    return bool((both & (log.mirrored(spacing).mean(axis=0) > 0.5)).any())
 
 
 def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
@@ -143,67 +154,6 @@ def _log_same_direction(
 LEG = 0.04
 """Difference of cosines up to which a single-bounce return may be a leg of a track's right angle, or lie along its
 line."""
-
-
-def explanations(
-    context: WindowState, rows: Integers, histories: TrackSummary, view: CycleAssociation, mean: Floats,
-    covariance: Floats,
-) -> list[tuple[int, float, Integers, int]]:  # fmt: skip
-    """Explanations of tracks by predicted returns of the map, in which nothing is free: (track, log evidence, forms
-    (2, 5) of feature rows, cluster) of each."""
-    expected, groups = view.expected, view.groups
-    if not len(groups.leader):
-        return []
-    lead, mate, share = groups.leader, groups.partner, groups.share[:, None]
-    inside, wide = covariance[HEAD:, HEAD:], 1e-14 * np.eye(len(mean) - HEAD)
-    root = np.asarray(np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + wide), dtype=np.float64)
-    found: list[tuple[int, float, Integers, int]] = []
-    for row, place in enumerate(rows):
-        off = np.abs(expected.seen[lead] + share * groups.gap - context.tracks.mean[place, :, 0]) / NEAR
-        near = (off < 1.0).all(axis=1).nonzero()[0]
-        for column in near[np.argsort(off[near].sum(axis=1))][:MOST].tolist():
-            partner = expected.forms[mate[column]] if mate[column] >= 0 else np.full(5, UNKNOWN)
-            forms = np.stack([expected.forms[lead[column]], partner])
-            value = _explain(context, histories, row, forms, groups, column, mean[HEAD:].reshape(-1, 3), root)
-            found.append((row, value, forms, column))
-    return found
-
-
-def _explain(
-    context: WindowState, histories: TrackSummary, row: int, forms: Integers, groups: UnresolvedClusters, column: int,
-    features: Floats, root: Floats,
-) -> float:  # fmt: skip
-    """Log evidence that a track's history is one cluster of returns that the map predicts."""
-    nearest, used = context.scene.sensor.nearest, histories.weight[row, :, 0] > 0.0
-    poses = Poses(histories.tx[row, used], histories.rx[row, used], np.zeros(int(used.sum())))
-    parts = forms[forms[:, 0] != UNKNOWN]
-    linear = linearise(compile_forms(parts), features, context.landmarks.anchor, poses)
-    share = np.array([1.0 - groups.share[column], groups.share[column]])[: len(parts)]
-    share = share / share.sum()
-    linear.seen[..., 0] = linear.seen[..., :1, 0] + nearest(linear.seen[..., 0] - linear.seen[..., :1, 0])
-    value, by_pose, by_map = (
-        np.einsum("r,kr...->k...", share, each) for each in (linear.seen, linear.by_pose, linear.wide)
-    )
-    by_pose = np.concatenate([by_pose @ histories.uncertainty[row, used], histories.twist[row, used]], axis=-1)
-    extra = groups.disturbance[column] + groups.share_variance[column] * groups.gap[column] ** 2
-    reported = histories.weight[row, used] ** -1.0
-    std = np.sqrt(reported**2 + extra)
-    jacobian = np.concatenate([by_pose, by_map @ root], axis=-1) / std[..., None]
-    left = histories.seen[row, used] - value
-    left[:, 0] = nearest(left[:, 0])
-    left = left / std
-    flat, trust = jacobian.reshape(-1, jacobian.shape[-1]), np.ones(len(left))
-    for _ in range(2):
-        heavy = flat * np.repeat(trust, 3)[:, None]
-        normal = heavy.T @ flat + np.eye(flat.shape[1])
-        error = np.linalg.solve(normal, heavy.T @ left.ravel())
-        squared = np.sum((left - (flat @ error).reshape(-1, 3)) ** 2, axis=1)
-        trust = (CONSTANTS.tail + 3.0) / (CONSTANTS.tail + squared)
-    cost = (CONSTANTS.tail + 3.0) * np.log1p(squared / CONSTANTS.tail).sum() + error @ error
-    cost += 2.0 * np.log(std / reported).sum() + np.linalg.slogdet(normal)[1]
-    level = histories.log_amplitude[row] - groups.log_amplitude[column]
-    variance = groups.log_amplitude_std[column] ** 2 + CONSTANTS.fading**2
-    return float(-0.5 * (cost + level**2 / variance + np.log(variance)))
 
 
 def _taken(context: WindowState, at: Integers, form: Integers) -> bool:

@@ -7,7 +7,6 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.predicted_returns import poses_of, reflect
@@ -40,13 +39,14 @@ def log_unheard(
     log, scene, where = context.log, context.scene, poses(context.window)
     ends = poses_of(where[:, :3], context.heading + where[:, 3], scene.body)
     slot = log.cycle - (context.cycle - len(where) + 1)
-    seen = log.seen.copy()
-    seen[:, 1:] = (rotation_z(ends.heading[slot]) @ rays(log.seen, 0.0)[..., None])[:, :2, 0]
     out = reflect(ends.tx, place[rows, None], summary.middle) - ends.rx
     length = np.linalg.norm(out, axis=2)
-    due = np.concatenate([length[..., None], out[..., :2] / length[..., None]], axis=2)
-    off = seen - due[:, slot]
+    ray = (rotation_z(-ends.heading) @ (out / length[..., None])[..., None])[..., 0]
+    off = log.seen - np.concatenate([length[..., None], ray[..., :2]], axis=2)[:, slot]
     off[..., 0] = scene.sensor.nearest(off[..., 0])
+    spacing = scene.radio.array.spacing
+    off[..., 1:] -= np.where(log.mirrored(spacing), np.round(off[..., 1:] * spacing) / spacing, 0.0)
+    off[..., 1:] = (rotation_z(ends.heading[slot])[:, :2, :2] @ off[..., 1:, None])[..., 0]
     doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[rows])[:, -1:])
     near = scene.sensor.cell_length + doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
     wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()
@@ -54,7 +54,6 @@ def log_unheard(
     present[wall, slot[heard]] = True
     shows = _shows(context, table, rows, length, summary) * (out[..., 2] > -CONSTANTS.dip * length)
     rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length
-    ray = (rotation_z(-ends.heading) @ (out / length[..., None])[..., None])[..., 0]
     for number, row in enumerate(rows.tolist()):
         shows[number] *= _above(context, elevations(rise[number], std[number], ray[number, :, :2]))
         mine = slot[track_rows[track[row]]]

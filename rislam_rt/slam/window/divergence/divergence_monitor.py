@@ -23,8 +23,8 @@ CELL = 0.01
 """Distance [m] within which two positions are one: as far as a cycle's returns tell."""
 FEWEST = 3
 """Pairs of a predicted return and a component without which no jump is estimated."""
-CUT, END = 0.7, 0.1
-"""Probabilities that a track ends in a cycle with a jump, and in any other."""
+CUT = 0.7
+"""Probability that a track ends in a cycle with a jump, besides what silences it in any other."""
 PAIRS = 60
 """Most pairs of a predicted return and a component from which a jump is estimated."""
 ALIKE = 0.1
@@ -36,11 +36,11 @@ def advance(log_odds: float, score: float, silent: Floats, kept: int) -> float:
     """Log odds of being lost after one more cycle, which the map explains better than clutter by the log likelihood
     ratio `score`.
 
-    Of the tracks `kept` ones go on, and others end, which arrive above the plane of the array with probabilities
-    `silent` (S,). They need no pose: if many end at once, the agent may be elsewhere.
+    Of the tracks `kept` ones go on, and others end, which were due with probabilities `silent` (S,): a faint one comes
+    and goes. They need no pose: if many end at once, the agent may be elsewhere.
     """
-    ended = np.log((1.0 - (1.0 - CUT) * silent) / (1.0 - (1.0 - END) * silent)).sum()
-    burst = ended + kept * np.log((1.0 - CUT) / (1.0 - END))
+    ended = np.log((1.0 - (1.0 - CUT) * silent) / (1.0 - silent)).sum()
+    burst = ended + kept * np.log(1.0 - CUT)
     rate = 1.0 / (1.0 + np.exp(-CONSTANTS.log_lost - max(burst, 0.0)))
     lost = 1.0 / (1.0 + np.exp(-log_odds))
     lost = min(lost + (1.0 - lost) * rate, 1.0 - 1e-9)

@@ -34,7 +34,7 @@ class Rates(NamedTuple):
     variance: Floats
     """(T,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(T,) error of the rate by the baseline between Tx and Rx, as a share of the speed."""
+    """(T,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
 
@@ -97,6 +97,8 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
+    doubt = total((log.std[rows, 1:] ** 2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
+    blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
     turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
     return Rates(toward[enough], rate[enough], variance[enough], blur[enough], turning)
 

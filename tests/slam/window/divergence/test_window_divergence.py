@@ -159,11 +159,26 @@ def test_the_chain_is_that_of_two_states():
 
 
 def test_tracks_that_end_at_once_make_a_loss_likelier_and_a_map_that_explains_does_not():
-    torn = divergence_monitor.advance(CONSTANTS.log_lost, -3.0, np.ones(17), 3)
-    assert torn > 3.0 > divergence_monitor.advance(CONSTANTS.log_lost, -3.0, np.ones(2), 18)
+    often = np.full(17, 0.95)
+    torn = divergence_monitor.advance(CONSTANTS.log_lost, -3.0, often, 3)
+    assert torn > 3.0 > divergence_monitor.advance(CONSTANTS.log_lost, -3.0, often[:2], 18)
     assert divergence_monitor.is_lost(torn)
-    assert not divergence_monitor.is_lost(divergence_monitor.advance(CONSTANTS.log_lost, 40.0, np.ones(17), 3))
+    assert not divergence_monitor.is_lost(divergence_monitor.advance(CONSTANTS.log_lost, 40.0, often, 3))
     assert divergence_monitor.advance(torn, 30.0, np.zeros(0), 5) == pytest.approx(CONSTANTS.log_lost)
+
+
+def test_tracks_that_are_heard_now_and_then_end_without_a_jump():
+    """31 of 68 tracks, each heard once or twice, as a waveform receiver has them in its first second."""
+    odds = divergence_monitor.advance(CONSTANTS.log_lost, 6.5, np.full(31, 0.667), 37)
+    assert odds == pytest.approx(CONSTANTS.log_lost)
+
+
+def test_a_rate_whose_direction_is_not_told_counts_for_little():
+    log = _log(0.1 * np.arange(8)[:, None] * np.array([0.2, -0.1, 0.0]), 0.0)
+    vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.9))
+    found = [egomotion.rates(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0).blur for one in (log, vague)]
+    np.testing.assert_allclose(found[1], 2.0 * 0.9 / np.sqrt(8.0))
+    assert (found[0] < 0.1).all()
 
 
 def _window(rng):
