@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement.received import HORIZON_MARGIN
+from rislam_rt.measurement.received_paths import HORIZON_MARGIN
 from rislam_rt.model import Paths, Scene
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.scene.check.mesh_queries import crossings
 
 WEAK = "too weak"

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.adviser.budget import LandmarkLink, Survey
+from rislam_rt.adviser.link_budget import LandmarkLink, Survey
 from rislam_rt.adviser.reasons import WEAK
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.antennas import amplitude

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisLegs, Scene

@@ -9,7 +9,7 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings, wr
 from rislam_rt.shipped import name_from_here, room_beside
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.specification.settings import Setting
+    from rislam_rt.pipeline.specification.settings_list import Setting
 
 Value = dict[str, Any]
 
@@ -26,8 +26,8 @@ def command(
 
     Example: rislam-rt config trace_then_slam --explain slam.sigma_a
     """
-    from rislam_rt.pipeline.specification.settings import explain as find
-    from rislam_rt.pipeline.specification.settings import list_settings
+    from rislam_rt.pipeline.specification.settings_list import explain as find
+    from rislam_rt.pipeline.specification.settings_list import list_settings
     from rislam_rt.studies import load_any
 
     spec = load_any(pipeline, set_ or ())

@@ -13,7 +13,7 @@ from rislam_rt.shipped import find_pipeline, find_room
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
-    from rislam_rt.pipeline.specification.spec import Settings as RunSettings
+    from rislam_rt.pipeline.specification.pipeline_spec import Settings as RunSettings
 
 FARTHEST = 1e5
 """Largest coordinate [m] of a point on the command line, as in a scene."""
@@ -116,7 +116,7 @@ def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
         The pipeline or a setting is unusable.
     """
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.specification.spec import build_settings
+    from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
     return build_settings(load_spec(pipeline, changed))
 

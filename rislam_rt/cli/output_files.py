@@ -84,8 +84,8 @@ def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: 
     """
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.store.identity import short_name
+    from rislam_rt.storage.checksums import checksum
     from rislam_rt.storage.files import check_writable
-    from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))
     if folder.exists() and not folder.is_dir():

@@ -8,7 +8,7 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
 from rislam_rt.cli.verbosity import warn
-from rislam_rt.spelling import counted
+from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -61,7 +61,7 @@ def command(
 
 def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
     """Run all schemes of a SLAM pipeline in a scene, as `rislam-rt run` does; a completed run is shown instead."""
-    from rislam_rt.cli.scenes import open_scene, scene_of
+    from rislam_rt.cli.scene_arguments import open_scene, scene_of
     from rislam_rt.pipeline.run import check_run, prepare_channel
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.pipeline.store.identity import run_identity
@@ -111,7 +111,7 @@ def compute_run(
     import numpy as np
 
     from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.pipeline import run_slam
     from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
     from rislam_rt.pipeline.scores.summary import summarise

@@ -12,8 +12,8 @@ import typer
 from rislam_rt.cli.interrupts import Interrupted
 from rislam_rt.cli.options import StudyOptions, write_json
 from rislam_rt.cli.output_files import page_files, study_folder
-from rislam_rt.cli.progress import show_progress, show_sweep
-from rislam_rt.cli.scenes import open_scene, scene_of
+from rislam_rt.cli.progress_bars import show_progress, show_sweep
+from rislam_rt.cli.scene_arguments import open_scene, scene_of
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.run import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
@@ -25,15 +25,15 @@ from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.terminal_tables import print_cards, print_validation
 from rislam_rt.report.unseen import write_unseen
-from rislam_rt.scene.file_names import safe_name
+from rislam_rt.scene.scene_folder import safe_name
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec, UnseenSpec
+from rislam_rt.studies.channel_validation import comparison_table, run_comparison
 from rislam_rt.studies.claims import SOURCE, judge, read_results
 from rislam_rt.studies.classifier.sets import gather_sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import ALL, train_and_score
-from rislam_rt.studies.compare import comparison_table, run_comparison
 from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept import build_sweep

@@ -3,8 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.design.objective import Objective
-from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.single_path import exact_code
 
 LARGE = 100

@@ -8,10 +8,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
+from rislam_rt.design.design_problem import DesignProblem
+from rislam_rt.design.design_result import Design, DesignConfig, Designer
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
-from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.result import Design, DesignConfig, Designer
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.design.design_problem import DesignProblem
+from rislam_rt.design.design_result import DesignConfig
 from rislam_rt.design.designers import designer
-from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single_path import exact_code
 
 

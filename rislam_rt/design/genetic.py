@@ -3,8 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.design.design_result import DesignConfig
 from rislam_rt.design.objective import Objective
-from rislam_rt.design.result import DesignConfig
 
 
 def genetic_search(

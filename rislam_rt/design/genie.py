@@ -4,7 +4,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.design.problem import DesignProblem, problem_from_arrays
+from rislam_rt.design.design_problem import DesignProblem, problem_from_arrays
 from rislam_rt.design.single_path import exact_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import vertex_gradient

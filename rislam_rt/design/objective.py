@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.information import Outcome
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.information.position import range_information
+from rislam_rt.information.position_bound import range_information
 from rislam_rt.model import RadioConfig, RxArray
 
 

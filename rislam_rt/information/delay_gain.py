@@ -12,7 +12,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.information.position import Outcome
+from rislam_rt.information.position_bound import Outcome
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import autocorrelation
 

@@ -17,7 +17,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.bistatic import cosine_gradient
 from rislam_rt.geometry.planes import mirror_chain, plane_tangents
 from rislam_rt.information.accuracy import cosine_information
-from rislam_rt.information.position import range_information
+from rislam_rt.information.position_bound import range_information
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 Unknown = Literal["known", "planes", "images"]

@@ -21,7 +21,7 @@ from rislam_rt.measurement.estimation.estimate import estimate_paths
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import fit_amplitudes
 from rislam_rt.measurement.hardware import Correction, image_spectrum
-from rislam_rt.measurement.signal import num_tones
+from rislam_rt.measurement.received_signal import num_tones
 from rislam_rt.model import Body, RadioConfig
 
 FAINTEST = (0.3, 0.1, 0.03, 0.01, 0.003)

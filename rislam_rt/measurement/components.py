@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std, measurement_std
-from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import RadioConfig, SensorModel
 
 DISC_STD = 0.5

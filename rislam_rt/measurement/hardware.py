@@ -15,7 +15,7 @@ import scipy
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.signal import add_noise, convert, num_tones, to_samples, to_tones
+from rislam_rt.measurement.received_signal import add_noise, convert, num_tones, to_samples, to_tones
 from rislam_rt.model import RadioConfig
 
 LARGEST = 1e12

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.received import receive
+from rislam_rt.measurement.received_paths import receive
 from rislam_rt.model import Paths, RadioConfig
 from rislam_rt.waveform import delay_response, subcarrier_frequencies
 

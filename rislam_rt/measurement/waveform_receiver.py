@@ -9,15 +9,15 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement.components import ReportedComponents, capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.detection_threshold import detection_threshold
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding
 from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import panel_probability
-from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sensor_model import detection_threshold
-from rislam_rt.measurement.signal import num_tones, tones
+from rislam_rt.measurement.received_paths import Received
+from rislam_rt.measurement.received_signal import num_tones, tones
 from rislam_rt.measurement.slot_motion import codes_in_turn, split_by_code
 from rislam_rt.measurement.true_identity import identify
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored

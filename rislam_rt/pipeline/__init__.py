@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rislam_rt.pipeline.run import run_slam
+    from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.pipeline.specification.read import load_spec
-    from rislam_rt.pipeline.specification.spec import PipelineSpec
+    from rislam_rt.pipeline.specification.read_pipeline import load_spec
 
 __all__ = ["PipelineSpec", "build_radio", "load_spec", "run_slam"]
 

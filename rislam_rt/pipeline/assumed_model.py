@@ -14,7 +14,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
-from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
+from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
 
 

@@ -17,7 +17,7 @@ from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, S
 from rislam_rt.pipeline.assumed_model import AssumedModel, tell_measurement
 from rislam_rt.pipeline.control_link import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
-from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings
 from rislam_rt.ris import PanelErrors, rephase
 
 

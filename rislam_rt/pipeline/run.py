@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.backend import prepare_backend
 from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
-from rislam_rt.measurement.received import check_half_turn
+from rislam_rt.measurement.received_paths import check_half_turn
 from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.assumed_model import tilted_motion
 from rislam_rt.pipeline.control_link import check_control
@@ -25,12 +24,13 @@ from rislam_rt.pipeline.room.true_motion import draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
+from rislam_rt.tracer_backend import prepare_backend
 from rislam_rt.worker_pool import run_side_by_side
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")

@@ -20,7 +20,7 @@ from rislam_rt.pipeline.recordings.inputs import RecordedInputs, given_of
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.progress import Tell
 from rislam_rt.ris import draw_panel
 from rislam_rt.storage.netcdf import padded

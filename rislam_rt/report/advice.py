@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from rislam_rt.adviser.advice import Advice
-from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink
-from rislam_rt.adviser.cost import cost_words
 from rislam_rt.adviser.coverage import Coverage
+from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.remedies import detection_label
+from rislam_rt.adviser.tracing_cost import cost_words
 from rislam_rt.model import Scene
 from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import save_figure, styled

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
 """Schemes in words; others are called by their names."""

@@ -13,7 +13,7 @@ from rislam_rt.evaluate import match_planes
 from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
-from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
+from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
 from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
 from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 

@@ -10,8 +10,8 @@ from rislam_rt.errors import GeometryError
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.read_inside_folder import read_inside
 from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv, parse_tum
+from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.schema import AgentSection
 from rislam_rt.scene.waypoints import RoundedPath, round_corners
 

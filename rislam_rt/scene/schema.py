@@ -6,10 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.input_messages import expected_input
+from rislam_rt.input_messages import did_you_mean, expected_input, nearest
 from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
-from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000

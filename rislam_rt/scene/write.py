@@ -12,10 +12,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.scene.scene_folder import safe_name
+from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.toml import toml_bytes
 
 TRAJECTORY_FILE = "path.tum"

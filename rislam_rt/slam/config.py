@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
+from rislam_rt.slam.input_checks import check_inside, check_named, check_not_negative
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.setting_checks import check_inside, check_named, check_not_negative
 
 FILTERS = ("window", "nested")
 """Names that `slam.filter` takes: filters with the same inputs and outputs."""

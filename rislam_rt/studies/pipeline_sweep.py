@@ -15,9 +15,9 @@ from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.specification.read import Table, build_spec, make_way, read_table
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.specification.section import Positive, Section
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from rislam_rt.errors import RislamError
 from rislam_rt.storage import files
+from rislam_rt.storage.checksums import flatten, read_sealed, seal
 from rislam_rt.storage.lock import LOCK_FILE, hold
-from rislam_rt.storage.seal import flatten, read_sealed, seal
 from rislam_rt.sweeps.cell_work import CellOutcome
 from rislam_rt.sweeps.sweep import Cell, Sweep
 

@@ -17,7 +17,7 @@ FLOORS = {
         "errors",
         "constants",
         "arrays",
-        "backend",
+        "tracer_backend",
         "input_messages",
         "progress",
         "shipped",
@@ -44,7 +44,7 @@ BLIND = {"slam": ("channel", "scene"), "design": ("channel", "scene"), "informat
 ONLY_IN = {
     "sionna": ("channel/traced/",),
     "mitsuba": ("channel/traced/",),
-    "drjit": ("channel/traced/", "slam/", "backend.py"),
+    "drjit": ("channel/traced/", "slam/", "tracer_backend.py"),
     "matplotlib": ("report/",),
     "trimesh": ("scene/",),
     "pickle": (),

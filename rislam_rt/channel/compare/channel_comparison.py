@@ -10,7 +10,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.channel.compare.comparison_report import PathReport
 from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.facets import WallFacets, build_facets
+from rislam_rt.channel.image_source.wall_facets import WallFacets, build_facets
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import WallFacets, build_facets
+from rislam_rt.channel.image_source.wall_facets import WallFacets, build_facets
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET

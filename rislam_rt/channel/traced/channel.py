@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.path_composition import compose_paths
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
-from rislam_rt.channel.traced.sequences import CandidateIndices, in_blocks, wall_sides
 from rislam_rt.channel.traced.tracer_startup import start_tracer
+from rislam_rt.channel.traced.wall_sequences import CandidateIndices, in_blocks, wall_sides
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory

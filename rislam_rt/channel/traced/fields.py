@@ -19,8 +19,8 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.traced.leg_query import LegEndpoints
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
 from rislam_rt.channel.traced.radio_materials import ConstantReflection
-from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene
+from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.float32_limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
-from rislam_rt.channel.traced.sequences import CandidateIndices, join_indices, point_sides, possible_sequences
+from rislam_rt.channel.traced.wall_sequences import CandidateIndices, join_indices, point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 

@@ -11,7 +11,7 @@ import sionna.rt as rt
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.radio_materials import specular_material
-from rislam_rt.channel.traced.sequences import NO_WALL
+from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError

@@ -1,8 +1,8 @@
 """Visibility test by Sionna's image method: which candidates for legs exist in the meshes, and where they bounce.
 
 `PathSolver` finds its candidates by shooting rays, for all pairs of sources and targets. Here the candidates are
-given (`sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory is
-one solve and no candidate depends on luck. The answer is the tracer's own: images in the meshes' planes, rays back
+given (`wall_sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory
+is one solve and no candidate depends on luck. The answer is the tracer's own: images in the meshes' planes, rays back
 through the scene, occlusion, and the primitives hit.
 """
 
@@ -21,8 +21,8 @@ from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
-from rislam_rt.channel.traced.sequences import NO_WALL, CandidateIndices, turned_round
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_points
+from rislam_rt.channel.traced.wall_sequences import NO_WALL, CandidateIndices, turned_round
 
 
 class SingleRays:

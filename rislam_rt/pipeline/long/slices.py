@@ -16,14 +16,14 @@ import numpy as np
 from rislam_rt.arrays import Integers
 from rislam_rt.errors import ResultError
 from rislam_rt.model import NOTHING, Body, Paths, Scene, SchemeResult, Trajectory
-from rislam_rt.pipeline import dataset
+from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
 from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.progress import Tell
 from rislam_rt.storage.netcdf import read_dataset, write_dataset
 
@@ -79,11 +79,11 @@ def run_slices(
         part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
-            (slice_file(folder, number, PATHS_FILE), dataset.paths_to_dataset(own, scene.agent[first:last])),
-            (slice_file(folder, number, f"scheme_{name}.nc"), dataset.scheme_to_dataset(part)),
+            (slice_file(folder, number, PATHS_FILE), run_datasets.paths_to_dataset(own, scene.agent[first:last])),
+            (slice_file(folder, number, f"scheme_{name}.nc"), run_datasets.scheme_to_dataset(part)),
             (slice_file(folder, number, f"measurements_{name}.nc"), given_to_dataset(part)),
         ):
-            write_dataset(dataset.seal_dataset(data, run=run, slice=str(number)), file)
+            write_dataset(run_datasets.seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
 
 
@@ -112,12 +112,12 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
         for what in (PATHS_FILE, f"scheme_{name}.nc"):
             file = slice_file(folder, number, what)
             data = read_dataset(file)
-            dataset.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
+            run_datasets.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
             found.append(data)
-        scheme = dataset.dataset_to_scheme(found[1])
+        scheme = run_datasets.dataset_to_scheme(found[1])
         if scheme.scheme != name:
             raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield SlicePart(scene.agent[first:last], dataset.dataset_to_paths(found[0]), scheme)
+        yield SlicePart(scene.agent[first:last], run_datasets.dataset_to_paths(found[0]), scheme)
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:

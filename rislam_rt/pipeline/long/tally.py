@@ -15,7 +15,7 @@ from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
 from rislam_rt.pipeline.scores.summary import has_diverged, landmark_track, map_score, nees_per_dof, over_budget
-from rislam_rt.pipeline.scores.walls import count_ghosts, wall_scores
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
 
 CLUTTER = None
 

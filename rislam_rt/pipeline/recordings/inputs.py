@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec, SchemeResult
 from rislam_rt.model.ris import join_sheets
-from rislam_rt.pipeline.dataset import AXES, names_of
+from rislam_rt.pipeline.run_datasets import AXES, names_of
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import Entry, padded, variables
 

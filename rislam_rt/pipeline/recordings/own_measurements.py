@@ -14,7 +14,7 @@ from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import read_dataset
 

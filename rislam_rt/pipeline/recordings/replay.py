@@ -14,8 +14,8 @@ from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator, OwnDiagnostics
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.specification.read import Table, build_spec
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted
 

@@ -9,7 +9,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import RisPanel, Scatterer, Scene, join_panels
-from rislam_rt.pipeline.specification.spec import RoomSection
+from rislam_rt.pipeline.specification.pipeline_spec import RoomSection
 
 RADIUS = 0.05
 """[m] Radius of an added scatterer, a sphere: the paper's."""

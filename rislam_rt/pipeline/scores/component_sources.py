@@ -10,8 +10,8 @@ from rislam_rt.model import NOTHING, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.walls import coplanar
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.scores.wall_scores import coplanar
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 Source = tuple[int, ...]
 """Source of a path: landmark and the plane that mirrors it (-1: none); of a wall return -1 and its planes, sorted."""

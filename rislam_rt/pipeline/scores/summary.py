@@ -10,10 +10,10 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
-from rislam_rt.pipeline.scores.walls import count_ghosts, seconds_audible, wall_scores
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 DIVERGED = 0.5
 """Position error [m] beyond which a run counts as diverged."""

@@ -15,15 +15,15 @@ from typing import Any
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import SchemeResult, SlamResult, Trajectory
-from rislam_rt.pipeline import dataset
+from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
+from rislam_rt.storage.checksums import file_digest, read_sealed, seal
 from rislam_rt.storage.files import has_marker, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.netcdf import dataset_bytes, read_dataset
-from rislam_rt.storage.seal import file_digest, read_sealed, seal
 
 RUN_FILE, PATHS_FILE = "run.json", "paths.nc"
 RUNNING, DONE = "running", "done"
@@ -51,9 +51,9 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             raise KeyError(name) from None
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
-        data = dataset.seal_dataset(dataset.scheme_to_dataset(result), **self._stamp())
+        data = run_datasets.seal_dataset(run_datasets.scheme_to_dataset(result), **self._stamp())
         if result.given is not None:
-            given = dataset.seal_dataset(given_to_dataset(result), **self._stamp())
+            given = run_datasets.seal_dataset(given_to_dataset(result), **self._stamp())
             self.put(f"measurements_{name}.nc", dataset_bytes(given))
         self.put(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
@@ -100,7 +100,9 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         StoreError
             The disk refused.
         """
-        paths = dataset.seal_dataset(dataset.paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
+        paths = run_datasets.seal_dataset(
+            run_datasets.paths_to_dataset(result.paths, result.scene.agent), **self._stamp()
+        )
         self.put(PATHS_FILE, dataset_bytes(paths))
         for name, content in export_files(result, summary).items():
             self.put(name, content)
@@ -264,8 +266,8 @@ def read_run(folder: Path) -> SlamResult:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
         check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
-        dataset.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
-        paths, scene = dataset.dataset_to_paths(data), load_scene(folder / "scene")
+        run_datasets.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
+        paths, scene = run_datasets.dataset_to_paths(data), load_scene(folder / "scene")
         agent = Trajectory(
             data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
             data["true_heading"].to_numpy(), scene.agent.body,
@@ -302,5 +304,5 @@ def reading_run(folder: Path) -> Iterator[None]:
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
     """Read a scheme's result from its NetCDF file, and check that it is of this scheme and run."""
     data = read_dataset(file)
-    dataset.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
-    return dataset.dataset_to_scheme(data)
+    run_datasets.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
+    return run_datasets.dataset_to_scheme(data)

@@ -9,7 +9,7 @@ from rislam_rt.report.markdown import table_lines
 from rislam_rt.report.studies.channel_validation_figure import draw_certificate
 from rislam_rt.report.style import to_png
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.studies.compare import Comparison
+from rislam_rt.studies.channel_validation import Comparison
 from rislam_rt.studies.spec import CompareSpec
 
 COMPARISON, CERTIFICATE = "channel_validation", "figures/path_certificate.png"

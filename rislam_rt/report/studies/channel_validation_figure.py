@@ -13,7 +13,7 @@ from rislam_rt.model import PathKind, Paths
 from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
-from rislam_rt.studies.compare import Certificate
+from rislam_rt.studies.channel_validation import Certificate
 
 ALONE = "#CC79A7"
 """Colour of a path that only one channel has."""

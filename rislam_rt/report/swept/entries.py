@@ -8,8 +8,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.audible import HEARD
-from rislam_rt.report.swept.table_cells import NOTHING
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.report.markdown import NOTHING
 from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.swept import Group, paired_gain, spread
 

@@ -6,11 +6,19 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.report.markdown import (
+    NOTHING,
+    metres,
+    metres_between,
+    paragraph,
+    percent_between,
+    picture,
+    ratio,
+    table_lines,
+)
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
-from rislam_rt.report.swept.table_cells import NOTHING, metres, metres_between, percent_between, ratio
 from rislam_rt.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
 from rislam_rt.studies.swept.sweep import SNR
 

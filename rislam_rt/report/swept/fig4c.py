@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import picture, table_lines
+from rislam_rt.report.markdown import metres, metres_between, percent_between, picture, ratio, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, panels_of, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, mark_metres
-from rislam_rt.report.swept.table_cells import metres, metres_between, percent_between, ratio
 from rislam_rt.studies.swept import Fig4cSpec, Group, paired_gain, spread
 
 TITLE = "Error against the panel's size: Fig. 4(c)"

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.report.markdown import NOTHING, paragraph, percent, picture, ratio, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.table_cells import NOTHING, percent, ratio
 from rislam_rt.studies.swept import Group, HardwareSpec
 from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 

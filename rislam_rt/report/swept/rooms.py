@@ -8,12 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
-from rislam_rt.pipeline.scores.audible import HEARD
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.report.markdown import metres, metres_between, paragraph, picture, ratio, table_lines
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import mark_metres
-from rislam_rt.report.swept.table_cells import metres, metres_between, ratio
 from rislam_rt.studies.swept import Group, RoomsSpec
 
 TITLE = "All rooms"

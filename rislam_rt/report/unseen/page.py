@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
-from rislam_rt.pipeline.scores.audible import HEARD
-from rislam_rt.report.markdown import paragraph, picture, table_lines
-from rislam_rt.report.swept.table_cells import NOTHING
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.report.markdown import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
 from rislam_rt.studies.unseen.score import FAR_OVER, GOOD_ANGLE, GOOD_OFFSET, LASTING, LOST, NEAR_POINT, SETTLED
 from rislam_rt.studies.unseen.spec import TEST, UnseenSpec

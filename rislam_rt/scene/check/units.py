@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Finding
-from rislam_rt.scene.mesh_files import UNITS
+from rislam_rt.scene.mesh_placement import UNITS
 
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
 """Units other than metres that rooms are drawn in, and their names in a scene file."""

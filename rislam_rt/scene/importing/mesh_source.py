@@ -10,9 +10,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.importing.obj import read_obj
+from rislam_rt.scene.importing.obj_files import read_obj
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, check_glb, node_mesh, sound_mesh, unfold
-from rislam_rt.scene.read_inside_folder import read_inside
+from rislam_rt.scene.scene_folder import read_inside
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 """Endings of the mesh files that can be imported."""

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_about
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader
-from rislam_rt.scene.read_inside_folder import read_inside
+from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.xml.untrusted_xml import children
 
 FILES = {"ply": ".ply", "obj": ".obj"}

@@ -11,9 +11,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RadioConfig, RisCode, SensorModel
-from rislam_rt.model.sensor import ONE_PULSE
+from rislam_rt.model.sensor_model import ONE_PULSE
 from rislam_rt.slam.classify import Sightings, classify, classify_geometric, load_classifier, track_features
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.input_checks import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
@@ -33,7 +34,6 @@ from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.observations import PANEL, free_space, stranger_density
 from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, StepInfo
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init

@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.gaussian_draws import even_draws, square_root
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.predicted_returns import AXES, poses_of
+from rislam_rt.slam.sampling import even_draws, square_root
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmarks.duplicate_walls import second_planes

@@ -6,10 +6,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
 from rislam_rt.slam.arrival_rays import scatterer_positions
-from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.predicted_returns import Poses, reflect
+from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh

@@ -15,8 +15,8 @@ from rislam_rt.pipeline.recordings.replay import Recorder
 from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.signals import SignalsSpec, build_signals
-from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec
+from rislam_rt.pipeline.signal_simulation import SignalsSpec, build_signals
+from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, PipelineSpec
 from rislam_rt.progress import tell_nobody
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
-from rislam_rt.pipeline.scores.audible import heard_long
+from rislam_rt.pipeline.scores.audible_paths import heard_long
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0

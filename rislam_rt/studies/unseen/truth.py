@@ -10,11 +10,11 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import Surfaces, root_mean_square
 from rislam_rt.information import posterior_bound
 from rislam_rt.model import Paths, Scene, SchemeResult
-from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes
-from rislam_rt.pipeline.scores.bound import bound_problem
+from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
-from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.posterior_bound import bound_problem
+from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 
 class Truth(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
-from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
 from rislam_rt.scene.importing.regions.region_groups import RegionGroup

@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.backend import prepare_backend
 from rislam_rt.slam.nested.particles.landmark_cloud import (
     DEEPEST,
     HOPELESS,
@@ -29,6 +28,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import (
     restoring_map,
 )
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
+from rislam_rt.tracer_backend import prepare_backend
 
 TOP = 2**20 - 1
 """Largest quantised coordinate, in steps."""
@@ -86,7 +86,7 @@ LANES = {"llvm": 8, "cuda": 64}
 
 
 class DrJitEngine:
-    """Engine of landmark particles in Dr.Jit, on the device that `rislam_rt.backend` chose."""
+    """Engine of landmark particles in Dr.Jit, on the device that `rislam_rt.tracer_backend` chose."""
 
     def __init__(self) -> None:
         self.name = prepare_backend().variant.split("_")[0]

@@ -14,7 +14,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import (
     restoring_map,
 )
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
-from rislam_rt.slam.systematic_resampling import ancestors_at
+from rislam_rt.slam.sampling import ancestors_at
 
 Singles = npt.NDArray[np.float32]
 """Arrays of float32."""

@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
-from rislam_rt.model.sensor import merged_pull
+from rislam_rt.model.sensor_model import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over

@@ -8,6 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.observations import free_space, is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, claims, expect_scan, likelihoods, spread_of
@@ -29,7 +30,6 @@ from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of, position_errors
 from rislam_rt.slam.schemes.shared.sum_correction import is_strong
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 LIVELY_STRIDE = 5

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.setting_checks import check_counts, check_inside, check_named, check_not_negative
+from rislam_rt.slam.input_checks import check_counts, check_inside, check_named, check_not_negative
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,10 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.ris.path_gain import point_amplitude
-from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.predicted_returns import AXES, poses_of
+from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable

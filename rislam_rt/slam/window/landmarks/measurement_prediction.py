@@ -9,8 +9,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
-from rislam_rt.model.sensor import SensorModel
-from rislam_rt.model.sensor import detection_probability as detection_probability_of
+from rislam_rt.model.sensor_model import SensorModel
+from rislam_rt.model.sensor_model import detection_probability as detection_probability_of
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS

@@ -16,7 +16,6 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
-from rislam_rt.slam.gaussian_draws import even_draws, square_roots
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.panel_evidence import (
@@ -28,6 +27,7 @@ from rislam_rt.slam.panel_evidence import (
     log_scatterer_missed,
     weigh_silence,
 )
+from rislam_rt.slam.sampling import even_draws, square_roots
 from rislam_rt.slam.window.solver_limits import CERTAIN, DRAWS
 
 
