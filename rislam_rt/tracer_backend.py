@@ -89,8 +89,8 @@ def prepare_backend() -> BackendInfo:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Delay interrupts (SIGINT, SIGTERM) while the ray tracer's libraries are loaded, whose extensions may abort the
-    process at an exception; the first signal that came meanwhile is raised at the end."""
+    """Delay interrupts (SIGINT, SIGTERM) while the ray tracer's backend is loaded, whose extensions may abort the
+    process at an exception; the first signal is raised at the end."""
     came: list[int] = []
     kept = {}
     if current_thread() is main_thread():  # no other is interrupted
@@ -167,7 +167,7 @@ def diagnose() -> tuple[Diagnosis, ...]:
 
 
 def count_gpus() -> int:
-    """Number of CUDA devices that the driver reports; 0 without a driver."""
+    """Number of CUDA devices (GPUs) for the tracer's backend that the driver reports; 0 without a driver."""
     try:
         driver = ctypes.CDLL("libcuda.so.1")
     except OSError:
@@ -213,7 +213,8 @@ def _choose_llvm() -> tuple[str, str]:
 
 
 def _wheel_llvm() -> Iterator[str]:
-    """Path of the libLLVM file of the installed karellen-llvm-core wheel; links to it may be missing."""
+    """Path of the libLLVM file of the installed karellen-llvm-core wheel, for the tracer's backend; links to it may be
+    missing."""
     try:
         files = metadata.distribution("karellen-llvm-core").files or []
     except metadata.PackageNotFoundError:
@@ -224,7 +225,8 @@ def _wheel_llvm() -> Iterator[str]:
 
 
 def _system_llvm() -> list[str]:
-    """Paths of the libLLVM files that the system has, newest first by the version in their names."""
+    """Paths of the libLLVM files that the system has for the tracer's backend, newest first by the version in their
+    names."""
     paths = {str(Path(p).resolve()) for pattern in _SYSTEM_LLVM for p in glob(pattern)}
     return sorted(paths, key=lambda p: (_named_version(p), p), reverse=True)
 
@@ -237,7 +239,8 @@ def _named_version(path: str) -> tuple[int, ...]:
 
 
 def _load(path: str) -> ctypes.CDLL:
-    """Open a libLLVM, the wheel's C++ runtime first, by its full name, where its links are missing."""
+    """Open a libLLVM for the tracer's backend, the wheel's C++ runtime first, by its full name, where its links are
+    missing."""
     try:
         return ctypes.CDLL(path)
     except OSError:

@@ -62,7 +62,8 @@ def cost_words(cost: TraceCost) -> str:
 
 
 def _count_sequences(channel: ImageSourceChannel, depth: int) -> int:
-    """Number of wall sequences, empty ones included, that tracing has to test at the trajectory's middle."""
+    """Number of wall sequences, empty ones included, that tracing has to test at the trajectory's middle: what it
+    costs."""
     scene, facets, row = channel.scene, channel.sequence_search.facets, len(channel.scene.agent) // 2
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]

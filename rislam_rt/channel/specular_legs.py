@@ -47,7 +47,7 @@ class SpecularLegs:
 
     @property
     def num_bounces(self) -> Integers:
-        """Number (S,) of bounces of each wall sequence."""
+        """Number (S,) of bounces on a specular leg, by wall sequence."""
         return (self.walls >= 0).sum(axis=1)
 
     def gain(self, wavelength: float) -> Complexes:

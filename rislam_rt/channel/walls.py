@@ -42,7 +42,7 @@ class Walls:
         return len(self.names)
 
     def beside(self, wall: int) -> Booleans:
-        """Which walls (W,) share a wall's plane by lying on each other, itself among them; none for -1."""
+        """Which walls (W,) of a scene share a wall's plane by lying on each other, itself among them; none for -1."""
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
 
     def largest_triangles(self) -> tuple[Integers, Floats]:

@@ -69,7 +69,8 @@ def command(
 
 
 def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:
-    """Print which landmarks the receiver will detect, draw the coverage map if asked, return the advice for JSON."""
+    """Part of `rislam-rt check`: print which landmarks will be detected, draw the coverage map if asked, return the
+    advice."""
     import numpy as np
 
     from rislam_rt.adviser.advice import advise

@@ -73,7 +73,7 @@ def _facts(one: "Setting") -> str:
 
 
 def _value(spec: Any, key: str) -> Any:
-    """Value of the setting with a dotted key in a specification."""
+    """Value of the setting with a dotted key in a specification, for `rislam-rt config`."""
     for part in key.split("."):
         spec = getattr(spec, part)
     return spec
@@ -90,7 +90,7 @@ def _from_here(value: Any, folder: Path, key: str = "") -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Value of a setting as plain data for TOML and JSON."""
+    """Value of a setting as plain data for TOML and JSON, for `rislam-rt config`."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):

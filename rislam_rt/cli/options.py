@@ -20,7 +20,7 @@ FARTHEST = 1e5
 
 
 def pipeline_file(name: str) -> Path:
-    """Path of a pipeline file, or of a built-in one by its name.
+    """Command line argument of a pipeline: the path of its file, or of a built-in one by its name.
 
     Its folder and the working folder are added to Python's module path, so that it can name a user's own methods.
     """
@@ -108,7 +108,8 @@ def parse_point(option: str, text: str) -> "Floats":
 
 
 def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
-    """Settings of a pipeline in SI units (radio, receiver, estimators), with `KEY=VALUE` settings put over them.
+    """Settings of a pipeline in SI units (radio, receiver, estimators), with the command line's `--set KEY=VALUE` put
+    over them.
 
     Raises
     ------

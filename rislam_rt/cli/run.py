@@ -81,7 +81,8 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
-    """Print the scores of a completed run from its folder, and draw its page if that is missing."""
+    """For `rislam-rt run`: print the scores of a completed run from its folder, and draw its page if that is
+    missing."""
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, read_summary
     from rislam_rt.report.page import PAGE, write_report
@@ -105,7 +106,7 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
 def compute_run(
     spec: "PipelineSpec", room: "Scene", identity: "RunIdentity", folder: Path, given: StudyOptions
 ) -> None:
-    """Compute a run, or the schemes of it that are not there yet, in its folder; print scores and write the page."""
+    """For `rislam-rt run`: compute a run, or its missing schemes, in its folder; print scores and write the page."""
     import os
 
     import numpy as np
@@ -147,7 +148,7 @@ def compute_run(
 
 
 def show_scores(summary: Mapping[str, Any]) -> None:
-    """Print the scores of a run from its summary, then its warnings on the error stream."""
+    """For `rislam-rt run`: print the scores of a run from its summary, then its warnings on the error stream."""
     from rislam_rt.report.terminal_tables import print_summary
 
     print_summary(summary)

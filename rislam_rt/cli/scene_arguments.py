@@ -27,7 +27,8 @@ class OpenedScene(NamedTuple):
 
 
 def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:
-    """Read and check a scene folder; where a radio is given, materials and panel at its carrier as well.
+    """Read and check the scene that a command works on; where a radio is given, materials and panel at its carrier as
+    well.
 
     Raises
     ------
@@ -43,7 +44,8 @@ def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:
 
 
 def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Path) -> Path:
-    """The folder of `--scene`, or the one that the pipeline names: relative to its file, or a built-in room.
+    """The scene folder that a command works on: that of `--scene`, or the one that the pipeline names, relative to its
+    file, or built in.
 
     Raises
     ------

@@ -45,7 +45,7 @@ from rislam_rt.sweeps.store import check_folder, read_timings
 
 
 def _refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
-    """Raise an error if `--scene` is given for a study that names its own rooms, or has none."""
+    """Raise an error if `rislam-rt run` gets `--scene` for a study that names its own rooms, or has none."""
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
 

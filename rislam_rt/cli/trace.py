@@ -101,7 +101,8 @@ def command(
 
 
 def _check_new(folder: Path) -> None:
-    """Check the folder of `trace --deepmimo` before paths are traced: it must not exist, and have a name that loads."""
+    """Check the folder of `rislam-rt trace --deepmimo` before paths are traced: it must not exist, and have a name that
+    loads."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.report.exports.deepmimo import check_name
 
@@ -111,7 +112,8 @@ def _check_new(folder: Path) -> None:
 
 
 def _part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
-    """Scene with the first `cycles` of its trajectory alone, of these every `stride`-th; an error if it has fewer."""
+    """Scene for `rislam-rt trace` with the first `cycles` of its trajectory, of these every `stride`-th; an error if it
+    has fewer."""
     from dataclasses import replace
 
     from rislam_rt.errors import ConfigError
@@ -145,7 +147,8 @@ def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int,
 def _trace_signals(
     scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
 ) -> TraceResult:
-    """Find all paths under phase codes, simulate received samples and components, and write the data set to a file."""
+    """Write the signals of `rislam-rt trace --signals`: find all paths under phase codes, simulate samples and
+    components."""
     from itertools import count
     from time import perf_counter
 

@@ -43,7 +43,8 @@ def coordinate_descent(objective: Objective, index: Integers, levels: int, max_s
 
 
 def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements whose best level change lowers the objective, best first, and that change less one for all."""
+    """Elements for coordinate descent whose best level change lowers the objective, best first, and that change less
+    one for all."""
     shift = objective.table[1:] - 1.0
     value = objective.value(gain + (weight[:, None] * objective.matrix) * shift[:, None, None])
     change = np.argmin(value, axis=0)
@@ -53,7 +54,7 @@ def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """As `_rank_by_value`, but to first order in the powers."""
+    """Elements for coordinate descent as `_rank_by_value` ranks them, but to first order in the powers."""
     size = 1e-6
     slope = (objective.value(gain * (1.0 + 0.5 * size * np.eye(len(gain)))) - now) / size
     shift = objective.table[1:] - 1.0
@@ -83,7 +84,7 @@ def _first_changes(index: Integers, order: Integers, change: Integers, levels: i
 
 
 def exact_codes(problem: DesignProblem) -> Integers:
-    """Code (N M,) with every panel at the exact optimum of its direct path's gain."""
+    """Start of coordinate descent: code (N M,) with every panel at the exact optimum of its direct path's gain."""
     return np.concatenate([exact_code(target, problem.levels)[0] for target in problem.targets])
 
 

@@ -46,7 +46,8 @@ def genetic_search(
 
 
 def _mutations(genes: int, levels: int, probability: float, *, rng: np.random.Generator) -> tuple[Integers, Integers]:
-    """Draw which of a number of genes mutate, each independently with the same probability, and their new levels."""
+    """Draw which of the genetic algorithm's genes mutate, each independently with the same probability, and their new
+    levels."""
     # The gaps between mutated genes are geometric, so that only those are drawn.
     if probability == 0.0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)

@@ -30,7 +30,8 @@ class Objective:
     """`UNOBSERVABLE` if no code makes the information regular: then the objective is `1 / tr J`."""
 
     def gains(self, weight: Complexes) -> Complexes:
-        """Gains (..., B P) of the panel paths at all samples under element weights (..., N M)."""
+        """Gains (..., B P) of the panel paths at all samples under element weights (..., N M), of which the objective
+        is made."""
         return weight @ self.matrix
 
     def value(self, gain: Complexes) -> Floats:
@@ -54,7 +55,8 @@ class Objective:
         return self.value(self.gains(self.table[index]))
 
     def _inverse_trace(self, information: Floats) -> Floats:
-        """Trace (...,) of the inverse of 2 x 2 information matrices (..., 3); 1 / trace of them where unobservable."""
+        """Objective from information matrices (..., 3): the trace (...,) of the inverse; 1 / trace of them where
+        unobservable."""
         xx, xy, yy = information[..., 0], information[..., 1], information[..., 2]
         trace = xx + yy
         if self.outcome is Outcome.UNOBSERVABLE:
@@ -95,7 +97,8 @@ def build_objective(problem: DesignProblem) -> Objective:
 
 
 def detected_power(power: Floats, least: float) -> Floats:
-    """Path powers (...,) times their approximate detection probability, `1 / (1 + (least / power)^4)`."""
+    """Path powers (...,) in the objective times their approximate detection probability, `1 / (1 + (least /
+    power)^4)`."""
     if least == 0.0:
         return power
     ratio = (power / least) ** 2

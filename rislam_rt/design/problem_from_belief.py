@@ -114,7 +114,8 @@ class _PredictedPaths(NamedTuple):
 
 
 def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_PredictedPaths, _PredictedPaths]:
-    """Paths predicted from a map: those over the panels in rows `held`, the direct ones first, and all others."""
+    """Paths that the belief predicts for a design: those over the panels in rows `held`, the direct ones first, and all
+    others."""
     # Images of images are too weak to matter.
     rows = np.arange(len(landmarks.parent))
     points = rows[landmarks.parent < 0]
@@ -133,7 +134,7 @@ def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Predicte
 
 
 def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
-    """Gradients (B, Q, 3) of the lengths of predicted paths by the agent's position."""
+    """Gradients (B, Q, 3) of the lengths of paths that the belief predicts, by the agent's position."""
     # The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
     # image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
     if mode == "exact":
@@ -149,7 +150,8 @@ def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mo
 
 
 def _ratio(landmarks: MapEstimate, paths: _PredictedPaths) -> Floats:
-    """Amplitude ratio (Q,) of the wall reflection on each predicted path, by the image's strength; 1 without wall."""
+    """Amplitude ratio (Q,) of the wall reflection on each path that the belief predicts, by the image's strength; 1
+    without wall."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
     return np.where(image != paths.source, landmarks.strength[image], 1.0)
 
@@ -158,7 +160,8 @@ def _panel_responses(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
     radio: RadioConfig,
 ) -> Complexes:  # fmt: skip
-    """Predicted element responses (B, Q, N, M) of the paths over all panels, whose rows in the map are `held`."""
+    """Element responses (B, Q, N, M) that the belief predicts for paths over all panels, whose rows in the map are
+    `held`."""
     whole = np.zeros((len(tx), len(paths.source), ris.rows, ris.cols), dtype=np.complex128)
     for number, row in enumerate(held):
         mine = np.flatnonzero(paths.source == row)
@@ -170,7 +173,7 @@ def _panel_responses(
 def _responses_of(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, row: int, ris: RisSpec, radio: RadioConfig
 ) -> Complexes:
-    """Predicted element responses (B, Q, N, M) of the paths over the panel in one row of the map."""
+    """Element responses (B, Q, N, M) that the belief predicts for paths over the panel in one row of the map."""
     center, legs = landmarks.position[row], []
     for end, seen, antenna_gain in ((tx, paths.tx_point, radio.tx_gain), (rx, paths.rx_point, radio.rx_gain)):
         # a point that is the panel itself has no plane: its zero normal mirrors nothing
@@ -186,7 +189,8 @@ def _responses_of(
 def _point_gains(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, radio: RadioConfig
 ) -> Complexes:
-    """Predicted gains (B, Q) of paths over point landmarks by eq. `a2`, of strength the root of the cross-section."""
+    """Gains (B, Q) that the belief predicts for paths over points by eq. `a2`, of strength the root of the
+    cross-section."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)
@@ -196,7 +200,7 @@ def _point_gains(
 
 
 def _length_variance(landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats) -> Floats:
-    """Variance (B, Q) [m^2] of the lengths of predicted paths that follows from the landmarks' covariances."""
+    """Variance (B, Q) [m^2] of the lengths of paths that the belief predicts, from the landmarks' covariances."""
     first = unit(landmarks.position[paths.tx_point] - tx)
     second = unit(landmarks.position[paths.rx_point] - rx)
     tx_spread, rx_spread = landmarks.covariance[paths.tx_point], landmarks.covariance[paths.rx_point]

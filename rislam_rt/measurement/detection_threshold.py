@@ -63,7 +63,8 @@ def expected_false_alarms(threshold: float, radio: RadioConfig, window: float) -
 
 
 def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float, float, float]:
-    """Intrinsic volumes mu_0 .. mu_3 of the region searched: ellipse of cosines times interval of delays."""
+    """Intrinsic volumes mu_0 .. mu_3 of the region where noise may pass the threshold: ellipse of cosines times
+    interval of delays."""
     length = 2.0 * np.pi * np.sqrt(radio.effective_bandwidth_squared) * window
     positions = 2.0 * np.pi * radio.array.positions(1.0)[:, :2]
     minor, major = np.sort(np.sqrt(np.mean(positions**2, axis=0)))
@@ -73,7 +74,8 @@ def _intrinsic_volumes(radio: RadioConfig, window: float) -> tuple[float, float,
 
 
 def _half_perimeter(major: float, minor: float) -> float:
-    """Half perimeter of an ellipse of given half axes by Gauss' arithmetic-geometric mean (Abramowitz and Stegun 17.6).
+    """Half perimeter of the ellipse of cosines where noise may pass the threshold, by Gauss' arithmetic-geometric mean
+    (Abramowitz and Stegun 17.6).
 
     `scipy.special.ellipe` would cost every command a tenth of a second to load.
     """

@@ -82,5 +82,5 @@ def _leak_odds(
 
 
 def _pick(found: ReportedComponents, rows: Booleans) -> ReportedComponents:
-    """Select multipath components by row."""
+    """Select by row the multipath components whose panel probability is asked."""
     return ReportedComponents._make(field[rows] for field in found)

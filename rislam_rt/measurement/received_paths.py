@@ -70,7 +70,7 @@ class Clutter(NamedTuple):
     """(K, P) [Hz] Doppler shifts."""
 
     def of_cycle(self, cycle: int) -> "Clutter":
-        """Clutter paths of one cycle alone."""
+        """Received clutter paths of one cycle alone."""
         return Clutter(self.paths.of_cycle(cycle), self.doppler[[cycle]])
 
     def beside(
@@ -83,7 +83,7 @@ class Clutter(NamedTuple):
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:
-    """Complex gain of the direct path from Tx to Rx (leakage) in a cycle before cancellation; 0 where hidden."""
+    """Complex gain of the received direct path (leakage) in a cycle before cancellation; 0 where hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
 
 

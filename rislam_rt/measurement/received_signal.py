@@ -83,7 +83,7 @@ def add_noise(signal: Complexes, variance: float, *, rng: np.random.Generator) -
 
 
 def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float = 0.0) -> tuple[Complexes, float]:
-    """Quantise tones (L, M) by analogue-to-digital converters of `bits` bits for real and imaginary part, 0 for none.
+    """Quantise the received signal's tones (L, M) by converters of `bits` bits for real and imaginary part, 0 for none.
 
     The converters see samples in time. Full scale is the largest sample of all, or `clip_rms` times the root mean
     square of a component; what lies above is cut off. Also returns the variance [J] that the steps add to a tone: a
@@ -101,7 +101,7 @@ def convert(spectrum: Complexes, bits: int, radio: RadioConfig, clip_rms: float 
 
 
 def _mid_rise(value: Floats, step: float, bits: int) -> Floats:
-    """Quantise values to the levels of a mid-rise converter; 0 bits leave them as they are."""
+    """Quantise values of the received signal to the levels of a mid-rise converter; 0 bits leave them as they are."""
     if not bits:
         return value
     level = np.clip(np.floor(value / step), -(2 ** (bits - 1)), 2 ** (bits - 1) - 1)

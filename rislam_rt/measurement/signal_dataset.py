@@ -114,7 +114,7 @@ def load_signals(path: str | Path) -> "xr.Dataset":
 
 
 def _dataset(values: dict[str, Any], radio: RadioConfig, config: ReceiverConfig) -> "xr.Dataset":
-    """Signals data set of the given variables, radio and receiver settings as attributes."""
+    """Data set of received signals from the given variables, radio and receiver settings as attributes."""
     import xarray as xr
 
     attributes = {f"radio_{key}": value for key, value in asdict(radio).items() if key not in ("array", "antennas")}

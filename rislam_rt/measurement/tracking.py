@@ -130,7 +130,7 @@ def step_tracks(
 
 
 def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState:
-    """Kalman prediction of tracks over `dt` [s] by discrete white-noise acceleration."""
+    """Kalman prediction of tracks of multipath components over `dt` [s] by discrete white-noise acceleration."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     shape = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
     strength = np.array([config.length_acceleration, config.cosine_acceleration, config.cosine_acceleration]) ** 2
@@ -156,14 +156,16 @@ def _assign(
 
 
 def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Kalman update of tracks by their components, (N, 3) independent pairs of value and rate."""
+    """Kalman update of tracks of multipath components by their components, (N, 3) independent pairs of value and
+    rate."""
     gain = covariance[..., :, 0] / (covariance[..., 0, 0] + noise)[..., None]
     mean = mean + gain * (seen - mean[..., 0])[..., None]
     return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]
 
 
 def _start(seen: Floats, noise: Floats, config: TrackingConfig) -> tuple[Floats, Floats]:
-    """Mean and covariance of new tracks of one component each: its value, and a rate about 0."""
+    """Mean and covariance of new tracks of multipath components, of one component each: its value, and a rate about
+    0."""
     mean = np.stack([seen, np.zeros_like(seen)], axis=-1)
     covariance = np.zeros((*seen.shape, 2, 2))
     covariance[..., 0, 0] = noise

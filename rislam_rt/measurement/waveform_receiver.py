@@ -121,7 +121,8 @@ def measure_waveform(
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the true path that each estimated component most likely is, of its capture's; -1 for none."""
+    """Column (N,) of the true path that each component of the waveform receiver most likely is, of its capture's; -1
+    for none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -145,7 +146,8 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
 
 
 def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Floats:
-    """Parameters (Q, 3) of the previous cycle's components of the same capture, where the estimator's search begins."""
+    """Parameters (Q, 3) of the previous cycle's components of the same capture, where the waveform receiver's search
+    begins."""
     if previous is None:
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
@@ -156,7 +158,8 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
 
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
-    """Estimate the components of one capture, their standard deviations inflated for what the bound leaves out."""
+    """Components that the waveform receiver estimates in one capture, deviations inflated for what the bound leaves
+    out."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
@@ -183,14 +186,15 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Sounding, MatchedFilterGrid]:
-    """Sounding of `count` tones, and the matched filter's grid over a window of delays in resolution cells."""
+    """Sounding of `count` tones for the waveform receiver, and its search grid over a window of delays in resolution
+    cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)
 
 
 def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
-    """Components after merging estimated paths that cannot be resolved: parameters (N, 3), gains (N,), their standard
-    deviations (N, 3), (N,)."""
+    """Components of the waveform receiver after merging estimated paths that cannot be resolved: parameters (N, 3),
+    gains (N,), their standard deviations (N, 3), (N,)."""
     # Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
     parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
     label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
@@ -211,7 +215,8 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """Number (P,) of each estimated path's component: unresolved ones join their nearest neighbour within a cell."""
+    """Number (P,) of the component that each path of the waveform receiver joins: unresolved ones their nearest
+    neighbour's."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

@@ -169,7 +169,8 @@ def perceived_paths(
 
 
 def _rotations(pitch: Floats, roll: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of a body with its front raised by `pitch` (about y) after a roll about x [rad]."""
+    """Rotation matrices (..., 3, 3) of a body whose tilt the assumed model lacks: front raised by `pitch` (about y)
+    after a roll about x [rad]."""
     pitch, roll = np.broadcast_arrays(pitch, roll)
     one, zero = np.ones_like(pitch), np.zeros_like(pitch)
     cp, sp, cr, sr = np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
@@ -179,5 +180,5 @@ def _rotations(pitch: Floats, roll: Floats) -> Floats:
 
 
 def _amplitude(decibel: float) -> float:
-    """Amplitude ratio of decibels."""
+    """Amplitude ratio of decibels, for errors that the assumed model does not know."""
     return float(10.0 ** (decibel / 20.0))

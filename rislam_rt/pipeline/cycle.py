@@ -53,7 +53,7 @@ class GroundTruth(NamedTuple):
     """Diffuse and diffracted paths, received with the others; None if there are none."""
 
     def at(self, cycle: int) -> Paths:
-        """True paths of one cycle alone."""
+        """True paths of one cycle of the protocol alone."""
         return self.paths.of_cycle(cycle - self.first)
 
 
@@ -191,5 +191,6 @@ def run_cycle(
 
 
 def usual_step(time: Floats) -> float:
-    """Median time [s] between cycles at `time` (K,), as a recording's cycles are not quite even; 0 for one cycle."""
+    """Median time [s] between the protocol's cycles at `time` (K,), as a recording's are not quite even; 0 for one
+    cycle."""
     return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -229,12 +229,12 @@ def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Ch
 
 
 def cut_scene(scene: Scene, cycles: int | None) -> Scene:
-    """Scene with the first `cycles` of its trajectory alone; unchanged if None."""
+    """Scene of a run with the first `cycles` of its trajectory alone; unchanged if None."""
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
 def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings, one line each, where a RIS panel is so large that the band resolves its elements' delays.
+    """Warnings of a run, one line each, where a RIS panel is so large that the band resolves its elements' delays.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.
@@ -260,6 +260,6 @@ def library_versions() -> dict[str, str]:
 
 
 def _seed_of(rng: np.random.Generator) -> int | None:
-    """The integer seed that a run's generator was made from; None if it was not made from one."""
+    """The integer seed of a run, from which its generator was made; None if it was not made from one."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None

@@ -150,7 +150,7 @@ def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
 
 
 def _checksum(data: "xr.Dataset") -> str:
-    """SHA-256 over a data set's names, shapes, types, values and attributes; not over how the file packs them."""
+    """SHA-256 over a run's data set: names, shapes, types, values and attributes; not over how the file packs them."""
     digest = hashlib.sha256()
     for name in sorted(map(str, data.variables)):
         variable = data.variables[name]
@@ -175,14 +175,15 @@ def _plain(attributes: Any) -> list[tuple[str, list[Any]]]:
 
 
 def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]:
-    """Data set variables of a record's fields that `table` lists, their names with `prefix`."""
+    """Variables of a run's data set: a record's fields that `table` lists, their names with `prefix`."""
     names = {f.name for f in fields(record)}
     found = {name: getattr(record, name) for name in table if name in names}
     return variables({name: value for name, value in found.items() if value is not None}, table, prefix)
 
 
 def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:
-    """Arrays of a data set's variables that `table` lists, by field name; complex ones joined of two variables."""
+    """Arrays of the variables of a run's data set that `table` lists, by field name; complex ones joined of two
+    variables."""
     values: dict[str, Any] = {}
     for name in table:
         key = prefix + name
@@ -194,7 +195,7 @@ def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[st
 
 
 def _dataset(content: dict[str, Any], attributes: dict[str, Any], coords: dict[str, Any]) -> "xr.Dataset":
-    """Data set of variables, with the labels (`AXES`) of the axes that they use."""
+    """A run's data set of variables, with the labels (`AXES`) of the axes that they use."""
     import xarray as xr
 
     used = {axis for dims, _, _ in content.values() for axis in dims}

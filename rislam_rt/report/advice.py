@@ -55,7 +55,8 @@ def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Pa
 
 
 def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
-    """Draw one panel's coverage map over the room's plan, with the line where the SNR meets the threshold."""
+    """Draw one panel's coverage map over the room's plan, with the line where the SNR meets the threshold, as
+    advice."""
     from matplotlib import colormaps
 
     colours = colormaps["viridis"].with_extremes(bad=UNSEEN)
@@ -86,6 +87,6 @@ def _cell(link: LandmarkLink, at: int) -> str:
 
 
 def _why(link: LandmarkLink) -> str:
-    """The most frequent reason why a landmark is not detected; empty if it is."""
+    """Advice on a landmark that is not detected: the most frequent reason; empty if it is."""
     said = [reason for reason in link.reason if reason]
     return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)

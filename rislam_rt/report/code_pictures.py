@@ -79,7 +79,7 @@ def _colours(levels: int) -> ListedColormap:
 
 
 def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.object_]]", levels: int) -> None:
-    """Add a colour bar of the phase shifts."""
+    """Add a colour bar of the phase shifts to a picture of codes."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -91,7 +91,8 @@ def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.o
 
 
 def _side_by_side(parts: Sequence[Integers]) -> Floats:
-    """Join the phase codes of several panels in one array with NaN between them, and below the lower ones."""
+    """Join the phase codes of several panels in one array for a picture, with NaN between them, and below the lower
+    ones."""
     rows, cols = max(len(part) for part in parts), sum(part.shape[1] for part in parts) + len(parts) - 1
     whole, first = np.full((rows, cols), np.nan), 0
     for part in parts:

@@ -50,7 +50,7 @@ def styled() -> Iterator[None]:
 
 
 def close_up(axis: Any, middle: Floats, half: float) -> None:
-    """Make an axis a close-up of a map: a framed square about a point (2,), `half` [m] to each side, without ticks."""
+    """Style of a map's close-up: a framed square about a point (2,), `half` [m] to each side, without ticks."""
     axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal")
     axis.set(xticks=[], yticks=[])
     for spine in axis.spines.values():
@@ -70,14 +70,14 @@ def _save(figure: Figure, target: Any, **how: Any) -> None:
 
 
 def to_png(figure: Figure) -> bytes:
-    """Encode a figure as PNG."""
+    """Encode a figure in our style as PNG."""
     buffer = io.BytesIO()
     _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
     return buffer.getvalue()
 
 
 def picture_kind(path: Path) -> str:
-    """Format of a picture file by its suffix: `png`, `svg` or `pdf`.
+    """Format of a figure's file by its suffix: `png`, `svg` or `pdf`.
 
     Raises
     ------

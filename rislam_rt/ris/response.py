@@ -85,7 +85,7 @@ def zero_code(spec: DataSheet) -> RisCode:
 
 
 def _leg_share(spec: RisSpec, wavelength: float) -> float:
-    """Square root of the factor `sqrt(4 pi G dx dy) A / lambda` that joins two legs."""
+    """Factor of a panel's response that is each leg's: square root of `sqrt(4 pi G dx dy) A / lambda`."""
     join = np.sqrt(4.0 * np.pi * element_gain_area(spec, wavelength)) * spec.amplitude / wavelength
     return float(np.sqrt(join))
 

@@ -110,7 +110,8 @@ def random_poses(
 
 
 def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) -> Trajectory:
-    """Trajectory of positions (K, 3) [m] at rest, one a second, with random headings and a random baseline."""
+    """Trajectory for a comparison of channels: positions (K, 3) [m] at rest, one a second, with random headings and
+    baseline."""
     count = len(position)
     elevation = rng.uniform(np.radians(15.0), np.radians(60.0)) * rng.choice([-1.0, 1.0])
     offset = 0.5 * baseline * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
@@ -121,7 +122,8 @@ def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) 
 
 
 def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
-    """Which points (N, 3) [m] are reachable from the start by straight lines that nothing blocks, over other points."""
+    """Which points (N, 3) [m] random poses can have: those reachable from the start by straight lines that nothing
+    blocks."""
     reached = np.zeros(len(points), dtype=np.bool_)
     walls = facets.possible_blockers(np.concatenate([start[None], points]))
     stations = [start]

@@ -57,7 +57,8 @@ class WallClusters(NamedTuple):
 
 
 def build_clusters(facets: WallFacets) -> WallClusters:
-    """Split walls into clusters of at most `CLUSTER` by halving along the longest extent of their centres."""
+    """Split walls into clusters for beam tracing, of at most `CLUSTER`, by halving along the longest extent of their
+    centres."""
     rectangles = facets.rectangles
     members: list[Integers] = []
     waiting = [np.arange(len(facets))] if len(facets) else []
@@ -86,8 +87,8 @@ class BoundingBalls(NamedTuple):
 
 
 def group_positions(points: Floats, limit: float) -> list[Integers]:
-    """Split positions (K, 3) [m] into groups of indices that each fit a ball of radius `limit` [m], halving the longest
-    side of their bounding box."""
+    """Split positions (K, 3) [m] into groups for beam tracing that each fit a ball of radius `limit` [m], halving the
+    longest side of their bounding box."""
     groups, waiting = [], [np.arange(len(points))] if len(points) else []
     while waiting:
         group = waiting.pop()
@@ -101,7 +102,7 @@ def group_positions(points: Floats, limit: float) -> list[Integers]:
 
 
 def enclosing_balls(points: Floats, groups: list[Integers]) -> BoundingBalls:
-    """Bounding balls of groups of positions (K, 3) [m], each about the middle of its group's bounding box."""
+    """Bounding balls of groups of positions (K, 3) [m] from which beams are traced, each about its box's middle."""
     middle = np.array([(points[g].min(axis=0) + points[g].max(axis=0)) / 2.0 for g in groups]).reshape(-1, 3)
     radius = [np.linalg.norm(points[g] - m, axis=-1).max() for g, m in zip(groups, middle, strict=True)]
     return BoundingBalls(middle, np.array(radius, dtype=np.float64))

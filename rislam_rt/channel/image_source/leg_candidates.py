@@ -123,8 +123,8 @@ def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, 
 
 
 def _extended(level: Integers, before: Integers, sides: Integers) -> tuple[Integers, Integers]:
-    """Put every possible wall in front of wall sequences (S, d); `before` (S,) are the side bits of their first wall on
-    which the ray goes on."""
+    """Candidates one bounce longer: every possible wall in front of wall sequences (S, d); `before` (S,) are the side
+    bits of their first wall on which the ray goes on."""
     # `sides[i, j]` tells on which sides of wall i wall j has a part.
     grown, seen_from = [], []
     for rows in row_blocks(len(level), len(sides)):

@@ -54,11 +54,11 @@ class WallFacets:
         return len(self.offset)
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distances (N, W) [m] of points (N, 3) from every wall's plane."""
+        """Signed distances (N, W) [m] of points (N, 3) from the plane of every wall's facets."""
         return points @ self.normal.T - self.offset
 
     def contains(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3), each in the plane of its wall (N,), lie on one of the wall's triangles."""
+        """Whether points (N, 3), each in the plane of its wall (N,), lie on one of the wall's facets."""
         inside = self.rectangles.contains(points, wall, SEAM)
         rows = np.flatnonzero(inside & ~self.rectangles.whole[wall])
         counts = np.diff(self.first)[wall[rows]]
@@ -84,7 +84,8 @@ class WallFacets:
         return inside
 
     def reflects(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3) in the planes of walls (N,) lie on their wall, and on none that covers it."""
+        """Whether points (N, 3) in the planes of walls (N,) lie on a facet of their wall, and on none that covers
+        it."""
         own = self.contains(points, wall)
         for lower in np.unique(wall[own]) if any(map(len, self.over)) else []:
             for upper in self.over[lower]:
@@ -93,7 +94,7 @@ class WallFacets:
         return own
 
     def _planes(self, wall: Integers) -> Integers:
-        """Numbers (N,) of the walls whose planes walls (N,) share, -1 for no wall."""
+        """Numbers (N,) of the walls whose facets' planes walls (N,) share, -1 for no wall."""
         return np.where(wall >= 0, self.plane[wall], -1) if len(self) else wall
 
     def _on_wall(self, points: Floats, wall: int) -> Booleans:
@@ -113,7 +114,8 @@ class WallFacets:
         return np.flatnonzero((low < -SURFACE_TOLERANCE) & (high > SURFACE_TOLERANCE))
 
     def hidden_by(self, start: Floats, end: Floats, walls: Integers, spared: Integers) -> Integers:
-        """Number (N,) of one of `walls` that occludes each segment from `start` to `end` (N, 3), -1 where none does.
+        """Number (N,) of one of `walls` whose facets occlude each segment from `start` to `end` (N, 3), -1 where none
+        does.
 
         A wall whose plane passes within `SURFACE_TOLERANCE` of an end is not in the way (ends are bounce points,
         devices and landmarks), nor is a segment's `spared` wall (N,) or what lies on it.
@@ -133,7 +135,7 @@ class WallFacets:
         return blocker
 
     def sides(self) -> Integers:
-        """Side bits (W, W): on which sides of wall i wall j has a part, 0 if it lies in the plane."""
+        """Side bits (W, W): on which sides of wall i's facets wall j has a part, 0 if it lies in the plane."""
         bits = np.zeros((len(self), len(self)), dtype=np.int64)
         points = self.corners.reshape(-1, 3)
         for rows in row_blocks(len(self), len(points)):
@@ -182,6 +184,7 @@ def build_facets(walls: Walls) -> WallFacets:
 
 
 def row_blocks(count: int, width: int) -> list[slice]:
-    """Slices of `count` rows of `width` numbers each, so that the rows of a slice hold about `_BLOCK` numbers."""
+    """Slices of `count` rows of `width` numbers each, so that a test of facets holds about `_BLOCK` numbers at a
+    time."""
     step = max(1, _BLOCK // max(width, 1))
     return [slice(i, min(i + step, count)) for i in range(0, count, step)]

@@ -71,7 +71,7 @@ def bounding_rectangles(corners: Floats, first: Integers, normal: Floats, offset
 
 
 def _span(points: Floats, owner: Integers, starts: Integers, direction: Floats) -> tuple[Floats, Floats]:
-    """Middle and half length (W,) [m] of each wall's corners along its direction (W, 3)."""
+    """Middle and half length (W,) [m] of each wall's bounding rectangle along its direction (W, 3)."""
     at = np.einsum("ni,ni->n", points, direction[owner])
     low, high = np.minimum.reduceat(at, starts), np.maximum.reduceat(at, starts)
     return (low + high) / 2.0, (high - low) / 2.0

@@ -106,7 +106,7 @@ class QueryBatch(NamedTuple):
             first_sequence += len(sequences)
 
     def ends(self, rows: CandidateIndices) -> LegEndpoints:
-        """Positions and antennas at the two ends of each candidate in `rows`."""
+        """Positions and antennas at the two ends of each leg queried in `rows`."""
         sizes = [len(query.device) for query in self.queries]
         far = np.concatenate([query.far for query in self.queries])
         heading = np.concatenate([query.heading for query in self.queries])
@@ -148,7 +148,7 @@ def build_batch(queries: Sequence[LegQuery], tracer_scene: "TracerScene", sides:
 
 
 def join_found(parts: list[FoundLegs]) -> FoundLegs:
-    """Concatenate the legs found in several parts."""
+    """Join the answers to leg queries: the legs found in several parts."""
     geometries = zip(*(part.geometry for part in parts), strict=True)
     return FoundLegs(
         join_indices([part.rows for part in parts]),

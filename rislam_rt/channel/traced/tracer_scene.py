@@ -79,17 +79,17 @@ class TracerScene:
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
 
     def is_stacked(self, wall: Integers) -> Booleans:
-        """Whether each of walls (...,) overlaps another wall in its plane."""
+        """Whether each of the tracer scene's walls (...,) overlaps another wall in its plane."""
         sharing = np.bincount(self.walls.plane, minlength=len(self.walls)) > 1
         return (wall != NO_WALL) & sharing[self.walls.plane[wall]] if len(self.walls) else wall != NO_WALL
 
     def share_plane(self, a: Integers, b: Integers) -> Booleans:
-        """Whether walls `a` and `b` (...,) are in one plane by lying on each other."""
+        """Whether walls `a` and `b` (...,) of the tracer's scene are in one plane by lying on each other."""
         return (a != NO_WALL) & (b != NO_WALL) & (self.walls.plane[a] == self.walls.plane[b])
 
     def on_top(self, wall: Integers, points: Floats) -> Booleans:
-        """Whether overlapping walls (N, D) are what reflects at points (N, D, 3) [m]: solid there and not covered; true
-        for all other walls."""
+        """Whether overlapping walls (N, D) of the tracer's scene are what reflects at points (N, D, 3) [m]: solid there
+        and not covered; true for all other walls."""
         top = np.ones(wall.shape, dtype=np.bool_)
         for number in np.unique(wall[self.is_stacked(wall)]):
             here = wall == number
@@ -99,7 +99,8 @@ class TracerScene:
         return top
 
     def _has(self, wall: int, points: Floats) -> Booleans:
-        """Which points (N, 3) of its plane are on a wall, within the uncertainty of float32 vertices."""
+        """Which points (N, 3) of its plane are on a wall of the tracer's scene, within the uncertainty of float32
+        vertices."""
         return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
 
 
@@ -192,7 +193,7 @@ def as_indices(values: Integers) -> mi.UInt:
 
 
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
-    """Mitsuba mesh of separate triangles (T, 3, 3) [m], in their order."""
+    """Mitsuba mesh for the tracer's scene, of separate triangles (T, 3, 3) [m], in their order."""
     mesh = mi.Mesh(
         name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,
         has_vertex_texcoords=False,

@@ -30,7 +30,8 @@ _BLOCK = 4_000_000
 
 
 def wall_sides(walls: Walls) -> Integers:
-    """Side bits (W, W): on which sides of wall i's plane wall j has parts, 0 in the plane."""
+    """Side bits (W, W), which leave wall sequences out: on which sides of wall i's plane wall j has parts, 0 in the
+    plane."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order].reshape(-1, 3)
     first = 3 * np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls)))
@@ -43,7 +44,8 @@ def wall_sides(walls: Walls) -> Integers:
 
 
 def point_sides(walls: Walls, points: Floats) -> Integers:
-    """Side bits (N, W): on which side of wall j's plane point i lies, 0 in the plane."""
+    """Side bits (N, W), which leave wall sequences out: on which side of wall j's plane point i lies, 0 in the
+    plane."""
     height = points @ walls.normal.T - walls.offset
     return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
 
@@ -156,12 +158,13 @@ class CandidateIndices(NamedTuple):
     sequence: Integers
 
     def only(self, keep: Integers | slice) -> "CandidateIndices":
-        """Select candidates by row."""
+        """Select candidates for legs (indices of devices, far ends, wall sequences) by row."""
         return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
 
 
 def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
-    """Yield candidates regrouped into blocks of `size` rows, the last one shorter."""
+    """Yield candidates for legs (indices of wall sequences) regrouped into blocks of `size` rows, the last one
+    shorter."""
     waiting: list[CandidateIndices] = []
     for part in parts:
         waiting.append(part)
@@ -174,5 +177,5 @@ def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[Candidat
 
 
 def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
-    """Concatenate candidates of several parts."""
+    """Concatenate candidates for legs (indices of wall sequences) of several parts."""
     return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))

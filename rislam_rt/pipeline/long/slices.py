@@ -121,7 +121,8 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
-    """True trajectory, true paths and result of a scheme at every n-th cycle of a long run, at most `SHOWN` in all."""
+    """True trajectory, paths and a scheme's result at every n-th cycle of a long run's slices, at most `SHOWN` in
+    all."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
     for part in parts:
@@ -192,13 +193,13 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
 
 
 def subsampled_paths(paths: Paths, rows: Integers) -> Paths:
-    """Paths of the cycles in `rows` alone."""
+    """Paths of the cycles in `rows` alone, of a long run's slice."""
     names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
     return replace(paths, **{name: getattr(paths, name)[rows] for name in names}, ris=None)
 
 
 def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
-    """Result of a scheme for the cycles in `rows` alone."""
+    """Result of a scheme for the cycles in `rows` alone, of a long run's slice."""
     names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
              "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
     return replace(
@@ -219,7 +220,7 @@ def path_columns(parts: Sequence[Paths]) -> list[Integers]:
 
 
 def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> Any:
-    """Array (K, count, ...) of arrays (K_i, P_i, ...) under each other, each at its `columns`; zero elsewhere."""
+    """Slices' arrays (K_i, P_i, ...) in one (K, count, ...) under each other, each at its `columns`; zero elsewhere."""
     tail = tuple(max(sizes) for sizes in zip(*(part.shape[2:] for part in parts), strict=True))
     table = np.zeros((sum(map(len, parts)), count, *tail), dtype=parts[0].dtype)
     row = 0
@@ -233,6 +234,6 @@ def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> An
 
 
 def _stacked(parts: Sequence[Integers]) -> Integers:
-    """Arrays of different width under each other, rows filled up with `NOTHING`."""
+    """Slices' arrays of different width under each other, rows filled up with `NOTHING`."""
     width = max(part.shape[1] for part in parts)
     return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=NOTHING) for p in parts])

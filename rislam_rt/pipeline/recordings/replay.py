@@ -92,7 +92,7 @@ class Recorder:
 
     @property
     def estimator(self) -> Estimator:
-        """Functions to be used in place of the wrapped estimator's, which record what passes."""
+        """Functions to be used in place of the wrapped estimator's, which record for a replay what passes."""
         return self.inner._replace(init=self._init, step=self._step, estimate=self._estimate)
 
     @property

@@ -41,7 +41,7 @@ def component_labels(scene: Scene, paths: Paths, scheme: SchemeResult, *, use_vt
 
 
 def true_planes(scene: Scene) -> list[int]:
-    """Number of the plane that each wall of a scene lies in, (W,); coplanar walls have one."""
+    """Number (W,) of the plane that each wall, as a source of components, lies in; coplanar walls have one."""
     return [int(plane) for plane in coplanar(build_walls(scene))]
 
 

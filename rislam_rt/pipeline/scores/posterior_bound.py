@@ -116,7 +116,7 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
 
 
 def over_distortion(paths: Paths, settings: Settings) -> Complexes:
-    """Gains (K, P) of paths, reduced so that their SNR counts the expected hardware distortion as noise, for the bound.
+    """Gains (K, P) of paths for the posterior bound, reduced so that the SNR counts hardware distortion as noise.
 
     Unchanged where the estimator is not told of the distortion (`hardware.told`).
     """

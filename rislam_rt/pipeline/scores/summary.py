@@ -86,7 +86,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
 
 
 def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
-    """Normalised estimation error squared (NEES) of the position per degree of freedom, (K,); None if all is known."""
+    """Score of consistency: NEES of the position per degree of freedom, (K,); None if all is known."""
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
     if not len(axes):
         return None
@@ -102,13 +102,14 @@ def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
 
 
 def has_diverged(errors: Floats, limit: Floats | None) -> bool:
-    """Whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
+    """Score: whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
     least = DIVERGED if limit is None else np.maximum(DIVERGED, FAR_OVER * limit)
     return bool((errors > least).any())
 
 
 def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dict[str, Any]:
-    """GOSPA [m] (order 2, cutoff `NEAR_LANDMARK`) of the map's points, without mirror images, against true landmarks.
+    """Score of the map: GOSPA [m] (order 2, cutoff `NEAR_LANDMARK`) of its points, without mirror images, against true
+    landmarks.
 
     Panels count among the true landmarks only if the scheme uses them (`panel`).
     """
@@ -120,12 +121,12 @@ def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dic
 
 
 def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
-    """Names of the cycle's steps whose mean computing time exceeds their time budget."""
+    """Score of computing time: names of the cycle's steps whose mean time exceeds their budget."""
     return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
 
 
 def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
-    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle."""
+    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle, for their scores."""
     truth = scene.landmark_positions
     error = np.full((len(scheme.position), len(truth)), np.nan)
     column = np.full(error.shape, -1)

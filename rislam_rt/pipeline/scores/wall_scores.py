@@ -66,7 +66,8 @@ def count_ghosts(scene: Scene, estimate: MapEstimate) -> int:
 
 
 def coplanar(walls: Walls) -> Integers:
-    """Number of the plane of each true wall (W,), from 0; coplanar walls, which no agent can tell apart, have one."""
+    """Number of the plane of each true wall (W,) for its score, from 0; coplanar walls, which no agent can tell apart,
+    have one."""
     group = np.full(len(walls), -1)
     count = 0
     for wall in range(len(walls)):
@@ -82,7 +83,8 @@ def coplanar(walls: Walls) -> Integers:
 
 
 def wall_surfaces(walls: Walls, group: Integers) -> Surfaces:
-    """Middle, normal and second moments of the surface of each group of true walls; `group` (W,) numbers from 0.
+    """Middle, normal and second moments of the surface of each group of true walls, to score; `group` (W,) numbers from
+    0.
 
     Over a triangle the mean of x x^T is (sum of v v^T + s s^T) / 12, with its corners v and their sum s.
     """

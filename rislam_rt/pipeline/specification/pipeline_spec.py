@@ -46,7 +46,7 @@ class DiffuseSection(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether diffuse or diffracted paths are to be traced."""
+        """Whether the pipeline file asks for diffuse or diffracted paths."""
         return self.diffuse or self.diffraction
 
 
@@ -55,7 +55,7 @@ RECORDS: dict[type, type] = {}
 
 
 def _table_of(record: type, *, without: tuple[str, ...] = ()) -> Any:
-    """Table of a pipeline file with the fields, types and defaults of a record, which checks its own ranges."""
+    """Table of a pipeline file made of a record's fields, types and defaults; the record checks its own ranges."""
     kinds: dict[str, Any] = {f.name: (f.type, f.default) for f in fields(record) if f.name not in without}
     section = create_model(f"{record.__name__}Table", __base__=Section, **kinds)
     RECORDS[section] = record
@@ -91,7 +91,7 @@ class HardwareSection(_table_of(HardwareConfig)):  # type: ignore[misc]
 
 
 def _check_channel(name: str) -> str:
-    """Return `name` if it is that of a built-in channel or of a user's own."""
+    """Check the setting of a pipeline file that names the channel: a built-in one, or a user's own."""
     if name not in CHANNELS and not is_own(name):
         raise ValueError(f"give one of {', '.join(CHANNELS)}, or module:Class of your own")
     return name

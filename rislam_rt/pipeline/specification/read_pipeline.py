@@ -170,24 +170,25 @@ def _override(table: dict[str, Any], setting: str) -> str:
 
 
 def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:
-    """Origin of a setting at fault, for messages: `--set` if the command line gave it or a key in it, else the file."""
+    """Origin of a pipeline's setting at fault, for messages: `--set` if the command line gave it or a key in it, else
+    the file."""
     set_there = any(f"{place}.".startswith((f"{key}.", f"{key}[")) for key in changed)
     return "--set" if set_there or (unknown and any(key.startswith(f"{place}.") for key in changed)) else str(path)
 
 
 def _place(item: Any) -> str:
-    """Dotted key of a validation error."""
+    """Dotted key of a validation error in a pipeline file."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"]).lstrip(".")[:100]
 
 
 def _line(path: Path, item: Any, changed: Sequence[str], model: type[BaseModel]) -> str:
-    """Line for one validation error: the file, or the command line that set the key, and the message."""
+    """Line for one validation error of a pipeline: the file, or the command line that set the key, and the message."""
     source = _source(path, _place(item), changed, item["type"] == "extra_forbidden")
     return f"{source}: {_remark(item, model, source == '--set')}"
 
 
 def _remark(item: Any, model: type[BaseModel], typed: bool) -> str:
-    """Message for one validation error of a pipeline's settings: key, value received, how to mend it."""
+    """Message for one validation error as a pipeline file is read: key, value received, how to mend it."""
     place = _place(item)
     if item["type"] == "missing":
         return f"{place}: missing; add it"

@@ -93,7 +93,8 @@ def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
-    """The class that declares a setting, and the configuration record whose fields it takes over, if any."""
+    """The class that declares a setting in the list, and the configuration record whose fields it takes over, if
+    any."""
     owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
     return owner, RECORDS.get(owner)
 
@@ -120,7 +121,7 @@ def _classes(module: str) -> dict[str, ast.ClassDef]:
 
 
 def _kind(annotation: Any) -> str:
-    """Type of a setting in plain words."""
+    """Type of a setting in plain words, for the list."""
     names = {int: "whole number", float: "number", bool: "true or false", str: "text"}
     if annotation in names:
         return names[annotation]
@@ -151,7 +152,7 @@ def _of_constraints(field: FieldInfo) -> str:
 
 
 def _choices(annotation: Any) -> Iterator[Any]:
-    """Values of a literal type, also inside an optional or a list."""
+    """Values that the list gives for a setting of literal type, also inside an optional or a list."""
     if get_origin(annotation) is Literal:
         yield from get_args(annotation)
     else:
@@ -160,7 +161,7 @@ def _choices(annotation: Any) -> Iterator[Any]:
 
 
 def _inner_metadata(annotation: Any) -> Iterator[Any]:
-    """Constraints of a setting's type inside an optional or a list."""
+    """Constraints of a listed setting's type inside an optional or a list."""
     for part in get_args(annotation):
         for item in getattr(part, "__metadata__", ()):
             yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
@@ -195,7 +196,8 @@ def _of_record(record: type, name: str) -> str:
 
 
 def _edge(passes: Callable[[Any], bool], inside: float, sign: int, whole: bool) -> str:
-    """End of a setting's range in words, found by bisection from a valid value to one side; empty if unlimited."""
+    """End of a setting's range in words, for the list, found by bisection from a valid value to one side; empty if
+    unlimited."""
     outside: float = sign * (int(LARGEST) if whole else LARGEST)
     step = 1 if whole else 1e-9
     if passes(outside):

@@ -78,11 +78,11 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     @property
     def spoiled(self) -> list[str]:
-        """Names of schemes whose files were changed since they were written; they run again."""
+        """Names of schemes whose files in the run folder were changed since they were written; they run again."""
         return [name for name in self if name not in self]
 
     def mark(self, state: str, more: Mapping[str, Any] | None = None) -> None:
-        """Write the run's marker file with its state, identity, the SHA-256 of all files, and `more`.
+        """Write the run folder's marker file with its state, identity, the SHA-256 of all files, and `more`.
 
         Raises
         ------
@@ -115,17 +115,17 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         return self.folder
 
     def put(self, name: str, content: bytes) -> None:
-        """Write a file of the run, and note its SHA-256."""
+        """Write a file into the run folder, and note its SHA-256."""
         write_atomic(self.folder / name, content)
         self.files[name] = hashlib.sha256(content).hexdigest()
 
     def adopt(self, names: Iterable[str]) -> None:
-        """Note the SHA-256 of files that are in the folder already, and write the marker."""
+        """Note the SHA-256 of files that are in the run folder already, and write the marker."""
         self.files |= {name: file_digest(self.folder / name) for name in names}
         self.mark(RUNNING)
 
     def holds(self, names: Iterable[str]) -> bool:
-        """Whether all these files of the run are there, unchanged since they were written."""
+        """Whether all these files are in the run folder, unchanged since they were written."""
         try:
             return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
         except ResultError:
@@ -219,7 +219,7 @@ def hold_run(folder: Path) -> Iterator[None]:
 
 
 def check_files(folder: Path, about: Mapping[str, Any]) -> None:
-    """Check that no file of a completed run was changed since it was written.
+    """Check that no file in the folder of a completed run was changed since it was written.
 
     Raises
     ------
@@ -285,7 +285,7 @@ def read_run(folder: Path) -> SlamResult:
 
 @contextmanager
 def reading_run(folder: Path) -> Iterator[None]:
-    """Turn whatever a damaged file raises while a run is read within this context into a one-line error.
+    """Turn whatever a damaged file raises while a run folder is read within this context into a one-line error.
 
     Raises
     ------
@@ -302,7 +302,7 @@ def reading_run(folder: Path) -> Iterator[None]:
 
 
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
-    """Read a scheme's result from its NetCDF file, and check that it is of this scheme and run."""
+    """Read a scheme's result from its NetCDF file in the run folder, and check that it is of this scheme and run."""
     data = read_dataset(file)
     run_datasets.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
     return run_datasets.dataset_to_scheme(data)

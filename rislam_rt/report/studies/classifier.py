@@ -266,5 +266,5 @@ def _by_snr(found: Training, rule: str) -> dict[str, tuple[float, int]]:
 
 
 def _f1(score: ClassifierScore) -> str:
-    """Table cell: F1 with its interval."""
+    """Table cell of the classifier's page: F1 with its interval."""
     return f"{score.f1:.3f} ({score.low:.3f} to {score.high:.3f})"

@@ -116,7 +116,8 @@ def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str
 
 
 def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table of the RMSE reductions by the paper's scheme, from pairs of runs with the same motion and noise."""
+    """Table for Fig. 4(b) of the RMSE reductions by the paper's scheme, from pairs of runs with the same motion and
+    noise."""
     rivals = list(dict.fromkeys(entry["over"] for entry in gains))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in gains):
@@ -134,7 +135,7 @@ def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table of bounds, NEES, association and what limits the error, by SNR and scheme."""
+    """Table for Fig. 4(b) of bounds, NEES, association and what limits the error, by SNR and scheme."""
     rows = [
         [
             f"{entry['snr_db']:g}", entry["scheme"], metres(entry["bound_m"]), ratio(entry["over_bound"]),

@@ -75,7 +75,8 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
 
 
 def panel_error(group: Group, scheme: str) -> Any:
-    """Position error (R,) [m] of the (first) panel at the end of each run; NaN where it is not mapped."""
+    """Position error (R,) [m] of the (first) panel at the end of each run, for Fig. 4(c); NaN where it is not
+    mapped."""
     panels = panels_of(group, scheme)
     return group.column(scheme, "landmarks", panels[0], "final_m") if panels else np.full(len(group.results), np.nan)
 
@@ -90,5 +91,5 @@ def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
 
 
 def _percent(fall: Mapping[str, Any], name: str) -> str:
-    """A reduction in percent with its interval, in words."""
+    """A reduction in percent with its interval, in words, for Fig. 4(c)."""
     return "an unknown share" if fall[name] is None else percent_between(fall, name)

@@ -105,7 +105,7 @@ _HEAD = ["mismatch", "level", "scheme", "agent RMSE [m]", "change", "bound [m]",
 
 
 def _worst_rows(content: Mapping[str, Any]) -> list[list[str]]:
-    """Table rows of the worst mismatches with their remedies."""
+    """Table rows of the mismatches worst for robustness, with their remedies."""
     rows = []
     first = content["entries"][0]["scheme"] if content["entries"] else ""
     for name in content["worst"][:WORST]:

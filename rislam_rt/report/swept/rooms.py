@@ -44,7 +44,8 @@ def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
 
 
 def budget(entry: Mapping[str, Any], name: str) -> str:
-    """What limits a score that misses its aim in a room: `bound`, `association`, `filter`, or `not heard` (no path)."""
+    """What limits a score that misses its aim in one of the rooms: `bound`, `association`, `filter`, or `not heard` (no
+    path)."""
     if name not in BOUND_OF:
         return what_limits(entry)
     error, bound = entry[name], entry[BOUND_OF[name]]
@@ -142,7 +143,7 @@ NAMES = {
 
 
 def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> str:
-    """Table cell: error and bound of a room's landmarks or walls, and the share that was found."""
+    """Table cell of the study in many rooms: error and bound of landmarks or walls, and the share that was found."""
     bound = entry[BOUND_OF[name]]
     known = "" if bound is None else f"bound {bound:.{digits}f}"
     if entry[name] is None:
