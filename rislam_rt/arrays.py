@@ -44,7 +44,8 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
 
 
 def phasor(phase: ArrayLike) -> Complexes:
-    """`exp(j phase)` (...,) of phases (...,) [rad]: numpy's own, of a complex argument, takes three times as long."""
+    """Array `exp(j phase)` (...,) of phases (...,) [rad]: numpy's own, of a complex argument, takes three times as
+    long."""
     angle = np.asarray(phase, dtype=np.float64)
     found = np.empty(angle.shape, dtype=np.complex128)
     np.cos(angle, out=found.real)
@@ -53,7 +54,7 @@ def phasor(phase: ArrayLike) -> Complexes:
 
 
 def show_point(point: ArrayLike) -> str:
-    """Text of a point's coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
+    """Text of an array of three coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
     return f"({', '.join(f'{value:.4g}' for value in np.asarray(point))})"
 
 

@@ -52,7 +52,7 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
 
 
 def _entry(word: str) -> str:
-    """A word as an entry of a list: numbers as they are, text in quotes."""
+    """A word as an entry of a list that a message proposes: numbers as they are, text in quotes."""
     try:
         float(word)
     except ValueError:

@@ -59,8 +59,8 @@ def plan_svg(plan: PlanView) -> str:
 
 
 def outline(meshes: Iterable[tuple[Floats, Integers]]) -> Floats:
-    """Edges (E, 2, 3) [m] to draw of meshes (vertices and faces) in a plan: open ones, and those between faces that are
-    not in one plane; none if they are more than `MOST_LINES`."""
+    """Edges (E, 2, 3) [m] of meshes (vertices and faces) to draw in a plan view: open ones, and those between faces
+    that are not in one plane; none if they are more than `MOST_LINES`."""
     found = [_open_edges(vertices, faces) for vertices, faces in meshes]
     edges = np.concatenate(found) if found else np.zeros((0, 2, 3))
     return edges if len(edges) <= MOST_LINES else np.zeros((0, 2, 3))

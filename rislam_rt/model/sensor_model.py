@@ -67,20 +67,22 @@ class SensorModel:
         return self.cell * np.array([SPEED_OF_LIGHT, 1.0, 1.0])
 
     def in_window(self, delay: Floats) -> Booleans:
-        """Whether (...,) the receiver reports components of delays [s] (...,) at all."""
+        """Sensor model's window: whether (...,) the receiver reports components of delays [s] (...,) at all."""
         return np.asarray((delay >= self.window[0]) & (delay <= self.window[1]))
 
     def heard_as(self, length: Floats) -> Floats:
-        """Path lengths (...,) [m] as measured: true lengths (...,) [m] less whole periods of the sounding."""
+        """Path lengths (...,) [m] as the sensor measures them: true lengths (...,) [m] less whole periods of the
+        sounding."""
         return np.asarray(np.mod(length, SPEED_OF_LIGHT * self.period))
 
     def nearest(self, gap: Floats) -> Floats:
-        """Differences (...,) of path lengths [m] less the nearest number of whole periods of the sounding."""
+        """Differences (...,) of path lengths [m] as the sensor tells them: less the nearest number of whole periods of
+        the sounding."""
         period = SPEED_OF_LIGHT * self.period
         return np.asarray(gap - period * np.round(gap / period))
 
     def detection_probability(self, snr: ArrayLike) -> Floats:
-        """Probability (...,) that the receiver reports a lone path of this expected SNR (see the function
+        """Probability (...,) that the sensor reports a lone path of this expected SNR (see the function
         `detection_probability`)."""
         return detection_probability(snr, self.threshold)
 
@@ -106,7 +108,8 @@ class SensorModel:
 
 
 def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
-    """Probability (...,) that the receiver reports a lone path of this expected SNR; see the function."""
+    """Probability (...,) that a sensor of that detection threshold reports a lone path of this expected SNR
+    (non-central chi squared)."""
     level = np.sqrt(2.0 * threshold)
     mean = np.sqrt(2.0 * np.maximum(np.asarray(snr, dtype=np.float64), 0.0))
     doubtful, found = mean < level + CERTAIN_SNR, np.ones(mean.shape)
@@ -115,8 +118,8 @@ def detection_probability(snr: ArrayLike, threshold: float) -> Floats:
 
 
 def merged_pull(ratio: ArrayLike) -> tuple[Floats, Floats]:
-    """Mean and variance (...,) of where two paths that cannot be resolved are measured as one, as a share of the gap
-    between them.
+    """Sensor model of two paths that cannot be resolved: mean and variance (...,) of where they are measured as one, as
+    a share of the gap between them.
 
     Counted from the path that is `1 / ratio` times as strong as the other. One path fits both best, to first order, at
     `Re sum alpha_i conj(alpha) z_i / |alpha|^2` with alpha the sum. Over an even relative phase, each weighed by the

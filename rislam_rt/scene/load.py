@@ -142,7 +142,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
 
 
 def _material(section: MaterialSection) -> Material:
-    """Material of a reflector from its section of the scene file."""
+    """Material of a reflector, loaded from its section of the scene file."""
     given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
     return Material(
         section.reflection, section.itu, permittivity=section.permittivity,
@@ -196,7 +196,8 @@ def build_panel(section: RisSection) -> RisPanel:
 
 
 def _digest(content: bytes, contents: dict[str, bytes]) -> str:
-    """SHA-256 over the scene file and every file it names, each with its name and length before it."""
+    """SHA-256 of a loaded scene: over the scene file and every file it names, each with its name and length before
+    it."""
     digest = hashlib.sha256()
     for name, data in [("", content), *sorted(contents.items())]:
         digest.update(f"{name}\0{len(data)}\0".encode())

@@ -73,8 +73,8 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
 
 
 def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
-    """Trajectory along a path with rounded corners at constant speed [m/s], heading along it; to its end, or for so
-    many cycles.
+    """Motion along a path with rounded corners at constant speed [m/s], heading along it; to its end, or for so many
+    cycles.
 
     Raises
     ------
@@ -93,7 +93,8 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
 
 
 def along_heading(course: Floats) -> Floats:
-    """Headings (K,) [rad] along velocities or tangents (K, 3); of a vertical one, that of the one before, or after."""
+    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one, that of the one before,
+    or after."""
     level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
     if not level.any():
         return np.zeros(len(course))
@@ -103,8 +104,8 @@ def along_heading(course: Floats) -> Floats:
 
 
 def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
-    """Interpolate recorded poses at even times, `cycle_s` [s] apart from the first on: positions by monotone cubics,
-    headings linearly.
+    """Interpolate the agent's recorded motion at even times, `cycle_s` [s] apart from the first on: positions by
+    monotone cubics, headings linearly.
 
     Raises
     ------
@@ -152,7 +153,7 @@ def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Traject
 
 
 def _body(agent: AgentSection) -> Body:
-    """Offsets of Tx and Rx from the agent section of the scene file."""
+    """Offsets of Tx and Rx for the agent's motion, from the agent section of the scene file."""
     offsets = {"tx_offset": agent.tx_offset_m, "rx_offset": agent.rx_offset_m}
     try:
         return Body(**{name: np.array(value) for name, value in offsets.items() if value is not None})

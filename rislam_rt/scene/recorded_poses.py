@@ -130,7 +130,7 @@ def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[f
 
 
 def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
-    """Check that times and positions can be a recording's, and return them as they are."""
+    """Check that times and positions can be those of recorded poses, and return them as they are."""
     if np.abs(time).max() > MAX_TIME:
         raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", "give seconds")
     step = np.diff(time)

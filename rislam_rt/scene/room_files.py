@@ -30,14 +30,14 @@ class RoomFiles:
 
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Table of a scene file for a reflector with a PLY mesh of its own."""
+    """Table of a new room's scene file for a reflector with a PLY mesh of its own."""
     return {"name": name, "mesh": mesh_file(name), "material": material or PAPER_MATERIAL}
 
 
 def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
 ) -> dict[str, Any]:
-    """Table of a scene file for a RIS panel like the paper's, anywhere."""
+    """Table of a new room's scene file for a RIS panel like the paper's, anywhere."""
     lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [0.015, 0.015]}
     return lie | {"levels": 4, "element": "tang", "host": host}
 

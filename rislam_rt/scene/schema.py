@@ -342,6 +342,6 @@ def _known_keys() -> list[str]:
 
 
 def _short(text: str, length: int) -> str:
-    """Text of a message on one line, cut to a length."""
+    """Text of a message on the scene file's schema on one line, cut to a length."""
     text = one_line(text)
     return text if len(text) <= length else text[: length - 3] + "..."

@@ -33,7 +33,7 @@ def hexahedron(corners: Floats) -> dict[str, Mesh]:
 
 
 def box_corners(low: Sequence[float], high: Sequence[float]) -> Floats:
-    """Corners (2, 2, 2, 3) [m] of an axis-aligned box, indexed by x, y and z side."""
+    """Corners (2, 2, 2, 3) [m] of the shape of an axis-aligned box, indexed by x, y and z side."""
     x, y, z = (np.array([a, b], dtype=np.float64) for a, b in zip(low, high, strict=True))
     return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
 
@@ -46,7 +46,7 @@ def block(low: Sequence[float], high: Sequence[float], without: Sequence[str] = 
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Join several meshes into one, their vertices and faces in order."""
+    """Join the meshes of several shapes into one, their vertices and faces in order."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
@@ -91,7 +91,8 @@ def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) ->
 
 
 def _icosahedron() -> Floats:
-    """Triangles (20, 3, 3) of an icosahedron with corners on the unit sphere, turned outwards."""
+    """Triangles (20, 3, 3) of an icosahedron, from which a sphere's mesh is made, corners on the unit sphere, turned
+    outwards."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0
     signs = np.array([[a, b * golden] for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
     corners = np.concatenate([np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)])
@@ -106,7 +107,7 @@ def _icosahedron() -> Floats:
 
 
 def _quartered(triangles: Floats) -> Floats:
-    """Cut every triangle (T, 3, 3) of a solid's mesh into four: (4 T, 3, 3)."""
+    """Triangles (4 T, 3, 3) of a sphere's mesh: each of (T, 3, 3) cut into four."""
     a, b, c = triangles.swapaxes(0, 1)
     ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
     return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])

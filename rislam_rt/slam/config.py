@@ -62,5 +62,5 @@ class SlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """Ones (3,) for the position's axes that are estimated, zero for a known height."""
+        """Ones (3,) for the position's axes that the SLAM filter is configured to estimate, zero for a known height."""
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])

@@ -30,7 +30,8 @@ PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29)
 
 
 def radical_inverse(count: int, base: int) -> Floats:
-    """First terms (count,) of van der Corput's sequence in (0, 1): the digits of 1, 2, ... mirrored at the point.
+    """First terms (count,) of van der Corput's sequence in (0, 1) for sampling: the digits of 1, 2, ... mirrored at the
+    point.
 
     `scipy.stats.qmc.Halton` without its half second of import.
     """

@@ -47,7 +47,7 @@ def read_sealed(file: Path) -> dict[str, Any]:
 
 
 def checksum(content: Any) -> str:
-    """SHA-256 of plain data, encoded as JSON with sorted keys and shortest numbers.
+    """Checksum (SHA-256) of plain data, encoded as JSON with sorted keys and shortest numbers.
 
     NaN, which no sealed file holds but a damaged one may, is encoded as well.
     """
@@ -56,7 +56,7 @@ def checksum(content: Any) -> str:
 
 
 def flatten(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """All values of nested plain data, with dotted names."""
+    """All values of nested plain data, with dotted names, to see which one changed."""
     for name, value in content.items():
         if isinstance(value, Mapping):
             yield from flatten(value, f"{above}{name}.")
@@ -65,7 +65,7 @@ def flatten(content: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, 
 
 
 def file_digest(file: Path) -> str:
-    """SHA-256 of a file's bytes.
+    """Checksum (SHA-256) of a file's bytes.
 
     Raises
     ------

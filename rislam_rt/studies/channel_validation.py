@@ -39,17 +39,17 @@ class Comparison(NamedTuple):
 
     @property
     def unexplained(self) -> int:
-        """Number of paths that one channel alone has and nothing explains, over all compared rooms."""
+        """Number of paths that one channel alone has and nothing explains, over all rooms of the validation."""
         return sum(row.report.unexplained for row in self.rows)
 
     @property
     def breaches(self) -> int:
-        """Number of path errors beyond their limits, over all compared rooms."""
+        """Number of path errors beyond their limits, over all rooms of the channel validation."""
         return sum(row.report.num_breaches for row in self.rows)
 
     @property
     def passed(self) -> bool:
-        """Whether the channels agree in every room."""
+        """Whether the channels agree in every room of the validation."""
         return all(row.report.passed for row in self.rows)
 
 
@@ -91,7 +91,8 @@ def run_comparison(
 def compare_room(
     name: str, rooms: Mapping[str, tuple[Scene, int]], radio: RadioConfig, poses: int, seed: int, tell: Tell
 ) -> list[Validation]:
-    """Compare both channels in one room, with the tracer's own float32 numbers and with the refined ones."""
+    """Compare both channels in one room of the validation, with the tracer's own float32 numbers and with the refined
+    ones."""
     return validate_rooms([rooms[name]], radio, poses=poses, seed=seed)
 
 

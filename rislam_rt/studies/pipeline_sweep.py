@@ -196,7 +196,8 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
 
 
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """Function that checks a cell's settings, and returns the scene's hash and versions that its result depends on."""
+    """Function that checks the settings of a pipeline sweep's cell, and returns the scene's hash and versions that its
+    result depends on."""
     load = cache(load_scene)
     versions = library_versions()
 
@@ -220,7 +221,7 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
 
 
 def _kinds(annotation: Any) -> list[type]:
-    """All plain types in a type annotation, such as those of a union."""
+    """All plain types in the annotation of a swept setting, such as those of a union."""
     parts = get_args(annotation)
     if not parts:
         return [annotation] if isinstance(annotation, type) else []
@@ -228,7 +229,7 @@ def _kinds(annotation: Any) -> list[type]:
 
 
 def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
-    """Entries of a run's scores that are times, or all others."""
+    """Entries of a swept run's scores that are times, or all others."""
     kept: dict[str, Any] = {}
     for name, value in summary.items():
         clock = name.endswith("seconds") or name == "over_budget"
@@ -241,7 +242,7 @@ def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
 
 
 def _interval(rmse: Sequence[float]) -> tuple[float, float] | None:
-    """Bootstrap interval of the RMSE over repetitions."""
+    """Bootstrap interval of a pipeline sweep's RMSE over repetitions."""
     if len(rmse) < 2:
         return None
     found = bootstrap(np.array(rmse), rng=np.random.default_rng(0), statistic=rms_over_runs)

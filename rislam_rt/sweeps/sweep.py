@@ -62,12 +62,12 @@ def parse_axis(text: str) -> Axis:
 
 
 def _plain(value: Any) -> bool:
-    """Whether a value is text, a finite number or a boolean."""
+    """Whether a value of a sweep's axis is text, a finite number or a boolean."""
     return isinstance(value, Scalar) and not (isinstance(value, float) and not math.isfinite(value))
 
 
 def _kind(value: Value) -> str:
-    """Type of an axis value in words."""
+    """Type of a sweep's axis value in words."""
     if isinstance(value, bool):
         return "booleans"
     if isinstance(value, list):

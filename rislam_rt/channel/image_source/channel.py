@@ -84,11 +84,12 @@ class ImageSourceChannel:
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths with their gains under another panel code, without a new search."""
+        """The image-source paths with their gains under another panel code, without a new search."""
         return rephase(paths, code)
 
     def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
-        """Specular legs from device positions (K, 3) [m] to one landmark; those to a panel arrive at its front."""
+        """Specular legs of the image-source channel from device positions (K, 3) [m] to one landmark; those to a panel
+        arrive at its front."""
         panel, point = self.scene.panel_number(number), self.scene.landmark_positions[[number]]
         host, front, landmark = -1, None, number
         if panel >= 0:

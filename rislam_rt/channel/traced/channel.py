@@ -84,7 +84,7 @@ class TracedChannel:
         return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths with their gains under another panel code, without tracing again."""
+        """The traced paths with their gains under another panel code, without tracing again."""
         return rephase(paths, code)
 
     def _trace(self, queries: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:

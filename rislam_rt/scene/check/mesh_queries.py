@@ -12,7 +12,8 @@ _CHUNK = 2_000_000
 
 
 def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
-    """Pairs (point, triangle) no more than `distance` [m] apart, of points (K, 3) and triangles (T, 3, 3)."""
+    """Query to a mesh: pairs (point, triangle) no more than `distance` [m] apart, of points (K, 3) and triangles (T, 3,
+    3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -24,7 +25,8 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
 
 
 def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
-    """Pairs (segment, triangle) where a segment, `start` to `end` (K, 3), passes through a triangle (T, 3, 3)."""
+    """Query to a mesh: pairs (segment, triangle) where a segment, `start` to `end` (K, 3), passes through a triangle
+    (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -39,8 +41,8 @@ def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, 
 
 
 def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float = 1e-6) -> Integers:
-    """Index (D,) of the nearest triangle (T, 3, 3) that each ray from one point (3,) along unit vectors (D, 3) hits, -1
-    for none.
+    """Query to a mesh: index (D,) of the nearest triangle (T, 3, 3) that each ray from one point (3,) along unit
+    vectors (D, 3) hits, -1 for none.
 
     `slack` [m] widens every triangle, so that no ray slips through the seam between two.
     """
@@ -76,7 +78,8 @@ def winding(point: Floats, triangles: Floats) -> float:
 
 
 def sphere_directions(count: int) -> Floats:
-    """Unit vectors (count, 3) of rays in all directions, spread evenly over the sphere (Fibonacci lattice)."""
+    """Unit vectors (count, 3) of rays to query a mesh in all directions, spread evenly over the sphere (Fibonacci
+    lattice)."""
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     phi = k * np.pi * (3.0 - np.sqrt(5.0))
@@ -85,13 +88,14 @@ def sphere_directions(count: int) -> Floats:
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
-    """Distance (S,) [m] of points (S, 3) from the nearest edge line of their triangle: positive inside."""
+    """Query to a mesh: distance (S,) [m] of points (S, 3) from the nearest edge line of their triangle, positive
+    inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
 
 
 def _blocks(rows: int, columns: int) -> Iterator[slice]:
-    """Slices of a point-triangle table's rows, each of no more than `_CHUNK` pairs."""
+    """Slices of rows for a query to a mesh, each of no more than `_CHUNK` pairs of point and triangle."""
     step = max(1, _CHUNK // max(columns, 1))
     return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 

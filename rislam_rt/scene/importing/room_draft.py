@@ -89,7 +89,8 @@ def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | N
 
 
 def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace) -> bool:
-    """Whether the corners of a proposed RIS panel lie on one host and are seen from the middle of the agent's line."""
+    """Whether the corners of a RIS panel proposed for the draft lie on one host and are seen from the middle of the
+    agent's line."""
     mesh, _ = draft.reflectors[host]
     down = np.cross(normal, right)
     corners = center + FROM_EDGE * np.array([right + down, right - down, -right + down, -right - down])

@@ -84,7 +84,7 @@ def left_behind(scene: Scene) -> list[str]:
 
 
 def _word(material: Material | None) -> str:
-    """Kind of a material for its name in a written XML scene; Sionna takes names with `itu` its own way."""
+    """Kind of a material for its name as an XML scene is written; Sionna takes names with `itu` its own way."""
     if material is None:
         return "air"
     return material.itu if material.itu else ("constant" if material.level is not None else "slab")

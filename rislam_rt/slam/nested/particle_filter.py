@@ -168,12 +168,12 @@ def _move(
 
 
 def _refresh_view(front: WindowState, belief: Nested, config: SlamConfig) -> WindowState:
-    """Window state whose window is the Gaussian view of the particles, after these have changed."""
+    """Window state of the particle filter after its particles have changed: its window is their Gaussian view."""
     return front._replace(window=gaussian_view(belief, front.window.step, front.heading, config))
 
 
 def _spans(front: WindowState) -> Floats:
-    """Times (K,) [s] from each pose of the particles' trail to now."""
+    """Times (K,) [s] from each pose of the particle filter's trail to now."""
     return np.append(np.cumsum(front.window.step[::-1])[::-1], 0.0)
 
 
@@ -187,7 +187,8 @@ def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
 
 
 def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
-    """Tracks not examined for births (young; wall returns, if thrown away), and which log entries are wall returns."""
+    """Tracks the particle filter does not examine for births (young; wall returns, if thrown away), and which log
+    entries are wall returns."""
     tracks, scene = front.tracks, front.scene
     need = config.nested.birth_cycles if config.use_vt or not len(front.landmarks.ident) else WALL_CYCLES
     looked = np.maximum(tracks.looked, 2 * need // 3)  # looked at again when their measurements have grown by a half
@@ -213,7 +214,8 @@ def _follow_map(
 
 
 def _history(front: WindowState, row: int) -> LandmarkHistory:
-    """Measurements from which a new feature of the map was found, and its prior, for its particles' initialisation."""
+    """Measurements from which a new feature of the map was found, and its prior, to initialise it in the particle
+    filter."""
     landmarks, log, window = front.landmarks, front.log, front.window
     at = (log.form[:, 0] == landmarks.ident[row]).any(axis=1).nonzero()[0]
     forms = landmarks.rows(log.form[at[0]])
@@ -244,7 +246,8 @@ def _history(front: WindowState, row: int) -> LandmarkHistory:
 def wall_returns(
     tracks: WindowTracks, log: Log, cycle: int, poses: Floats, body: Body, radio: RadioConfig, config: NestedConfig
 ) -> Booleans:
-    """Whether each track (T,) is a wall return, by the classifier, from K estimated poses (K, 4) [m, rad].
+    """Whether each track (T,) is a wall return for the particle filter, by the classifier, from K estimated poses (K,
+    4) [m, rad].
 
     What the receiver says ran over the panel is none, however it looks to a classifier.
     """

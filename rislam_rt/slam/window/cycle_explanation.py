@@ -175,7 +175,7 @@ def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
-    """Mean squared residuals (A,) of explained rows of the log, in reported standard deviations."""
+    """Mean squared residuals (A,) of explained components, as rows of the log, in reported standard deviations."""
     if not len(rows):
         return np.zeros(0)
     at = np.searchsorted(left.row, rows)
@@ -269,8 +269,8 @@ def _weigh_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonE
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Landmark label (A,) of forms (A, 5): the ident of a point or wall, or a combined one of a point's image in a wall
-    and of two walls in either order."""
+    """Landmark label (A,) of the forms (A, 5) that explain components: the ident of a point or wall, or a combined one
+    of a point's image in a wall and of two walls in either order."""
     if not len(forms):
         return np.zeros(0, dtype=np.int64)
     point, first, second = forms[:, 0] >= 0, forms[:, 3], forms[:, 4]

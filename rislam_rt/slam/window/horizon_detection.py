@@ -58,7 +58,7 @@ class _Near(NamedTuple):
 
 
 def _near(returns: Elevations, log_like: Floats) -> _Near:
-    """Returns that may come in nearly level, by the map and by the log likelihoods (R, Z) of what was heard of them.
+    """Returns near the horizon, by the map and by the log likelihoods (R, Z) of what was heard of them.
 
     A level body hears them: their elevation is at the plane at least.
     """

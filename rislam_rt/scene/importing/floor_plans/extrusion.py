@@ -80,7 +80,7 @@ def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> Roo
 
 
 def _cut_lines(opening: Opening, lines: list[Line]) -> list[int]:
-    """Numbers of the wall lines of a floor plan that an opening goes through."""
+    """Numbers of the wall lines of an extruded floor plan that a door or window goes through."""
     along = (opening.ends[1] - opening.ends[0]) / np.linalg.norm(opening.ends[1] - opening.ends[0])
     near = []
     for number, line in enumerate(lines):
@@ -140,7 +140,7 @@ def _frame(opening: Opening, lines: list[Line], thresholds: dict[float, list[Mes
 
 
 def _floor_triangles(plan: FloorPlan, lines: list[Line]) -> Floats:
-    """Triangles (T, 3, 2) [m] of the floors of a plan's rooms; without any, of the rectangle about all walls."""
+    """Floors of an extruded plan's rooms, triangles (T, 3, 2) [m]; without rooms, the rectangle about all walls."""
     found = []
     for room in plan.rooms:
         triangles = triangulate(room, [])

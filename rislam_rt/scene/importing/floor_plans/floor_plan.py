@@ -105,7 +105,7 @@ def parse_geojson(content: bytes) -> list[PlanShape]:
 
 
 def _features(table: Any) -> Iterator[tuple[Any, Any]]:
-    """Geometry and properties of every feature of a GeoJSON table."""
+    """Geometry and properties of every feature of a floor plan's GeoJSON table."""
     if table["type"] == "FeatureCollection":
         for feature in table["features"]:
             yield from _features(feature)

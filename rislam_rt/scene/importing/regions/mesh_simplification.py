@@ -74,7 +74,8 @@ def _filled(
 
 
 def _off_loop(corners: Floats, loop: Floats) -> float:
-    """Largest distance [m] of a flat region's corners (n, 3) from its simplified closed loop (m, 3)."""
+    """Error of a simplification: largest distance [m] of a flat region's corners (n, 3) from its simplified closed loop
+    (m, 3)."""
     edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
     return float(distance_to_edges(corners, edges).max())
 
@@ -106,5 +107,6 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 
 
 def has_area(triangles: Floats) -> Booleans:
-    """Whether (T,) triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
+    """Whether (T,) triangles (T, 3, 3) of a simplified mesh are more than a line: higher than a tenth of a
+    millimetre."""
     return np.asarray(triangle_heights(triangles) > 1e-4)

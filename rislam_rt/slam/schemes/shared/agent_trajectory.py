@@ -45,7 +45,7 @@ class AgentTrajectory(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Number 2A of coordinates of one state."""
+        """Number 2A of coordinates of one state of the agent's trajectory."""
         return 2 * self.axes
 
 
@@ -108,7 +108,8 @@ def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Pseudo-inverse of a positive semidefinite matrix (D, D), directions of mere rounding left out."""
+    """Pseudo-inverse of a positive semidefinite matrix (D, D) for the agent's trajectory, directions of mere rounding
+    left out."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-24))
     unit = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(matrix / unit, rcond=1e-9, hermitian=True)) / unit

@@ -88,7 +88,7 @@ def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimat
 
 
 def _map(points: Points) -> MapEstimate:
-    """Map of a SLAM estimate that holds points alone, none of them a panel, and no walls."""
+    """Map of an agent that filters by delay alone: points alone, none of them a panel, and no walls."""
     count = len(points.ident)
     return MapEstimate(
         points.ident, points.mean, points.covariance, np.full(count, -1), np.zeros(count), np.zeros(count),
