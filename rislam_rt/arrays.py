@@ -1,5 +1,4 @@
-"""Array types, and the checks of dtype, shape and NaN that frozen dataclasses make of their array fields on
-construction."""
+"""Arrays: their types, the checks of dtype, shape and NaN that frozen dataclasses make of their fields, blocks of rows."""
 
 from typing import Any
 
@@ -67,3 +66,9 @@ def freeze(record: Any, name: str, dtype: Any, shape: tuple[int | None, ...]) ->
     """Replace a field of a frozen dataclass by its checked, read-only array (for `__post_init__`)."""
     label = f"{type(record).__name__}.{name}"
     object.__setattr__(record, name, frozen(getattr(record, name), dtype, shape, label))
+
+
+def row_blocks(count: int, width: int, most: int = 2_000_000, least: int = 1) -> list[slice]:
+    """Slices of an array's rows of `width` numbers, so that one holds about `most`, `least` rows or more."""
+    step = max(least, most // max(width, 1))
+    return [slice(first, min(first + step, count)) for first in range(0, count, step)]

@@ -62,7 +62,8 @@ def command(
 def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
     """Run all schemes of a SLAM pipeline in a scene, as `rislam-rt run` does; a completed run is shown instead."""
     from rislam_rt.cli.scene_arguments import open_scene, scene_of
-    from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.pipeline.channels import prepare_channel
+    from rislam_rt.pipeline.run import check_run
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.pipeline.store.identity import run_identity
     from rislam_rt.pipeline.store.run_folder import DONE, find_run

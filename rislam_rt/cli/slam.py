@@ -104,7 +104,7 @@ def _true_positions(file: Path, cycles: int) -> "Floats":
     """True positions (K, 3) [m] for `rislam-rt slam` from the TUM file of `--truth`, one a cycle."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.recorded_poses import parse_tum
+    from rislam_rt.scene.motion.recorded_poses import parse_tum
 
     try:
         _, position, _ = parse_tum(file.read_bytes())

@@ -15,7 +15,7 @@ from rislam_rt.cli.output_files import page_files, study_folder
 from rislam_rt.cli.progress_bars import show_progress, show_sweep
 from rislam_rt.cli.scene_arguments import open_scene, scene_of
 from rislam_rt.errors import ConfigError
-from rislam_rt.pipeline.run import prepare_channel
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.report.studies import classifier
 from rislam_rt.report.studies.channel_validation import CERTIFICATE, COMPARISON, write_comparison

@@ -65,7 +65,7 @@ def command(
     """
     from rislam_rt.cli.scene_arguments import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.run import prepare_channel
+    from rislam_rt.pipeline.channels import prepare_channel
     from rislam_rt.pipeline.signal_simulation import load_signals_spec, signal_settings
     from rislam_rt.pipeline.specification.read_pipeline import load_radio
     from rislam_rt.report.exports.deepmimo import deepmimo_files
@@ -130,7 +130,7 @@ def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int,
     """Find all paths along a scene's trajectory, RIS panel at phase level 0, and write them to a file if given."""
     from time import perf_counter
 
-    from rislam_rt.pipeline.run import build_channel
+    from rislam_rt.pipeline.channels import build_channel
     from rislam_rt.pipeline.run_datasets import paths_to_dataset
     from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset

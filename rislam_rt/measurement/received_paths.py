@@ -6,7 +6,6 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.model import PathKind, Paths, RadioConfig
@@ -105,18 +104,3 @@ def _tx_leg_length(paths: Paths, cycle: int, path: Integers) -> Floats:
         corners = np.vstack([tx, paths.vertices[cycle, path[row], : bounces + 1]])
         length[row] = np.sum(np.linalg.norm(np.diff(corners, axis=0), axis=1))
     return length
-
-
-def check_half_turn(levels: int) -> None:
-    """Check that half a turn is among the phase levels of a panel, as alternated codes need it.
-
-    Raises
-    ------
-    ConfigError
-        Their number is odd.
-    """
-    if levels % 2:
-        raise ConfigError(
-            f"ris.levels: {levels} received; alternation needs an even number of phase levels, half a turn among "
-            "them; give one, or receiver.alternation = false, which holds one code for the whole slot"
-        )

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.design import DESIGNERS, Design, DesignProblem, panel_columns, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.channels import build_channel
 
 
 class DesignsAt(NamedTuple):

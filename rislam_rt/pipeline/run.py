@@ -9,15 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
-from rislam_rt.measurement.received_paths import check_half_turn
-from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
+from rislam_rt.measurement.config import check_half_turn
+from rislam_rt.model import Body, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.assumed_model import tilted_motion
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
-from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.room.true_motion import draw_motion
@@ -30,7 +29,6 @@ from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
 from rislam_rt.scene.findings import raise_errors
-from rislam_rt.tracer_backend import prepare_backend
 from rislam_rt.worker_pool import run_side_by_side
 
 LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-core")
@@ -201,31 +199,6 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     if spec.receiver.alternation and any(SCHEMES[name].panel for name in spec.schemes):
         check_half_turn(scene.ris.spec.levels)
     check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
-
-
-def prepare_channel(kind: str) -> None:
-    """Load the ray tracer's backend if a run's channel needs it, so that a machine that lacks it is found out early.
-
-    Raises
-    ------
-    SetupError
-        The machine lacks something that the tracer needs.
-    """
-    if kind == "traced":
-        prepare_backend()
-
-
-def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:
-    """Build the channel of that name: ray tracer, image sources or a user's own; the tracer is imported on demand."""
-    if kind == "traced":
-        from rislam_rt.channel.traced import TracedChannel
-
-        return TracedChannel(scene, radio, depth)
-    if kind != "image_source":
-        return OwnChannel(kind, scene, radio, depth)
-    from rislam_rt.channel.image_source import ImageSourceChannel
-
-    return ImageSourceChannel(scene, radio, depth)
 
 
 def cut_scene(scene: Scene, cycles: int | None) -> Scene:

@@ -129,7 +129,8 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
 
 
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
-    """Add to a data set, as attributes, `about`, schema version, number of cycles and a checksum over its content."""
+    """Seal a run's data set: add, as attributes, `about`, schema version, number of cycles and a checksum over its
+    content."""
     found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["time"]))
     return found.assign_attrs(checksum=_checksum(found))
 

@@ -11,9 +11,9 @@ from pydantic import Field
 from rislam_rt.design import focus_codes
 from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.measurement import NO_COMPONENT, ReceiverConfig, num_tones, signals_dataset
-from rislam_rt.measurement.received_paths import check_half_turn
+from rislam_rt.measurement.config import check_half_turn
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode, Scene
-from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.run_datasets import paths_to_dataset
 from rislam_rt.pipeline.specification.pipeline_spec import ReceiverSection, build_receiver
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio

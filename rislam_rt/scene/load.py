@@ -15,7 +15,7 @@ from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_placement import MeshFiles
-from rislam_rt.scene.motion import build_motion
+from rislam_rt.scene.motion.agent_motion import build_motion
 from rislam_rt.scene.schema import MAX_SCENE_BYTES, MaterialSection, RisSection, ScattererSection, SceneSpec, read_spec
 from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.shipped import find_room

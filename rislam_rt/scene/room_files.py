@@ -12,9 +12,6 @@ from rislam_rt.toml import toml_bytes
 PAPER_MATERIAL = {"reflection": 0.85}
 """Material of the paper's walls, as a table of the scene file."""
 
-BASELINE = {"tx_offset_m": [-0.04388, -0.02397, 0.0], "rx_offset_m": [0.04388, 0.02397, 0.0]}
-"""Offsets [m] of Tx and Rx in the scene file: 0.1 m apart, turned 0.5 rad, parallel to no edge and no diagonal."""
-
 CYCLES = {"cycles": 600, "cycle_s": 0.1}
 """Number of cycles and their length in the scene file."""
 

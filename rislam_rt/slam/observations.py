@@ -43,7 +43,7 @@ class Observations(NamedTuple):
 
     @property
     def odds(self) -> Floats:
-        """Log odds (M,) that a component ran over the panel, 0 where the receiver does not tell."""
+        """Log odds (M,) that an observed component ran over the panel, 0 where the receiver does not tell."""
         return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
 
     def take(self, rows: Integers) -> "Observations":

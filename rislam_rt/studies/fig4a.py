@@ -11,7 +11,7 @@ from rislam_rt.design import DesignProblem, GainCurves, direct_only, gain_curves
 from rislam_rt.design.gain_curves import GainInterval
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.specification.pipeline_spec import build_design
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.progress import Tell, tell_nobody

@@ -12,8 +12,9 @@ from pydantic import BaseModel, Field
 from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.evaluate import bootstrap, rms_over_runs
 from rislam_rt.model import Scene
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.own_methods import own_digests
-from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
+from rislam_rt.pipeline.run import check_run, library_versions, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec, make_way, read_table

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, row_blocks
 from rislam_rt.channel.image_source.wall_facets import WallFacets
 from rislam_rt.channel.image_source.wall_rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -153,7 +153,7 @@ def search_beams(
     ball, wall = (index.ravel() for index in np.indices((len(far.radius), count)))
     keep = ~barred[wall]
     ball, wall = ball[keep], wall[keep]
-    for rows in _blocks(len(ball), 40):
+    for rows in row_blocks(len(ball), 40, _BLOCK, 256):
         start = far.center[ball[rows]]
         nothing = np.zeros((len(start), 0), dtype=np.int64)
         empty = Beams(ball[rows], nothing, start, np.zeros((len(start), 0, 3)), np.zeros((len(start), 0)))
@@ -168,19 +168,13 @@ def _followed(
     yield _reaching(beams, device, pairs)
     if more == 0:
         return
-    for rows in _blocks(len(beams.ball), len(clusters.rectangles.center)):
+    for rows in row_blocks(len(beams.ball), len(clusters.rectangles.center), _BLOCK, 256):
         block = beams.only(rows)
         row, wall = clusters.reached(block.normal, block.offset)
         row, wall = _facing(clusters.rectangles, block, row, wall, far.radius)
-        for some in _blocks(len(row), 4 * (block.normal.shape[1] + 5)):
+        for some in row_blocks(len(row), 4 * (block.normal.shape[1] + 5), _BLOCK, 256):
             grown = _through(clusters.rectangles, block.only(row[some]), wall[some], far.radius)
             yield from _followed(clusters, grown, device, far, pairs, more - 1)
-
-
-def _blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of `count` rows of `width` numbers each that keep a temporary array within `_BLOCK`, 256 rows or more."""
-    step = max(256, _BLOCK // width)
-    return (slice(i, i + step) for i in range(0, count, step))
 
 
 def _facing(

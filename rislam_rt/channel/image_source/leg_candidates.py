@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, row_blocks
 from rislam_rt.channel.image_source.beam_tracing import (
     BoundingBalls,
     FoundSequences,
@@ -15,7 +15,7 @@ from rislam_rt.channel.image_source.beam_tracing import (
     group_positions,
     search_beams,
 )
-from rislam_rt.channel.image_source.wall_facets import WallFacets, row_blocks
+from rislam_rt.channel.image_source.wall_facets import WallFacets
 
 FEW = 2000
 """Number of wall sequences up to which `auto` tries all of them; beyond it beam tracing is faster."""

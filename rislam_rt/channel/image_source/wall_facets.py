@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, row_blocks
 from rislam_rt.channel.image_source.wall_rectangles import Rectangles, bounding_rectangles
 from rislam_rt.channel.occluders import Occluders
 from rislam_rt.channel.walls import Walls
@@ -15,8 +15,6 @@ SEAM = 1e-9
 """[m] Triangles reach this far over their edges, so that no ray slips between two that share one (float64 rounding)."""
 _SIMPLE = 4
 """Largest number of triangles of walls that are tested all together; walls of more are tested one by one."""
-_BLOCK = 2_000_000
-"""Numbers in the largest temporary array."""
 FRONT, BACK = 1, 2
 """Side bits: in front of a wall (where its normal points), behind it."""
 
@@ -181,10 +179,3 @@ def build_facets(walls: Walls) -> WallFacets:
         over=walls.over,
         occluders=walls.occluders,
     )
-
-
-def row_blocks(count: int, width: int) -> list[slice]:
-    """Slices of `count` rows of `width` numbers each, so that a test of facets holds about `_BLOCK` numbers at a
-    time."""
-    step = max(1, _BLOCK // max(width, 1))
-    return [slice(i, min(i + step, count)) for i in range(0, count, step)]

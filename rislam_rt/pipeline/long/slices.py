@@ -17,9 +17,9 @@ from rislam_rt.arrays import Integers
 from rislam_rt.errors import ResultError
 from rislam_rt.model import NOTHING, Body, Paths, Scene, SchemeResult, Trajectory
 from rislam_rt.pipeline import run_datasets
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
-from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec

@@ -1,14 +1,9 @@
 """Geometric queries to a mesh: triangles near a point, crossed by a segment, hit by a ray, or around a point."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, row_blocks
 from rislam_rt.geometry.triangles import edge_planes, triangle_planes
-
-_CHUNK = 2_000_000
-"""Point-triangle pairs that a query works out in one go: 16 MB an array."""
 
 
 def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
@@ -17,7 +12,7 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
-    for rows in _blocks(len(points), len(triangles)):
+    for rows in row_blocks(len(points), len(triangles)):
         k, t = np.nonzero(np.abs(points[rows] @ normal.T - offset) <= distance)
         near = _depth(points[rows][k], edges, t) >= -distance
         found.append((k[near] + rows.start, t[near]))
@@ -30,7 +25,7 @@ def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, 
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
-    for rows in _blocks(len(start), len(triangles)):
+    for rows in row_blocks(len(start), len(triangles)):
         a, b = start[rows] @ normal.T - offset, end[rows] @ normal.T - offset
         k, t = np.nonzero(a * b < 0.0)
         fraction = (a[k, t] / (a[k, t] - b[k, t]))[:, None]
@@ -50,7 +45,7 @@ def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float
     edges = edge_planes(triangles)
     height = offset - normal @ origin
     nearest = np.full(len(directions), -1, dtype=np.int64)
-    for rows in _blocks(len(directions), len(triangles)):
+    for rows in row_blocks(len(directions), len(triangles)):
         slope = directions[rows] @ normal.T
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = height / slope
@@ -92,12 +87,6 @@ def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> 
     inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
-
-
-def _blocks(rows: int, columns: int) -> Iterator[slice]:
-    """Slices of rows for a query to a mesh, each of no more than `_CHUNK` pairs of point and triangle."""
-    step = max(1, _CHUNK // max(columns, 1))
-    return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
 
 def _joined(found: list[tuple[Integers, Integers]]) -> tuple[Integers, Integers]:

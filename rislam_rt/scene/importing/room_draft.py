@@ -13,7 +13,8 @@ from rislam_rt.scene.check.mesh_queries import ray_hits
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, reflector
+from rislam_rt.scene.motion.suggested_motion import BASELINE
+from rislam_rt.scene.room_files import CYCLES, RoomFiles, panel, reflector
 from rislam_rt.scene.write import mesh_file
 
 FROM_EDGE = 0.1

@@ -98,3 +98,10 @@ def _made(**values: Any) -> Material:
     except SceneError as error:
         what, _, mend = str(error).partition("; ")
         raise Fault(what, mend) from None
+
+
+def material_word(material: Material | None) -> str:
+    """Kind of a material for its name in a written XML scene; Sionna takes names with `itu` its own way."""
+    if material is None:
+        return "air"
+    return material.itu if material.itu else ("constant" if material.level is not None else "slab")

@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.errors import SceneError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.specification.pipeline_spec import build_receiver
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.progress import Tell, tell_nobody

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rislam_rt.model import RisCode, SchemeResult
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
-from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
+from rislam_rt.pipeline.run import RunSetup, prepare_setup, run_scheme
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.signal_simulation import SignalsSpec, build_signals

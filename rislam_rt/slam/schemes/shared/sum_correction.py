@@ -103,7 +103,8 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
 
 
 def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:
-    """Agent's trajectory corrected by one feature's message: moments over its Gaussians, the rest changing nothing."""
+    """Correction of the agent's trajectory by one feature's message: moments over its Gaussians, the rest changing
+    nothing."""
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):
         return course

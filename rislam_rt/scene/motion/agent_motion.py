@@ -9,11 +9,11 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import GeometryError
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv, parse_tum
+from rislam_rt.scene.motion.random_walk import draw_walk
+from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv, parse_tum
+from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
 from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.schema import AgentSection
-from rislam_rt.scene.waypoints import RoundedPath, round_corners
 
 MAX_TUM_BYTES = 100_000_000
 """Most bytes of a recording of the agent's motion."""

@@ -8,7 +8,9 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.room_files import BASELINE
+
+BASELINE = {"tx_offset_m": [-0.04388, -0.02397, 0.0], "rx_offset_m": [0.04388, 0.02397, 0.0]}
+"""Offsets [m] of Tx and Rx in the scene file: 0.1 m apart, turned 0.5 rad, parallel to no edge and no diagonal."""
 
 NUM_PLACES, NUM_RAYS, NUM_WAYS = 120, 64, 24
 """Places tried for a suggested motion (a fifth with many faces), rays cast from each, and directions."""

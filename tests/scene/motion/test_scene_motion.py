@@ -12,8 +12,8 @@ from rislam_rt.model import Body
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import MeshReader, ply_bytes
-from rislam_rt.scene.motion import straight_motion
-from rislam_rt.scene.recorded_poses import parse_tum
+from rislam_rt.scene.motion.agent_motion import straight_motion
+from rislam_rt.scene.motion.recorded_poses import parse_tum
 from rislam_rt.scene.shapes import block
 from rislam_rt.scene.write import tum_bytes
 

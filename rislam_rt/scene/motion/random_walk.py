@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.waypoints import RoundedPath, round_corners
+from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
 
 WIDEST_TURN = np.radians(110.0)
 """Largest turn [rad] at a corner of a random walk."""
