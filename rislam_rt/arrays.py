@@ -1,4 +1,4 @@
-"""Arrays: their types, the checks of dtype, shape and NaN that frozen dataclasses make of their fields, blocks of rows."""
+"""Arrays: their types, checks of dtype, shape and NaN that frozen dataclasses make of their fields, blocks of rows."""
 
 from typing import Any
 

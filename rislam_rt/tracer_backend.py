@@ -107,7 +107,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def check_python(version: tuple[int, ...]) -> None:
-    """Raise a `SetupError` for a version of Python that the ray tracer does not run on."""
+    """Raise a `SetupError` for a version of Python that the tracer's backend does not run on."""
     if not PYTHONS[0] <= tuple(version[:2]) <= PYTHONS[1]:
         found, (low, high) = ".".join(map(str, version[:2])), [".".join(map(str, v)) for v in PYTHONS]
         raise SetupError(f"Python {found} found, {low} to {high} needed: build the environment anew with one of them")
@@ -178,7 +178,7 @@ def count_gpus() -> int:
 
 
 def _device() -> str:
-    """Device of the ray tracer, `llvm` or `cuda`, from the environment variable RISLAM_RT_DEVICE."""
+    """Device of the tracer's backend, `llvm` or `cuda`, from the environment variable RISLAM_RT_DEVICE."""
     device = os.environ.get("RISLAM_RT_DEVICE", "llvm").lower()
     if device not in ("llvm", "cuda"):
         raise SetupError(f"RISLAM_RT_DEVICE: '{device}' received; give 'llvm' or 'cuda'")
@@ -254,7 +254,8 @@ def _load(path: str) -> ctypes.CDLL:
 
 
 def _package(name: str) -> Diagnosis:
-    """Row of `rislam-rt doctor` with the version of an installed package; only the LLVM wheel may be missing."""
+    """Version of an installed package that the tracer's backend needs, a row of `rislam-rt doctor`; only the LLVM wheel
+    may be missing."""
     try:
         return Diagnosis(name, metadata.version(name))
     except metadata.PackageNotFoundError:

@@ -24,7 +24,7 @@ GROWTH = 1.05
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """Label of a landmark's link budget by its share: `heard`, `heard at times` or `not heard`."""
+    """Label that the adviser gives a landmark, by which it picks remedies: `heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 
@@ -104,7 +104,8 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """Warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam sweep."""
+    """Remedy for a search: a warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam
+    sweep."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:
         yield (

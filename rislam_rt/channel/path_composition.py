@@ -19,7 +19,7 @@ def compose_paths(
     scene: Scene, radio: RadioConfig, walls: Walls, depth: int, direct: SpecularLegs, tx_legs: Sequence[SpecularLegs],
     rx_legs: Sequence[SpecularLegs], source: str,
 ) -> Paths:  # fmt: skip
-    """Compose specular legs into all paths of up to `depth` wall bounces, with gains, that some cycle has.
+    """Compose specular legs to all paths of up to `depth` wall bounces, with gains, that some cycle has.
 
     Parameters
     ----------
@@ -144,13 +144,13 @@ def _panel_responses(
 
 
 def _padded(walls: Integers, depth: int) -> Integers:
-    """Pad or cut wall sequences (P, d) of legs to exactly `depth` columns, to compose paths of them."""
+    """Composition of paths: pad or cut the legs' wall sequences (P, d) to exactly `depth` columns."""
     fill = np.full((len(walls), max(depth - walls.shape[1], 0)), -1)
     return np.concatenate([walls, fill], axis=1)[:, :depth]
 
 
 def _padded_vertices(vertices: Floats, count: int) -> Floats:
-    """Pad or cut the legs' vertices (K, S, D, 3) to exactly `count` points, to compose paths of them."""
+    """Composition of paths: pad or cut the legs' vertices (K, S, D, 3) to exactly `count` points."""
     cycles, paths, depth, _ = vertices.shape
     fill = np.zeros((cycles, paths, max(count - depth, 0), 3))
     return np.concatenate([vertices, fill], axis=2)[:, :, :count]

@@ -62,7 +62,8 @@ def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Pa
 
 
 def point_in(scene: "Scene", text: str) -> "Floats":
-    """Point (3,) [m] from the text `x,y,z` of the option `--at`, which must lie within the bounds of a scene.
+    """Command line argument `--at`: a point (3,) [m] from the text `x,y,z`, which must lie within the bounds of a
+    scene.
 
     Raises
     ------

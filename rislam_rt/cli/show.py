@@ -66,7 +66,7 @@ def command(
 
 
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
-    """Write the HTML view of a scene (`show --html`) with the paths at some poses of its trajectory."""
+    """Part of `rislam-rt show --html`: write the view of a scene with the paths at some poses of its trajectory."""
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.report.view.page import view_page

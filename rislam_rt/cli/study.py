@@ -51,7 +51,8 @@ def _refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
 
 
 def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
-    """Run the study that compares ray tracer and image sources, and write its page; exit code 1 if they differ."""
+    """For `rislam-rt run` of a study: compare ray tracer and image sources, and write the page; exit code 1 if they
+    differ."""
     _refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
@@ -74,7 +75,7 @@ def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
 
 
 def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
-    """Run the study of Fig. 4(a), panel gain against distance, and write its page."""
+    """For `rislam-rt run` of a study: compute Fig. 4(a), panel gain against distance, and write its page."""
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
     check_fig4a(scene, spec)
@@ -93,7 +94,8 @@ def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
 
 
 def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
-    """Run a swept study (Fig. 4(b), rooms, ablations, ...) and write its page; exit code 1 if a cell failed."""
+    """For `rislam-rt run` of a swept study (Fig. 4(b), rooms, ablations, ...): write its page; exit code 1 if a cell
+    failed."""
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
@@ -111,7 +113,8 @@ def run_cells(
     sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
     write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run the cells of a study's sweep, rewriting its page as they end, and `show` them; exit code 1 if one failed."""
+    """For `rislam-rt run` of a study: run the cells of its sweep, rewriting its page as they end, and `show` them; exit
+    code 1 if one failed."""
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
@@ -128,7 +131,7 @@ def run_cells(
 
 
 def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
-    """Check the paper's claims against the results of other studies, and write the page."""
+    """For `rislam-rt run` of a study: check the paper's claims against the results of others, and write the page."""
     _refuse_scene(given, "claims", "runs in no room; leave it out")
     results = read_results(Path(os.path.normpath(given.pipeline.parent / spec.results)))
     found = judge(results)
@@ -141,7 +144,8 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
 
 
 def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
-    """Run the study in unseen random rooms, print the scores and write its page; exit code 1 if a room failed."""
+    """For `rislam-rt run` of the study in unseen rooms: print the scores and write its page; exit code 1 if a room
+    failed."""
     _refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
@@ -171,7 +175,7 @@ PICTURES = {
 
 
 def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
-    """Train and score the classifier of multipath components, and write weights, page, data and figures."""
+    """For `rislam-rt run` of a study: train and score the classifier, and write weights, page, data and figures."""
     _refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]

@@ -15,7 +15,8 @@ _WORTHWHILE = 1e-7
 
 
 def coordinate_descent(objective: Objective, index: Integers, levels: int, max_steps: int) -> tuple[Integers, Floats]:
-    """Improve a code (N M,) until no change of one element lowers the expected CRLB; and the objective by step.
+    """Improve a code (N M,) by coordinate descent until no change of one element lowers the expected CRLB; and the
+    objective by step.
 
     Each step values every change of one element, ranks the elements by what their best change gains, and applies the
     first m of them for the m = 1, 2, 4, ... that turns out best: never worse than the best single change.

@@ -72,7 +72,7 @@ def _describe(
 
 
 def _db(magnitude: Floats) -> Floats:
-    """Decibels 20 log10 (...,) of a design's gain magnitudes, a gain of zero as -400 dB."""
+    """Decibels 20 log10 (...,) of the gain magnitudes by which designers are valued, a gain of zero as -400 dB."""
     return 20.0 * np.log10(np.maximum(magnitude, 1e-20))
 
 

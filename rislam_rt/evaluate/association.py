@@ -25,8 +25,8 @@ class AssociationScore(NamedTuple):
 
 
 def association_score(label: Integers, truth: Integers) -> AssociationScore:
-    """Score the labels (T,) that a filter gave measurements against their true identities (T,), in the order of time;
-    -1 is none.
+    """Score of data association: the labels (T,) that a filter gave measurements against their true identities (T,), in
+    the order of time; -1 is none.
 
     Labels are numbers of the agent's own. Each is first given the identity with which it agrees most often, one to one
     (the assignment that gets the most measurements right), so a split or merged track costs what it loses.

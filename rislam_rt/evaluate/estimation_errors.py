@@ -31,7 +31,8 @@ def root_mean_square(errors: Floats) -> float:
 
 
 def align(estimate: Floats, truth: Floats) -> Floats:
-    """Estimated positions (K, 3) turned about z and shifted onto the true ones at the least squared distances."""
+    """Estimated positions (K, 3) turned about z and shifted onto the true ones at the least squared distances, to leave
+    relative errors."""
     centred, target = estimate - estimate.mean(axis=0), truth - truth.mean(axis=0)
     # The angle that maximises sum target . R centred, with complex numbers for the plane.
     overlap = np.sum(np.conj(centred[:, 0] + 1j * centred[:, 1]) * (target[:, 0] + 1j * target[:, 1]))

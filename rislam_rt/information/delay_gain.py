@@ -30,8 +30,8 @@ class EquivalentDelayInformation(NamedTuple):
 
 
 def steering(arrival: Floats, radio: RadioConfig, heading: Floats | float = 0.0) -> Complexes:
-    """Antenna vectors (..., P, L) `exp(j 2 pi x_l . a / lambda)` of paths' arrival directions (..., P, 3), for their
-    information."""
+    """Antenna vectors (..., P, L) `exp(j 2 pi x_l . a / lambda)` of directions (..., P, 3), for the information on
+    delays and gains."""
     body = arrival @ rotation_z(np.asarray(heading, dtype=np.float64))
     return np.exp(2j * np.pi / radio.wavelength * body @ radio.array.positions(radio.wavelength).T)
 

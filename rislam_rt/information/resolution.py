@@ -77,8 +77,8 @@ def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
 
 
 def _block(gap: Floats, axes: list[tuple[Any, Any]]) -> Complexes:
-    """Inner products (..., 4, 4) of a path's signal and derivatives with those of another to resolve, a `gap` (..., 3)
-    away."""
+    """Inner products (..., 4, 4), for resolution, of one path's signal and derivatives with those of another a `gap`
+    (..., 3) away."""
     moments = []
     for axis, (place, weight) in enumerate(axes):
         wave = np.exp(2j * np.pi * np.multiply.outer(gap[..., axis], place)) * weight

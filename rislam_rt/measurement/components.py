@@ -107,7 +107,7 @@ def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -
 
 
 def select_paths(received: Received, keep: Booleans) -> Received:
-    """Select the received paths that are marked (N,)."""
+    """Select the received paths that are marked (N,), from which components are made."""
     return Received._make(field[keep] for field in received)
 
 

@@ -86,7 +86,7 @@ class TrackInfo(NamedTuple):
 
 
 def init_tracks() -> TrackState:
-    """Empty set of tracks, with which tracking begins."""
+    """Empty set of tracks of multipath components, with which tracking begins."""
     none = np.zeros(0, dtype=np.int64)
     return TrackState(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, 0)
 
@@ -94,7 +94,8 @@ def init_tracks() -> TrackState:
 def step_tracks(
     state: TrackState, measurement: Measurement, dt: float, config: TrackingConfig
 ) -> tuple[TrackState, TrackInfo]:
-    """Predict tracks over `dt` [s], assign this cycle's components to them, update, start and end tracks."""
+    """Track multipath components over a cycle: predict tracks over `dt` [s], assign components to them, update, start
+    and end tracks."""
     seen = np.column_stack([SPEED_OF_LIGHT * measurement.tau, measurement.cosines])
     noise = config.std_scale**2 * np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std]) ** 2
     loudness = np.log(np.maximum(measurement.amplitude, 1e-300))
@@ -141,7 +142,7 @@ def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState
 def _assign(
     state: TrackState, seen: Floats, noise: Floats, loudness: Floats, config: TrackingConfig
 ) -> tuple[Integers, Integers]:
-    """Optimal assignment of tracks to components within the gate: rows of tracks, rows of components."""
+    """Optimal assignment of tracks to multipath components within the gate: rows of tracks, rows of components."""
     innovation = seen - state.mean[:, None, :, 0]
     spread = state.covariance[:, None, :, 0, 0] + noise
     distance = np.sum(innovation**2 / spread, axis=-1)

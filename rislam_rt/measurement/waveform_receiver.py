@@ -59,7 +59,8 @@ def capture(
     received: Received, radio: RadioConfig, config: ReceiverConfig, front_end: FrontEnd | None = None,
     leakage: complex = 0.0, *, rng: np.random.Generator,
 ) -> list[Capture]:  # fmt: skip
-    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of codes.
+    """Simulate what the waveform receiver samples in a cycle: one capture, or with alternation the sum and differences
+    of codes.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
@@ -131,7 +132,8 @@ def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig
 
 
 def to_measurement(found: DetectedComponents, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
-    """Measurement of the agent from estimated components, with the probability that each came over the panel."""
+    """Measurement that the waveform receiver reports of estimated components, with the probability that each came over
+    the panel."""
     told: tuple[Any, ...] = ()
     if config.alternation:
         points, deviation = (

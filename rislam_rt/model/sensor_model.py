@@ -56,14 +56,15 @@ class SensorModel:
 
     @property
     def cell(self) -> Floats:
-        """Widths (3,) of the resolution cell: 1/B [s], and the beam in either direction cosine (2 without aperture)."""
+        """Widths (3,) of the sensor's resolution cell: 1/B [s], and the beam in either direction cosine (2 without
+        aperture)."""
         array = self.radio.array
         beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
         return np.array([1.0 / self.radio.bandwidth, *beams])
 
     @property
     def cell_length(self) -> Floats:
-        """Widths (3,) of the receiver's resolution cell: path length [m] and two direction cosines."""
+        """Widths (3,) of the sensor's resolution cell: path length [m] and two direction cosines."""
         return self.cell * np.array([SPEED_OF_LIGHT, 1.0, 1.0])
 
     def in_window(self, delay: Floats) -> Booleans:
@@ -87,7 +88,8 @@ class SensorModel:
         return detection_probability(snr, self.threshold)
 
     def false_alarm_density(self, tau: ArrayLike, cosines: Floats) -> Floats:
-        """Expected number (...,) of false components a cycle, per second of delay and unit of either direction cosine.
+        """Expected number (...,) of the sensor's false components a cycle, per second of delay and unit of either
+        direction cosine.
 
         Noise is stationary in delay and cosines, so that its peaks lie evenly over the window and the unit disc.
         """
@@ -96,12 +98,13 @@ class SensorModel:
         return np.where(inside, self.false_alarms / (np.pi * (self.window[1] - self.window[0])), 0.0)
 
     def false_alarm_snr_density(self, snr: ArrayLike) -> Floats:
-        """Probability density (...,) of the measured SNR of a false component: noise above the threshold."""
+        """Probability density (...,) of the measured SNR of a sensor's false component: noise above the threshold."""
         excess = np.asarray(snr, dtype=np.float64) - self.threshold
         return np.where(excess >= 0.0, np.exp(-np.maximum(excess, 0.0)), 0.0)
 
     def may_merge(self, gap: Floats) -> Booleans:
-        """Whether (...,) paths `gap` (..., 3) apart in delay [s] and direction cosines share a resolution cell."""
+        """Whether (...,) paths `gap` (..., 3) apart in delay [s] and direction cosines share a resolution cell of the
+        sensor."""
         if self.resolution == "all":
             return np.zeros(gap.shape[:-1], dtype=np.bool_)
         return np.asarray((np.abs(gap) < self.cell).all(axis=-1))

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 __all__ = ["PipelineSpec", "build_radio", "load_spec", "run_slam"]
 
 _HOME = {
-    "build_radio": "specification.radio", "load_spec": "specification.read", "run_slam": "run",
-    "PipelineSpec": "specification.spec",
+    "build_radio": "specification.radio", "load_spec": "specification.read_pipeline", "run_slam": "run",
+    "PipelineSpec": "specification.pipeline_spec",
 }  # fmt: skip
 
 

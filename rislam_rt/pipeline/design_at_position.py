@@ -50,7 +50,7 @@ def design_at(
 
 
 def _panel_gains(scene: Scene, problem: DesignProblem, design: Design) -> dict[str, float]:
-    """Gain [dB] of the first path of each of several panels under a design; empty for a single panel."""
+    """Gain [dB] of the first path of each of several panels under a design at a position; empty for a single panel."""
     weight, found = np.exp(-1j * design.xi.ravel()), {}
     for panel, target, (_, span) in zip(scene.panels, problem.targets, problem.panels, strict=True):
         found[panel.name] = float(20.0 * np.log10(max(abs(target @ weight[span]), 1e-20)))

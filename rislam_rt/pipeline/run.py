@@ -60,7 +60,7 @@ class RunSetup(NamedTuple):
 
 
 def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
-    """Return a run's scene with its overrides and drawn true motion, the Tx and Rx offsets of a level agent, the seeds.
+    """Scene of a run with its overrides and drawn true motion, the Tx and Rx offsets of a level agent, the seeds.
 
     Raises
     ------
@@ -220,7 +220,7 @@ def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of this package, of Python and of the libraries that a run's numbers depend on, by name."""
+    """Versions of this package, of Python and of the libraries that the numbers of a run depend on, by name."""
     from rislam_rt import __version__
 
     found = {"rislam-rt": __version__, "python": platform.python_version()}

@@ -127,7 +127,8 @@ def coded_paths(scene: Scene, channel: str, depth: int, spec: SignalsSpec, *, rn
 
 
 def panel_codes(scene: Scene, paths: Paths, kind: str, *, rng: np.random.Generator) -> RisCode | None:
-    """Phase codes (K, N, M) of a data set of signals, one a cycle; None without a RIS panel, or for its level 0.
+    """Phase codes (K, N, M) under which signals are simulated, one a cycle; None without a RIS panel, or for its level
+    0.
 
     `kind`: `focused` on the agent (random where every path over the panel has walls), `random` or `zero`.
     """

@@ -18,7 +18,7 @@ MAX_LABELLED = 10
 
 
 def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
-    """Figure of the phase codes applied at `number` cycles of a run, a row for each scheme; None without a panel."""
+    """Picture of the phase codes applied at `number` cycles of a run, a row for each scheme; None without a panel."""
     schemes = [scheme for scheme in result.schemes.values() if scheme.applied.shape[1]]
     if not schemes:
         return None
@@ -40,7 +40,8 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
 
 
 def draw_codes(designs: Mapping[str, Design], path: Path, sheet: DataSheet | None = None) -> Path:
-    """Draw the phase codes that several methods designed, with the gain of their target path; return the file's path.
+    """Draw a picture of the phase codes that several methods designed, with the gain of their target path; return the
+    file's path.
 
     `sheet` is the data sheet, needed for several panels.
     """

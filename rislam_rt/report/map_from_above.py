@@ -89,7 +89,7 @@ def largest_middle(triangles: Floats) -> Floats:
 
 
 def name_walls(axis: Axes, scene: Scene) -> None:
-    """Write the names of upright walls beside them in a plan; floors and ceilings have none."""
+    """Write the names of upright walls beside them in a map from above; floors and ceilings have none."""
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
     for (name, point), reflector in zip(wall_places(scene), scene.reflectors, strict=False):
         extent = np.ptp(reflector.vertices, axis=0)

@@ -27,12 +27,12 @@ NOTHING = "-"
 
 
 def metres(value: float | None) -> str:
-    """Table cell: a length in metres with three decimals."""
+    """Table cell in Markdown: a length in metres with three decimals."""
     return NOTHING if value is None or np.isnan(value) else f"{value:.3f}"
 
 
 def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
-    """Table cell: an entry's error in metres with its interval."""
+    """Table cell in Markdown: an entry's error in metres with its interval."""
     value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
     if value is None or low is None:
         return metres(value)
@@ -40,12 +40,12 @@ def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
 
 
 def ratio(value: float | None) -> str:
-    """Table cell: a ratio with two decimals."""
+    """Table cell in Markdown: a ratio with two decimals."""
     return NOTHING if value is None else f"{value:.2f}"
 
 
 def percent_between(entry: Mapping[str, Any], name: str) -> str:
-    """Table cell: a share of an entry in percent with its interval."""
+    """Table cell in Markdown: a share of an entry in percent with its interval."""
     if entry[name] is None:
         return NOTHING
     found = (entry[name + end] for end in ("", "_low", "_high"))
@@ -54,5 +54,5 @@ def percent_between(entry: Mapping[str, Any], name: str) -> str:
 
 
 def percent(value: float | None) -> str:
-    """Table cell: a share in percent."""
+    """Table cell in Markdown: a share in percent."""
     return NOTHING if value is None else f"{100 * value:.0f} %"

@@ -63,7 +63,7 @@ def scheme_colour(name: str) -> str:
 
 
 def _save(figure: Figure, target: Any, **how: Any) -> None:
-    """Save a figure without warnings about characters that the fonts lack, which are drawn as boxes."""
+    """Save a figure in our style without warnings about characters that the fonts lack, which are drawn as boxes."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         figure.savefig(target, **how)
@@ -91,7 +91,7 @@ def picture_kind(path: Path) -> str:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure to a PNG, SVG or PDF file by the file's suffix, whole or not at all.
+    """Write a figure in our style to a PNG, SVG or PDF file by the file's suffix, whole or not at all.
 
     Raises
     ------

@@ -20,7 +20,7 @@ def element_pattern(spec: RisSpec, cos_theta: Floats) -> Floats:
 
 
 def element_gain_area(spec: RisSpec, wavelength: float) -> float:
-    """Gain times area of a panel's element, G dx dy [m^2].
+    """Gain times area of a panel's element in its response, G dx dy [m^2].
 
     `tang`: 8 dx dy. `energy`: 4 pi (dx dy)^2 / lambda^2, what a perfectly conducting cell of that area re-radiates.
     """

@@ -40,7 +40,7 @@ def panel(
 
 
 def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:
-    """Files of a room's scene folder: relative name -> content. `origin` says where the room comes from."""
+    """Files of a new room's scene folder: relative name -> content. `origin` says where the room comes from."""
     files = {mesh_file(name): ply_bytes(*mesh) for name, mesh in room.meshes.items()}
     readme = f"# {room.table['name']}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
     return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

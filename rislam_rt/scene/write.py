@@ -36,7 +36,7 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
-    """Files of a scene folder by name: `scene.toml`, a PLY mesh a reflector, the path unless straight."""
+    """Files of a scene folder to write, by name: `scene.toml`, a PLY mesh a reflector, the path unless straight."""
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
@@ -158,7 +158,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
 
 
 def _has_own_shadow(scatterer: Scatterer) -> bool:
-    """Whether a scatterer's occluder is the mesh of its own solid, written as `shadow = true`."""
+    """Whether a scatterer's occluder, as the scene is written, is the mesh of its own solid: `shadow = true`."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)

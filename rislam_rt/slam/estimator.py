@@ -40,7 +40,7 @@ def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
 
 
 def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Any:
-    """State of the SLAM filter that begins another run, or another agent's, on an earlier run's map and identities.
+    """State of the SLAM estimator that begins another run, or another agent's, on an earlier run's map and identities.
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
@@ -49,7 +49,8 @@ def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random
 
 
 def smoothed(state: Any) -> Floats | None:
-    """Smoothed positions (K, 3) [m] of the agent in all cycles, with hindsight; None of a filter without smoothing."""
+    """Smoothed positions (K, 3) [m] by the SLAM estimator in all cycles, with hindsight; None of a filter without
+    smoothing."""
     return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 

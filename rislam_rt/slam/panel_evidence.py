@@ -117,7 +117,8 @@ def panel_probabilities(log_ris: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def _probabilities(odds: bytes, panels: int) -> Floats:
-    """Probabilities (P, Q) of `panel_probabilities`, read-only and cached: asked for several times in a cycle."""
+    """Probabilities (P, Q) by the panel evidence, as `panel_probabilities`, read-only and cached: asked for several
+    times in a cycle."""
     table = np.frombuffer(odds).reshape(-1, panels)
     before, after = _log_ways(table), _log_ways(table[::-1])[::-1]
     total = np.logaddexp.reduce(before[-1, ::-1])
@@ -148,7 +149,8 @@ def panel_rows(probability: Floats) -> tuple[int, ...]:
 
 
 def _log_ways(table: Floats) -> Floats:
-    """Log weights (P + 1, 2^Q) of giving a set of panels (as bits) different ones of the first 0 to P landmarks."""
+    """Log weights (P + 1, 2^Q) of giving a set of panels (as bits) different ones of the first 0 to P landmarks, for
+    the evidence of all."""
     points, panels = table.shape
     ways = np.full((points + 1, 2**panels), -np.inf)
     ways[:, 0] = 0.0

@@ -26,7 +26,7 @@ RECORDING = (b"RRF", b"rislam_rt")
 
 
 def is_own(path: Path) -> bool:
-    """Whether a path may be written to: there is no file, an empty one, or one that this program made (`MARK`)."""
+    """Whether a file may be written to a path: there is none, an empty one, or one that this program made (`MARK`)."""
     if not path.is_file() or path.stat().st_size == 0 or is_device(path):
         return True
     try:

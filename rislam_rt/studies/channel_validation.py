@@ -97,7 +97,8 @@ def compare_room(
 
 
 def certify_pose(scene: Scene, depth: int, radio: RadioConfig, *, poses: int, seed: int) -> Certificate:
-    """Compare both channels at the pose of a room where most paths are found by one alone, or else the first pose."""
+    """For the picture of the channel validation: compare both channels at the pose where most paths are found by one
+    alone, or else the first."""
     traced, analytic, motion = trace_both(
         scene, radio, poses=poses, depth=depth, rng=room_rng(scene, seed), refine=False
     )

@@ -33,7 +33,8 @@ class Claim(NamedTuple):
 
 
 def read_results(folder: Path) -> dict[str, Mapping[str, Any]]:
-    """Read the result files of the studies that are in a folder, by the name of the study.
+    """Read the result files of the studies against which the paper's claims are held, in a folder, by the name of the
+    study.
 
     Raises
     ------

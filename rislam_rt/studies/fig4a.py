@@ -97,7 +97,8 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
 
 
 def walk_to_panel(scene: Scene, places: int, closest: float) -> Trajectory:
-    """Places on a straight, level line from the trajectory's start towards the RIS panel, to `closest` [m] from it."""
+    """Places for Fig. 4(a) on a straight, level line from the trajectory's start towards the RIS panel, to `closest`
+    [m] from it."""
     start = scene.agent.position[0]
     way = np.append(lone_panel(scene).center[:2] - start[:2], 0.0)
     reach = float(np.linalg.norm(way))

@@ -68,7 +68,7 @@ class SchemeScore(NamedTuple):
         return float(rms_over_runs(np.array(self.rmse))) if self.rmse else None
 
     def as_dict(self) -> dict[str, Any]:
-        """Scores as plain data, one level deep but for the list of RMSEs."""
+        """Scores of a scheme in a pipeline's sweep as plain data, one level deep but for the list of RMSEs."""
         low, high = self.interval or (None, None)
         counts = {"runs": len(self.rmse), "diverged": self.diverged, "failed": self.failed, "missing": self.missing}
         scores = {"rmse_m": self.overall, "low_m": low, "high_m": high, **counts, "each_m": list(self.rmse)}
@@ -137,7 +137,8 @@ def slam_sweep(
 
 
 def typed_axis(axis: Axis) -> Axis:
-    """Axis with its values in the type of the pipeline's setting: whole numbers become real, or values lists."""
+    """Axis of a pipeline's sweep with its values in the type of the setting: whole numbers become real, or values
+    lists."""
     model: Any = PipelineSpec
     *parents, leaf = axis.key.split(".")
     for part in parents:

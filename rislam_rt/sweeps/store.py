@@ -125,7 +125,7 @@ def read_row(folder: Path, cell: Cell) -> Row:
 
 
 def rows_by_point(rows: Sequence[Row]) -> list[list[Row]]:
-    """Rows of a sweep in groups with the same values along the axes, groups and rows in their order."""
+    """Stored rows of a sweep in groups with the same values along the axes, groups and rows in their order."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)

@@ -157,7 +157,8 @@ def build_cells(sweep: Sweep) -> list[Cell]:
 
 
 def _digest(content: Any) -> bytes:
-    """SHA-256 of plain data, encoded as JSON with sorted keys and shortest numbers that read back the same."""
+    """SHA-256 of a sweep's settings as plain data, encoded as JSON with sorted keys and shortest numbers that read back
+    the same."""
     try:
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError) as error:

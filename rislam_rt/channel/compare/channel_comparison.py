@@ -84,7 +84,8 @@ _ROUNDS = 20
 def random_poses(
     scene: Scene, count: int, *, rng: np.random.Generator, clearance: float = 0.1, baseline: float = 0.1
 ) -> Trajectory:
-    """Draw `count` random poses inside the room, the midpoint at least `clearance` [m] from every surface.
+    """Draw `count` random poses for a comparison inside the room, the midpoint at least `clearance` [m] from every
+    surface.
 
     Inside means reachable from the scene's start by a chain of free straight lines between poses, so that the
     insides of closed objects are left out and rooms of any shape are covered. The baseline [m] has one random

@@ -71,7 +71,7 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         return dr.full(mi.Float, 1.0, dr.width(si.wi))
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
-        """Register R of the material with Mitsuba's differentiable parameters."""
+        """Register the constant R of a radio material with Mitsuba's differentiable parameters."""
         callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
 
     def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:

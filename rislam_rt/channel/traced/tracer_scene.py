@@ -170,7 +170,7 @@ def _numbered(
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
-    """Planes and bounding boxes of the walls about `origin`, for the tracer."""
+    """Planes and bounding boxes of the walls in the tracer's scene, about `origin`."""
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
@@ -183,12 +183,12 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
 
 
 def as_points(points: Floats) -> mi.Point3f:
-    """Convert positions (N, 3) [m] to float32 points of the tracer's backend."""
+    """Convert positions (N, 3) [m] for the tracer's scene to float32 points of its backend."""
     return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
 def as_indices(values: Integers) -> mi.UInt:
-    """Convert numbers (N,) to unsigned integers of the tracer's backend."""
+    """Convert numbers (N,) for the tracer's scene to unsigned integers of its backend."""
     return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
 
 

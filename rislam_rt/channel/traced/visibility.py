@@ -39,7 +39,7 @@ class SingleRays:
         return getattr(self._scene, name)
 
     def ray_intersect(self, *args: Any, **options: Any) -> Any:
-        """Intersect rays with the scene like `mi.Scene.ray_intersect`, each ray by itself."""
+        """Intersect rays with the scene for a visibility test like `mi.Scene.ray_intersect`, each ray by itself."""
         return self._scene.ray_intersect(*args, **{**options, "coherent": False})
 
 

@@ -64,7 +64,8 @@ def estimate_paths(
     sounding: Sounding, grid: MatchedFilterGrid, samples: Complexes, threshold: float, window: tuple[float, float],
     most: int, known: Floats = NOTHING,
 ) -> Estimate:  # fmt: skip
-    """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, and repeat.
+    """The waveform estimator: all paths in samples (L, M) whose noise has unit variance; detect, refine, drop, and
+    repeat.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class Sounding(NamedTuple):
 
     @property
     def num_samples(self) -> int:
-        """Number of samples L M, which is the energy of a path's signal of unit amplitude."""
+        """Number of samples L M of a sounding, which is the energy of a path's signal of unit amplitude."""
         return len(self.frequency) * len(self.row) * len(self.col)
 
 

@@ -238,7 +238,8 @@ def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes
 
 
 def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
-    """Which paths (P,) to keep when those are dropped, one by one, that lower the cost by less than the threshold.
+    """Which refined paths (P,) to keep when those are dropped, one by one, that lower the cost by less than the
+    threshold.
 
     The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
     """

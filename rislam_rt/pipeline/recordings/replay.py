@@ -103,7 +103,8 @@ class Recorder:
 
     @property
     def answers(self) -> Answers:
-        """All estimates and diagnostics that the wrapped estimator returned so far, and its mean time."""
+        """All estimates and diagnostics that the wrapped estimator returned so far, and its mean time, as recorded for
+        a replay."""
         return Answers(tuple(self.estimates), tuple(self.infos), self.seconds / max(len(self.steps), 1))
 
     def _init(
@@ -176,7 +177,8 @@ def replay(
 
 
 def _alternated_panels(inputs: Inputs) -> int:
-    """Number of RIS panels that the receiver of a recording told apart by alternated codes; 0 where it did not."""
+    """Number of RIS panels that the receiver of a replayed recording told apart by alternated codes; 0 where it did
+    not."""
     if all(one.from_panel is None for one in inputs.measurements):
         return 0
     return 1 if inputs.panel is None else len(inputs.panel.panels)

@@ -18,7 +18,7 @@ Source = tuple[int, ...]
 
 
 def uses_wall_returns(scheme: str, settings: Settings) -> bool:
-    """Whether a scheme's estimator uses wall returns (VT paths) as measurements of its map."""
+    """Whether the score of association counts wall returns (VT paths) as sources: a scheme's estimator uses them."""
     known = scheme in SCHEMES or is_own(scheme)
     return known and ESTIMATORS[SCHEMES[scheme].estimator].use_vt(settings)
 

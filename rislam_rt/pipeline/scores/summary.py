@@ -95,7 +95,8 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
 
 
 def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
-    """Posterior bound of agent, landmarks and walls for a scheme of a run; None for a scheme of unknown name."""
+    """Bounds for the summary of scores: posterior bound of agent, landmarks and walls for a scheme; None for one of
+    unknown name."""
     if scheme.scheme not in SCHEMES and not is_own(scheme.scheme):
         return None
     return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)

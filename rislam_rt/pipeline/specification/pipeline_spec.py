@@ -125,7 +125,8 @@ class DesignSection(DesignerSection):
 
     @property
     def least_snr(self) -> float:
-        """SNR (linear) at which the design takes a path to be detected every other time; 0 if not set."""
+        """SNR (linear) by the pipeline file at which the design takes a path to be detected every other time; 0 if not
+        set."""
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
@@ -190,7 +191,7 @@ class PanelSection(Section):
 
     @property
     def tolerance(self) -> PanelTolerance:
-        """Hardware tolerances of the RIS panel, phases in radians."""
+        """Hardware tolerances of the RIS panel by the pipeline file, phases in radians."""
         return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 
@@ -253,7 +254,8 @@ class PipelineSpec(Section):
     @model_validator(mode="before")
     @classmethod
     def _tell_all_estimators(cls, content: Any) -> Any:
-        """Copy process noise, `height` and `use_vt` to every estimator for which the file does not give them."""
+        """Copy a pipeline's process noise, `height` and `use_vt` to every estimator for which the file does not give
+        them."""
         return share_settings(content) if isinstance(content, dict) else content
 
     @model_validator(mode="after")
@@ -318,8 +320,8 @@ class Settings(NamedTuple):
 
 
 def build_receiver(section: ReceiverSection, panels: int = 1, **more: float) -> ReceiverConfig:
-    """Receiver configuration from a table `[receiver]`, for a room with that number of RIS panels; `more` is what the
-    table does not hold.
+    """Receiver configuration by a pipeline's table `[receiver]`, for a room with that number of RIS panels; `more` is
+    what the table does not hold.
 
     Where there is no panel there is nothing to alternate: one capture a cycle, whatever the table says.
 
@@ -352,7 +354,7 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
 
 
 def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
-    """Impairments of the front end; an error if the receiver simulates no signal."""
+    """Impairments of the front end by a pipeline's table `[hardware]`; an error if the receiver simulates no signal."""
     hardware = HardwareConfig(**section.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
@@ -362,7 +364,8 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
 
 
 def build_design(section: DesignerSection) -> DesignConfig:
-    """Configuration of the phase code designer; without the certificate of optimality, which takes longer than a cycle.
+    """Configuration of the phase code designer by a pipeline's table `[design]`; without the certificate of optimality,
+    which takes longer than a cycle.
 
     Raises
     ------

@@ -45,7 +45,7 @@ class RunIdentity(NamedTuple):
         return short_name(name, self.digest)
 
     def difference(self, other: Mapping[str, Any]) -> str:
-        """Describe the first setting in which another run differs, as `key is A there and B here`."""
+        """Describe the first setting in which the identity of another run differs, as `key is A there and B here`."""
         here, there = dict(flatten(self.content)), dict(flatten(other))
         for key in sorted(here):
             if here[key] != there.get(key):

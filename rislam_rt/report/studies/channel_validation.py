@@ -48,7 +48,7 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 def write_comparison(
     found: Comparison, spec: CompareSpec, content: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path:
-    """Write the files of a comparison of both channels: page, JSON and figure; return the page's path.
+    """Write the files of the channel validation: page, JSON and figure; return the page's path.
 
     Raises
     ------

@@ -92,7 +92,8 @@ def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
 
 
 def _draw_errors(axis: Axes, certificate: Certificate) -> None:
-    """Draw the errors of matched paths, the tracer's float32 against float64, in rows by quantity and path class."""
+    """Draw the errors of matched paths of the channel validation, the tracer's float32 against float64, in rows by
+    quantity and path class."""
     report = certificate.report
     rows = (
         ("length [m]", report.length_error), ("gain [dB]", report.gain_error_db), ("phase [rad]", report.phase_error),

@@ -84,7 +84,7 @@ def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, lis
 
 
 def failure_notes(groups: Sequence[Group]) -> list[str]:
-    """Markdown lines on how many runs of a study failed or diverged, with the error messages."""
+    """Notes beside the entries of a study, in Markdown: how many runs failed or diverged, with the error messages."""
     runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
     diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)

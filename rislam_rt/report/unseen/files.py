@@ -66,7 +66,7 @@ def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]:
-    """Table rows of all runs in unseen rooms: series, properties of the room, scores with six digits."""
+    """Rows of a file with all runs in unseen rooms: series, properties of the room, scores with six digits."""
     good = [run for members in runs.values() for run in members if run.scores]
     names = list(dict.fromkeys(name for run in good for name in run.scores))
     entries = []

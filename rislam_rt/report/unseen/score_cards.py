@@ -142,7 +142,8 @@ def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
 def cycle_times(
     runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
 ) -> dict[str, float | None]:
-    """Median CPU time [ms] of the estimator per cycle, by series; the last of a cell's times counts."""
+    """Median CPU time [ms] of the estimator per cycle for a score card, by series; the last of a cell's times
+    counts."""
     told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
     found: dict[str, float | None] = {}
     for name, members in runs.items():

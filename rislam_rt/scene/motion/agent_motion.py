@@ -26,7 +26,7 @@ LONGEST_GAP = 5.0
 
 
 def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[Trajectory, bytes]:
-    """Trajectory of the agent from its section of the scene file, and the bytes of its recording (empty without one).
+    """Motion of the agent from its section of the scene file, and the bytes of its recording (empty without one).
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
-    """Trajectory at constant velocity (3,) [m/s] from `start` (3,) [m], heading along it (0 if vertical)."""
+    """Motion at constant velocity (3,) [m/s] from `start` (3,) [m], heading along it (0 if vertical)."""
     time = np.arange(cycles, dtype=np.float64) * cycle_s
     speed = np.asarray(velocity, dtype=np.float64)
     heading = np.arctan2(speed[1], speed[0]) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
@@ -130,7 +130,7 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
 
 
 def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Trajectory:
-    """Trajectory from a recording (TUM or CSV), as far as the agent section contradicts none of it."""
+    """Motion of the agent from a recording (TUM or CSV), as far as the agent section contradicts none of it."""
     assert agent.trajectory is not None
     named = agent.columns or {}
     is_csv = agent.trajectory.lower().endswith(".csv")

@@ -204,7 +204,8 @@ def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Bool
 def _follow_map(
     belief: Nested, before: WindowState, after: WindowState, config: SlamConfig, *, rng: np.random.Generator
 ) -> Nested:
-    """Particles with the landmarks that the window state holds now: removed ones dropped, a new one initialised."""
+    """Particles of the nested filter with the landmarks that the map holds now: removed ones dropped, a new one
+    initialised."""
     keep = np.isin(before.landmarks.ident, after.landmarks.ident)
     belief = belief if keep.all() else drop(belief, keep)
     for row in range(len(belief.clouds), len(after.landmarks.ident)):

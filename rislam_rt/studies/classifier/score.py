@@ -43,7 +43,7 @@ class ClassifierScore(NamedTuple):
 
 
 def rules(network: Network) -> dict[str, Rule]:
-    """Classification rules by name: the network over a track's life or cycle by cycle, geometry, amplitude.
+    """Classification rules to score by name: the network over a track's life or cycle by cycle, geometry, amplitude.
 
     All of them remove components as short as the direct path.
     """
@@ -111,7 +111,8 @@ def importance(examples: Examples, network: Network, *, rng: np.random.Generator
 
 
 def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
-    """F1 of a classification rule and number of examples in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
+    """Score of the classifier by a value: F1 of a rule and number of examples in bins `edges[i] <= value < edges[i +
+    1]` of age or SNR."""
     kept, known = rule(examples), examples.labelled & ~examples.near
     bins = {}
     for low, high in pairwise(edges):

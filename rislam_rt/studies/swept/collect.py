@@ -86,7 +86,8 @@ def spread(values: Floats) -> Interval | None:
 
 
 def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
-    """Relative reduction of our RMSE against theirs, `1 - ours / theirs`, with its interval, over seeds that both have.
+    """Relative reduction of our collected RMSE against theirs, `1 - ours / theirs`, with its interval, over seeds that
+    both have.
 
     None for fewer than two seeds.
     """
@@ -98,7 +99,8 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
-    """Difference [m] of their RMSE and ours, with its interval, over seeds that both have; None of fewer than two."""
+    """Difference [m] of their collected RMSE and ours, with its interval, over seeds that both have; None of fewer than
+    two."""
 
     def difference(samples: Floats) -> Floats:
         root = rms_over_runs(samples)

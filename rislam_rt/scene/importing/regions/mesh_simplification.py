@@ -41,7 +41,8 @@ def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, toleranc
 
 
 def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
-    """Points of a simplified mesh put into a plane, moved only where rounding does not explain that they are off."""
+    """Simplification of a mesh: points put into a plane, moved only where rounding does not explain that they are
+    off."""
     height = points @ normal - offset
     return points - height[:, None] * normal if np.abs(height).max() > 1e-6 else points
 
@@ -87,8 +88,8 @@ def _around(hole: Floats, outers: list[Floats]) -> int | None:
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
-    """Simplify clutter, triangles (T, 3, 3), by joining the corners in each cell [m] in their mean; also the largest
-    distance [m] that one moved.
+    """Simplify the mesh of clutter, triangles (T, 3, 3), by joining the corners in each cell [m] in their mean; also
+    the largest distance [m] that one moved.
 
     What shrinks to a line or a point is gone: it was finer than a cell. Rossignac and Borrel 1993.
     """

@@ -306,7 +306,8 @@ class DrJitEngine:
         return [self._four(self._dr.reinterpret_array(self._four_signed, part) >> 11) for part in parts]
 
     def _loop(self, start: tuple[Any, ...], packets: int, body: Callable[..., tuple[Any, ...]]) -> tuple[Any, ...]:
-        """Run `body` on every lane's packets; the first of the state is the lane's step, the same for all lanes."""
+        """Run `body` in a Dr.Jit kernel on every lane's packets; the first of the state is the lane's step, the same
+        for all lanes."""
         return self._dr.while_loop(start, lambda step, *_: step < packets, body)
 
     def _lanes(self, count: int, size: int) -> tuple[Any, Any, int]:

@@ -41,5 +41,6 @@ class ChannelSlamConfig(DelayConfig):
 
     @property
     def odds(self) -> Odds:
-        """Odds that a tracked range belongs to its virtual transmitter, by `outlier_probability`, over a metre."""
+        """Configured odds of Channel-SLAM that a tracked range belongs to its virtual transmitter, by
+        `outlier_probability`, over a metre."""
         return Odds(0.5, self.outlier_probability / (1.0 - self.outlier_probability), 1.0)

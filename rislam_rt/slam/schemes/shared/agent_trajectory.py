@@ -31,7 +31,8 @@ class AgentTrajectory(NamedTuple):
     """Variance [m^2] per axis of the position that was told at the start."""
 
     def turn(self) -> Floats:
-        """Unit vector (2A W,) along which the trajectory's states change as all turn about the start, before any range.
+        """Unit vector (2A W,) along which the agent's trajectory changes as all of it turns about the start, before any
+        range.
 
         Ranges to unknown places tell nothing of such a turn. Linearised now here and now there, they seem to (Huang,
         Mourikis and Roumeliotis, 2010): whatever a range seems to tell of this one direction is taken off it.

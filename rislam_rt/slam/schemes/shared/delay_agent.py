@@ -63,7 +63,8 @@ def move_agent(agent: DelayAgent, dt: float, sigma_a: float, stride: int) -> tup
 def hear_ranges(
     agent: DelayAgent, measurement: Measurement, config: DelayConfig
 ) -> tuple[Integers, Scan, Booleans, Bistatic]:
-    """Rows (M,) of the components that the agent uses, their ranges, which are wall returns, and the range model.
+    """Rows (M,) of the components that an agent uses by delay alone, their ranges, which are wall returns, and the
+    range model.
 
     The direct path is left out; wall returns too, with `config.planes` False.
     """
