@@ -113,7 +113,7 @@ def _unit(what: str, name: str) -> float:
 
 
 def _few(header: Sequence[str]) -> str:
-    """Column names of a recording's CSV file for an error message, a dozen at most."""
+    """Column names of a CSV file of recorded poses for an error message, a dozen at most."""
     return ", ".join(f"'{name[:20]}'" for name in header[:12]) or "no columns"
 
 

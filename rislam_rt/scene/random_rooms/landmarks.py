@@ -6,8 +6,8 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.scene.check.mesh_queries import crossings
-from rislam_rt.scene.random_rooms.floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
+from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
 PLACES = ("open", "below", "hidden")

@@ -10,9 +10,9 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material, Reflector, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.random_rooms.floor_plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_pieces
 from rislam_rt.scene.random_rooms.landmarks import MOST, PLACES, SHARES, draw_panel, draw_scatterer, hidden_share
+from rislam_rt.scene.random_rooms.random_floor_plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.random_motion import MOTIONS, draw_motion, draw_motion_profile
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 

@@ -58,8 +58,8 @@ def components_to_explain(measurement: Measurement, scene: KnownEnvironment) -> 
 def log_associations(
     state: WindowState, observed: Observations, view: CycleAssociation
 ) -> tuple[WindowState, Booleans]:
-    """Append a cycle's components to the log with the paths that they were associated with, and mark which of the
-    associated ones (A,) update the Gaussian.
+    """Write a cycle's explanation into the log: append its components with the paths that they were associated with,
+    and mark which of the associated ones (A,) update the Gaussian.
 
     With `use_vt = false` wall returns are recognised, but update nothing.
     """

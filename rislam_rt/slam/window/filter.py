@@ -130,8 +130,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
 
 
 def smoothed(state: WindowState) -> Floats:
-    """Smoothed positions (K, 3) [m] of all cycles so far, each from a window's length of later cycles, fewer for the
-    last ones."""
+    """Smoothed positions (K, 3) [m] by the window filter in all cycles so far, each from a window's length of later
+    cycles, fewer for the last ones."""
     return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 

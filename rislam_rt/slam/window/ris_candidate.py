@@ -29,8 +29,8 @@ PATIENCE = 2
 def weigh_tracks(
     tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None
 ) -> WindowTracks:
-    """Update each track's odds of being a RIS panel, were it a point heard over no wall, by this cycle's amplitude or
-    missed detection under the phase code."""
+    """Update of RIS candidates: each track's odds of being a panel, were it a point heard over no wall, by this cycle's
+    amplitude or missed detection under the phase code."""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks

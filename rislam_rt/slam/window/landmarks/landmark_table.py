@@ -103,14 +103,14 @@ def enter(
 
 
 def idents(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Forms (..., 5) of feature idents, from forms of feature rows."""
+    """Forms (..., 5) of the landmark table's idents, from forms of its rows."""
     if not len(landmarks.ident):
         return forms
     return np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms)
 
 
 def image_ident(point: Integers, wall: Integers) -> Integers:
-    """Idents (...,) of the mirror images of points in walls, from the idents of both."""
+    """Idents (...,) of the mirror images of the landmark table's points in walls, from the idents of both."""
     return np.asarray(((point + 1) << 32) + wall)
 
 
