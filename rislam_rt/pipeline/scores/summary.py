@@ -51,7 +51,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     """Scores of one scheme in a run: position RMSE and bound, NEES, landmarks, walls, GOSPA, association, times."""
     scene, truth = result.scene, result.scene.agent.position
     errors = evaluate.position_errors(scheme.position, truth)
-    least = run_bound(result, scheme)
+    known = scheme.scheme in SCHEMES or is_own(scheme.scheme)
+    least = scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config) if known else None
     limit = least.agent if least else None
     error, bound = evaluate.root_mean_square(errors), None if limit is None else evaluate.root_mean_square(limit)
     squares = nees_per_dof(scheme, truth)
@@ -92,14 +93,6 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
         return None
     block = scheme.covariance[:, axes[:, None], axes]
     return evaluate.normalised_squares((scheme.position - truth)[:, axes], block) / len(axes)
-
-
-def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
-    """Bounds for the summary of scores: posterior bound of agent, landmarks and walls for a scheme; None for one of
-    unknown name."""
-    if scheme.scheme not in SCHEMES and not is_own(scheme.scheme):
-        return None
-    return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
 
 
 def has_diverged(errors: Floats, limit: Floats | None) -> bool:

@@ -90,8 +90,7 @@ class Window(NamedTuple):
 
     @property
     def features(self) -> Floats:
-        """Features (F, 3) [m] of the window's Gaussian: places of points, and for walls the mirror images of their
-        anchors."""
+        """Features (F, 3) [m] of the window: places of points, and for walls the mirror images of their anchors."""
         return self.head[HEAD:].reshape(-1, 3)
 
     @property
@@ -267,8 +266,7 @@ def slide(window: Window) -> Window:
 
 
 def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
-    """Covariance (size, size) of the gradient of the window's cost that is left when the other unknowns are eliminated
-    by `gain`."""
+    """Covariance (size, size) of the cost's gradient that is left when the other unknowns are eliminated by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
 
