@@ -43,8 +43,7 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
 
 
 def phasor(phase: ArrayLike) -> Complexes:
-    """Array `exp(j phase)` (...,) of phases (...,) [rad]: numpy's own, of a complex argument, takes three times as
-    long."""
+    """Array `exp(j phase)` (...,) of phases (...,) [rad]: numpy's own, of a complex argument, takes thrice as long."""
     angle = np.asarray(phase, dtype=np.float64)
     found = np.empty(angle.shape, dtype=np.complex128)
     np.cos(angle, out=found.real)

@@ -42,8 +42,7 @@ def room_beside(folder: Path, name: str) -> Path:
 
 
 def name_from_here(folder: Path) -> str:
-    """What a pipeline file in the working folder calls a shipped scene or a scene folder: the room's name, or the way
-    there."""
+    """What a pipeline file in the working folder calls a shipped scene (its name) or a folder (the way there)."""
     built_in = shipped_rooms().get(folder.name)
     if built_in is not None and folder.resolve() == built_in.resolve() and not Path(folder.name).exists():
         return folder.name

@@ -225,8 +225,7 @@ def _wheel_llvm() -> Iterator[str]:
 
 
 def _system_llvm() -> list[str]:
-    """Paths of the libLLVM files that the system has for the tracer's backend, newest first by the version in their
-    names."""
+    """Paths of the libLLVM files that the system has for the tracer's backend, newest first by their names."""
     paths = {str(Path(p).resolve()) for pattern in _SYSTEM_LLVM for p in glob(pattern)}
     return sorted(paths, key=lambda p: (_named_version(p), p), reverse=True)
 
@@ -239,8 +238,7 @@ def _named_version(path: str) -> tuple[int, ...]:
 
 
 def _load(path: str) -> ctypes.CDLL:
-    """Open a libLLVM for the tracer's backend, the wheel's C++ runtime first, by its full name, where its links are
-    missing."""
+    """Open a libLLVM for the tracer's backend, the wheel's C++ runtime first by its full name, if links are missing."""
     try:
         return ctypes.CDLL(path)
     except OSError:

@@ -53,7 +53,7 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
 
 
 def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: SensorModel) -> int:
-    """Column of the strongest path in whose component a path is forecast to be merged; -1 if it has its own or is too
+    """Column of the strongest path in whose component a path is forecast to merge; -1 if it has its own or is too
     weak."""
     row = np.flatnonzero(loud.path == path)
     if path in parts.path or not len(row):

@@ -42,8 +42,7 @@ def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.rando
 
 
 def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
-    """RIS codes, phase levels (K, N, M), for the forecast: each panel's best one for its strongest path that the array
-    receives."""
+    """RIS codes (K, N, M) for the forecast: each panel's best for its strongest path that the array receives."""
     assert paths.ris is not None
     index = np.zeros((paths.num_cycles, spec.num_elements), dtype=np.int64)
     best = np.zeros((len(spec.panels), paths.num_cycles))
@@ -66,6 +65,5 @@ def aimed_paths(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Paths:
 
 
 def paths_under_codes(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
-    """Propagation paths of a room with the gains that they have under RIS codes of phase levels (K, N, M), for the
-    forecast."""
+    """Propagation paths of a room with their gains under RIS codes of phase levels (K, N, M), for the forecast."""
     return rephase(paths, RisCode(index, spec.levels))

@@ -49,8 +49,7 @@ class Reasons(NamedTuple):
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:
-        """Reason why a landmark is not detected: name of the mesh, not its own, that occludes it from Tx or Rx; empty
-        if none."""
+        """Reason why a landmark is not detected: the mesh, not its own, that hides it from Tx or Rx; empty if none."""
         scatterers = self.scene.scatterers
         own = scatterers[number].name if number < len(scatterers) and scatterers[number].shade is not None else ""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):

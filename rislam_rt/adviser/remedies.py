@@ -40,14 +40,13 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
 
 
 def weak_places(link: LandmarkLink) -> Integers:
-    """Indices of a link budget's positions at which a remedy of more SNR would help: a path comes in that is only too
+    """Indices of a link budget's positions at which a remedy of more SNR helps: a path comes in that is only too
     weak."""
     return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
 
 
 def lack_db(link: LandmarkLink) -> float:
-    """SNR [dB] that remedies must add for a landmark to be detected, the median where it is only too weak; 0 without
-    any."""
+    """SNR [dB] that remedies must add for a landmark to be detected, the median where it is too weak; 0 without any."""
     weak = weak_places(link)
     return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
 
@@ -104,8 +103,7 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """Remedy for a search: a warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam
-    sweep."""
+    """Remedy for a search: warning of a panel that is detected under an aimed code, but hardly ever by the sweep."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:
         yield (
@@ -128,8 +126,7 @@ def _way_round(why: str, *, panel_held: bool) -> str:
 
 
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
-    """Margin (K,) [dB] of a RIS panel's direct path under the best code for a data sheet, nothing in its way, for
-    remedies."""
+    """Margin (K,) [dB], for remedies, of a RIS panel's unhindered direct path under the best code for a data sheet."""
     radio, agent = looked.settings.radio, looked.scene.agent
     ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
     tx, rx = (

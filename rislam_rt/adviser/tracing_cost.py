@@ -62,8 +62,7 @@ def cost_words(cost: TraceCost) -> str:
 
 
 def _count_sequences(channel: ImageSourceChannel, depth: int) -> int:
-    """Number of wall sequences, empty ones included, that tracing has to test at the trajectory's middle: what it
-    costs."""
+    """What tracing costs: number of wall sequences, empty ones included, to test at the trajectory's middle."""
     scene, facets, row = channel.scene, channel.sequence_search.facets, len(channel.scene.agent) // 2
     tx, rx = (ends[row : row + 1] for ends in (scene.agent.tx, scene.agent.rx))
     legs = [(tx, rx, -1)]

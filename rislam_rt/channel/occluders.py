@@ -106,8 +106,7 @@ def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _outline(triangles: Floats, direction: Floats) -> Floats:
-    """Silhouette edges (E, 2, 3) [m] of an occluder's triangles (T, 3, 3) along a direction, and edges of one triangle
-    alone."""
+    """Silhouette edges (E, 2, 3) [m] of an occluder's triangles (T, 3, 3) along a direction, and its open edges."""
     normal, _ = triangle_planes(triangles)
     ahead = np.repeat(normal @ direction > 0.0, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)

@@ -157,15 +157,13 @@ def _padded_vertices(vertices: Floats, count: int) -> Floats:
 
 
 def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
-    """Reverse the first `bounces` (S,) walls of each leg (S, d) to compose paths of them; the padding of -1 stays
-    behind."""
+    """Reverse the first `bounces` (S,) walls of each leg (S, d) to compose paths of them; the padding stays behind."""
     index = bounces[:, None] - 1 - np.arange(walls.shape[1])
     return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
 
 
 def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
-    """Vertices (K, P, count, 3) [m] of paths composed of two legs, in order of travel: Tx bounces, landmark, Rx
-    bounces."""
+    """Vertices (K, P, count, 3) [m] of paths composed of two legs, in the order of travel over the landmark."""
     vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
     for path, (a, b) in enumerate(zip(i, j, strict=True)):
         first, last = int(tx.num_bounces[a]), int(rx.num_bounces[b])

@@ -46,7 +46,7 @@ class Walls:
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
 
     def largest_triangles(self) -> tuple[Integers, Floats]:
-        """Number (W,) of the largest triangle of each of the scene's walls, and its altitude (W,) [m] on its longest
+        """Number (W,) of the largest triangle of each wall of a scene, and its altitude (W,) [m] on its longest
         side."""
         edges = self.triangles[:, 1:] - self.triangles[:, :1]
         area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
@@ -103,8 +103,7 @@ def _names(reflector: str, count: int) -> list[str]:
 
 
 def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """Number of the scene's wall behind a panel, -1 without: its host reflector's nearest plane; `reflector` (W,) of
-    walls."""
+    """Number of the scene's wall behind a panel, -1 without: its host's nearest plane; `reflector` (W,) of walls."""
     names = [r.name for r in scene.reflectors]
     if panel.host not in names:
         return -1

@@ -69,7 +69,7 @@ def command(
 
 
 def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:
-    """Part of `rislam-rt check`: print which landmarks will be detected, draw the coverage map if asked, return the
+    """Part of `rislam-rt check`: print which landmarks will be detected, draw the coverage if asked, return the
     advice."""
     import numpy as np
 

@@ -83,8 +83,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
-    """For `rislam-rt run`: print the scores of a completed run from its folder, and draw its page if that is
-    missing."""
+    """For `rislam-rt run`: print the scores of a completed run from its folder, draw its page if that is missing."""
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, read_summary
     from rislam_rt.report.page import PAGE, write_report

@@ -77,8 +77,7 @@ def command(
 
 
 def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "StartPrior":
-    """Start prior for `rislam-rt slam` from the options `--start` and `--velocity`; the heading is that of the
-    velocity."""
+    """Start prior for `rislam-rt slam` from the options `--start` and `--velocity`, along which the heading is."""
     import numpy as np
 
     from rislam_rt.slam import StartPrior

@@ -51,8 +51,7 @@ def _refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
 
 
 def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
-    """For `rislam-rt run` of a study: compare ray tracer and image sources, and write the page; exit code 1 if they
-    differ."""
+    """For `rislam-rt run` of a study: compare both channels, and write the page; exit code 1 if they differ."""
     _refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
@@ -94,8 +93,7 @@ def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
 
 
 def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
-    """For `rislam-rt run` of a swept study (Fig. 4(b), rooms, ablations, ...): write its page; exit code 1 if a cell
-    failed."""
+    """For `rislam-rt run` of a swept study (rooms, ablations, ...): write its page; exit code 1 if a cell failed."""
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
@@ -113,8 +111,7 @@ def run_cells(
     sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
     write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
-    """For `rislam-rt run` of a study: run the cells of its sweep, rewriting its page as they end, and `show` them; exit
-    code 1 if one failed."""
+    """For `rislam-rt run` of a study: its cells; page and `show` as they end; exit code 1 if one failed."""
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
@@ -144,8 +141,7 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
 
 
 def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
-    """For `rislam-rt run` of the study in unseen rooms: print the scores and write its page; exit code 1 if a room
-    failed."""
+    """For `rislam-rt run` of the study in unseen rooms: print scores, write its page; exit code 1 if a room failed."""
     _refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)

@@ -101,8 +101,7 @@ def command(
 
 
 def _check_new(folder: Path) -> None:
-    """Check the folder of `rislam-rt trace --deepmimo` before paths are traced: it must not exist, and have a name that
-    loads."""
+    """Check the folder of `rislam-rt trace --deepmimo` before paths are traced: new, and of a name that loads."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.report.exports.deepmimo import check_name
 
@@ -112,8 +111,7 @@ def _check_new(folder: Path) -> None:
 
 
 def _part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
-    """Scene for `rislam-rt trace` with the first `cycles` of its trajectory, of these every `stride`-th; an error if it
-    has fewer."""
+    """Scene for `rislam-rt trace` with every `stride`-th of its first `cycles`; an error if it has fewer."""
     from dataclasses import replace
 
     from rislam_rt.errors import ConfigError
@@ -147,8 +145,7 @@ def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int,
 def _trace_signals(
     scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
 ) -> TraceResult:
-    """Write the signals of `rislam-rt trace --signals`: find all paths under phase codes, simulate samples and
-    components."""
+    """Write the signals of `rislam-rt trace --signals`: find paths under codes, simulate samples and components."""
     from itertools import count
     from time import perf_counter
 

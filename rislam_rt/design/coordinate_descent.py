@@ -44,8 +44,7 @@ def coordinate_descent(objective: Objective, index: Integers, levels: int, max_s
 
 
 def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements for coordinate descent whose best level change lowers the objective, best first, and that change less
-    one for all."""
+    """Elements for coordinate descent whose best change lowers the objective, best first, and that change less one."""
     shift = objective.table[1:] - 1.0
     value = objective.value(gain + (weight[:, None] * objective.matrix) * shift[:, None, None])
     change = np.argmin(value, axis=0)

@@ -66,19 +66,16 @@ class DesignProblem:
 
     @property
     def target(self) -> Complexes:
-        """Element responses (N M,) of a design problem's direct panel path at the first sample of the belief (its
-        mean)."""
+        """Element responses (N M,) of a design problem's direct panel path at the first sample of the belief."""
         return self.response[0, 0].ravel()
 
     @property
     def targets(self) -> list[Complexes]:
-        """For each panel of a design problem the responses of its elements to its direct path, at the belief's first
-        sample."""
+        """For each panel of a design problem its elements' responses to its direct path, at the first sample."""
         return [self.response[0, row].ravel()[span] for row, span in self.panels]
 
     def owner(self) -> Integers:
-        """Number (P,) of the panel that each panel path of a design problem runs over: the one whose elements respond
-        to it."""
+        """Number (P,) of the panel over which each panel path of a design problem runs: whose elements respond."""
         elements = np.abs(self.response[0].reshape(self.response.shape[1], -1))
         return np.argmax([elements[:, span].max(axis=1) for _, span in self.panels], axis=0)
 

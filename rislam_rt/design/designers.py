@@ -100,8 +100,7 @@ def blind_design(method: str, code: RisCode) -> Design:
 
 
 def best_magnitudes(problem: DesignProblem) -> Floats:
-    """Largest gain magnitude (B, P) that each panel path of a design can reach by a code of its own, exact over the
-    levels."""
+    """Largest gain magnitude (B, P) that each panel path of a design can reach by a code of its own, exactly."""
     samples, panel = problem.response.shape[:2]
     return exact_code(problem.response.reshape(samples, panel, -1), problem.levels)[1]
 

@@ -46,8 +46,7 @@ def genetic_search(
 
 
 def _mutations(genes: int, levels: int, probability: float, *, rng: np.random.Generator) -> tuple[Integers, Integers]:
-    """Draw which of the genetic algorithm's genes mutate, each independently with the same probability, and their new
-    levels."""
+    """Draw which of the genetic algorithm's genes mutate, all with one probability, and their new levels."""
     # The gaps between mutated genes are geometric, so that only those are drawn.
     if probability == 0.0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)

@@ -30,8 +30,7 @@ class Objective:
     """`UNOBSERVABLE` if no code makes the information regular: then the objective is `1 / tr J`."""
 
     def gains(self, weight: Complexes) -> Complexes:
-        """Gains (..., B P) of the panel paths at all samples under element weights (..., N M), of which the objective
-        is made."""
+        """Gains (..., B P) of panel paths, for the objective, at all samples under element weights (..., N M)."""
         return weight @ self.matrix
 
     def value(self, gain: Complexes) -> Floats:
@@ -97,8 +96,7 @@ def build_objective(problem: DesignProblem) -> Objective:
 
 
 def detected_power(power: Floats, least: float) -> Floats:
-    """Path powers (...,) in the objective times their approximate detection probability, `1 / (1 + (least /
-    power)^4)`."""
+    """Path powers (...,) in the objective times about the detection probability, `1 / (1 + (least / power)^4)`."""
     if least == 0.0:
         return power
     ratio = (power / least) ** 2

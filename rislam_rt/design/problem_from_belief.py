@@ -114,8 +114,7 @@ class _PredictedPaths(NamedTuple):
 
 
 def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_PredictedPaths, _PredictedPaths]:
-    """Paths that the belief predicts for a design: those over the panels in rows `held`, the direct ones first, and all
-    others."""
+    """Paths that the belief predicts for a design: over the panels in rows `held`, direct ones first; all others."""
     # Images of images are too weak to matter.
     rows = np.arange(len(landmarks.parent))
     points = rows[landmarks.parent < 0]
@@ -150,8 +149,8 @@ def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mo
 
 
 def _ratio(landmarks: MapEstimate, paths: _PredictedPaths) -> Floats:
-    """Amplitude ratio (Q,) of the wall reflection on each path that the belief predicts, by the image's strength; 1
-    without wall."""
+    """Amplitude ratio (Q,) of the wall reflection on paths that the belief predicts, by the image's strength, else
+    1."""
     image = np.where(paths.tx_point != paths.source, paths.tx_point, paths.rx_point)
     return np.where(image != paths.source, landmarks.strength[image], 1.0)
 
@@ -160,8 +159,7 @@ def _panel_responses(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, held: list[int], ris: DataSheet,
     radio: RadioConfig,
 ) -> Complexes:  # fmt: skip
-    """Element responses (B, Q, N, M) that the belief predicts for paths over all panels, whose rows in the map are
-    `held`."""
+    """Element responses (B, Q, N, M) that the belief predicts for paths over the panels in rows `held`."""
     whole = np.zeros((len(tx), len(paths.source), ris.rows, ris.cols), dtype=np.complex128)
     for number, row in enumerate(held):
         mine = np.flatnonzero(paths.source == row)
@@ -189,8 +187,7 @@ def _responses_of(
 def _point_gains(
     landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats, radio: RadioConfig
 ) -> Complexes:
-    """Gains (B, Q) that the belief predicts for paths over points by eq. `a2`, of strength the root of the
-    cross-section."""
+    """Gains (B, Q) that the belief predicts for paths over points by eq. `a2`, by the root of the cross-section."""
     nearest = radio.wavelength  # a believed landmark may lie on the agent; the law ends about there
     first = np.maximum(np.linalg.norm(landmarks.position[paths.tx_point] - tx, axis=-1), nearest)
     second = np.maximum(np.linalg.norm(landmarks.position[paths.rx_point] - rx, axis=-1), nearest)

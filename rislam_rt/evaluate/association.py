@@ -52,8 +52,7 @@ def association_fractions(labels: Integers, identities: Integers, counts: Intege
 
 
 def label_switches(label: Integers, truth: Integers) -> int:
-    """Number of times that the label of a true identity differs from its last one, a score of association; -1 does not
-    count."""
+    """Score of association: number of times that a true identity's label changes; -1 does not count."""
     switches = 0
     both = (np.asarray(label) != NONE) & (np.asarray(truth) != NONE)
     for identity in np.unique(np.asarray(truth)[both]):

@@ -107,8 +107,7 @@ def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
 
 
 def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) -> list[tuple[int, int]]:
-    """Pairs of walls that may be coplanar: nearly one normal, one corner (W, 3) near the other's plane, by sorted
-    normals."""
+    """Pairs of walls that may be coplanar: one normal, one corner (W, 3) near the other's plane, by sorted normals."""
     key = np.abs(normal @ np.array([0.36, 0.48, 0.80]))
     order = np.argsort(key, kind="stable")
     found: list[tuple[int, int]] = []

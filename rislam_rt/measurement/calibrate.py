@@ -100,8 +100,7 @@ def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Calibratio
 
 
 def _chains(mean: Complexes, direct: Complexes) -> Complexes:
-    """Complex gains (L,) of the receive chains by calibration, of mean one, from the direct path in the mean samples
-    (L, M)."""
+    """Complex gains (L,) of the receive chains by calibration, of mean one, from the direct path in samples (L, M)."""
     chains = np.sum(mean * direct.conj(), axis=1)
     return np.asarray(chains / np.mean(chains))
 
@@ -133,8 +132,8 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
 
 
 def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
-    """Leakage residue (L, M) by calibration, the constant part of unexplained samples (T, L, M), and the variance of
-    the rest."""
+    """Leakage residue (L, M) by calibration, constant part of unexplained samples (T, L, M), and the rest's
+    variance."""
     mean = rest.mean(axis=0)
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))

@@ -65,8 +65,7 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
 
 
 def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
-    """Merge paths of one capture that are closer than a resolution cell into multipath components, from the strongest
-    down."""
+    """Merge paths of one capture closer than a resolution cell into multipath components, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
     for value in in_resolution_cells(
         received, sensor.radio
@@ -125,15 +124,13 @@ def clip_to_unit_disc(cosines: Floats) -> Floats:
 
 
 def capped_cosine_std(deviation: Floats, radio: RadioConfig) -> Floats:
-    """Standard deviations (N, 2) of a component's direction cosines, at most `DISC_STD`, as along an axis without
-    aperture."""
+    """Standard deviations (N, 2) of a component's cosines, at most `DISC_STD`, as along an axis without aperture."""
     blind = np.array([radio.array.rows, radio.array.cols]) < 2
     return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))
 
 
 def blind_axes(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Direction cosines (N, 2) of components set to zero along axes of the array without aperture, where nothing is
-    measured."""
+    """Direction cosines (N, 2) of components, zero along axes without aperture, where nothing is measured."""
     return cosines * (np.array([radio.array.rows, radio.array.cols]) > 1)
 
 

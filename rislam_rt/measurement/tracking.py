@@ -157,16 +157,14 @@ def _assign(
 
 
 def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Kalman update of tracks of multipath components by their components, (N, 3) independent pairs of value and
-    rate."""
+    """Kalman update of tracks of multipath components by their components, (N, 3) pairs of value and rate."""
     gain = covariance[..., :, 0] / (covariance[..., 0, 0] + noise)[..., None]
     mean = mean + gain * (seen - mean[..., 0])[..., None]
     return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]
 
 
 def _start(seen: Floats, noise: Floats, config: TrackingConfig) -> tuple[Floats, Floats]:
-    """Mean and covariance of new tracks of multipath components, of one component each: its value, and a rate about
-    0."""
+    """Mean and covariance of new tracks of multipath components, one component each: its value, a rate about 0."""
     mean = np.stack([seen, np.zeros_like(seen)], axis=-1)
     covariance = np.zeros((*seen.shape, 2, 2))
     covariance[..., 0, 0] = noise

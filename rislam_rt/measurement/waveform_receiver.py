@@ -122,8 +122,8 @@ def measure_waveform(
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the true path that each component of the waveform receiver most likely is, of its capture's; -1
-    for none."""
+    """Column (N,) of the true path of its capture that each component of the waveform receiver likely is; -1 for
+    none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -148,8 +148,7 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
 
 
 def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Floats:
-    """Parameters (Q, 3) of the previous cycle's components of the same capture, where the waveform receiver's search
-    begins."""
+    """Parameters (Q, 3) of the last cycle's components, of one capture, where the waveform receiver's search begins."""
     if previous is None:
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
@@ -160,8 +159,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
 
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
-    """Components that the waveform receiver estimates in one capture, deviations inflated for what the bound leaves
-    out."""
+    """Components that the waveform receiver estimates in one capture, with what the bound leaves out in their stds."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
@@ -188,8 +186,7 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Sounding, MatchedFilterGrid]:
-    """Sounding of `count` tones for the waveform receiver, and its search grid over a window of delays in resolution
-    cells."""
+    """Sounding of `count` tones for the waveform receiver, and its grid over a window of delays in resolution cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)
 
@@ -217,8 +214,7 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """Number (P,) of the component that each path of the waveform receiver joins: unresolved ones their nearest
-    neighbour's."""
+    """Component (P,) that each path of the waveform receiver joins: unresolved ones their nearest neighbour's."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

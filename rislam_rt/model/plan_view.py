@@ -67,8 +67,7 @@ def outline(meshes: Iterable[tuple[Floats, Integers]]) -> Floats:
 
 
 def _open_edges(vertices: Floats, faces: Integers) -> Floats:
-    """Edges (E, 2, 3) of a mesh to draw in a plan view: those that one face alone has, or between faces not in one
-    plane."""
+    """Edges (E, 2, 3) of a mesh to draw in a plan view: of one face alone, or between faces not in one plane."""
     points, same = np.unique(np.round(vertices, 6), axis=0, return_inverse=True)
     corners = same.reshape(-1)[faces]
     ends = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

@@ -96,8 +96,7 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """Whether (K, I) each landmark of a scheme's result was identified as a RIS panel (probability above one
-        half)."""
+        """Whether (K, I) each landmark of a scheme's result was identified as a RIS panel (above one half)."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:

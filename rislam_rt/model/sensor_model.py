@@ -56,8 +56,7 @@ class SensorModel:
 
     @property
     def cell(self) -> Floats:
-        """Widths (3,) of the sensor's resolution cell: 1/B [s], and the beam in either direction cosine (2 without
-        aperture)."""
+        """Widths (3,) of the sensor's resolution cell: 1/B [s], and the beam in either cosine (2 without aperture)."""
         array = self.radio.array
         beams = [1.0 / (count * array.spacing) if count > 1 else 2.0 for count in (array.rows, array.cols)]
         return np.array([1.0 / self.radio.bandwidth, *beams])
@@ -72,13 +71,11 @@ class SensorModel:
         return np.asarray((delay >= self.window[0]) & (delay <= self.window[1]))
 
     def heard_as(self, length: Floats) -> Floats:
-        """Path lengths (...,) [m] as the sensor measures them: true lengths (...,) [m] less whole periods of the
-        sounding."""
+        """Path lengths (...,) [m] as the sensor measures them: true ones (...,) [m] less whole sounding periods."""
         return np.asarray(np.mod(length, SPEED_OF_LIGHT * self.period))
 
     def nearest(self, gap: Floats) -> Floats:
-        """Differences (...,) of path lengths [m] as the sensor tells them: less the nearest number of whole periods of
-        the sounding."""
+        """Differences (...,) of path lengths [m] as the sensor tells them: less the nearest whole sounding periods."""
         period = SPEED_OF_LIGHT * self.period
         return np.asarray(gap - period * np.round(gap / period))
 
@@ -103,8 +100,7 @@ class SensorModel:
         return np.where(excess >= 0.0, np.exp(-np.maximum(excess, 0.0)), 0.0)
 
     def may_merge(self, gap: Floats) -> Booleans:
-        """Whether (...,) paths `gap` (..., 3) apart in delay [s] and direction cosines share a resolution cell of the
-        sensor."""
+        """Whether (...,) paths `gap` (..., 3) apart in delay [s] and cosines share the sensor's resolution cell."""
         if self.resolution == "all":
             return np.zeros(gap.shape[:-1], dtype=np.bool_)
         return np.asarray((np.abs(gap) < self.cell).all(axis=-1))

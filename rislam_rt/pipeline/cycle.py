@@ -191,6 +191,5 @@ def run_cycle(
 
 
 def usual_step(time: Floats) -> float:
-    """Median time [s] between the protocol's cycles at `time` (K,), as a recording's are not quite even; 0 for one
-    cycle."""
+    """Median time [s] between the protocol's cycles at `time` (K,), as a recording's vary; 0 for one cycle."""
     return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -231,8 +231,7 @@ def _imported(file: Path) -> Iterator[Path]:
 
 
 def _places(folder: Path, names: list[str]) -> Iterator[Path]:
-    """Existing Python files of a dotted module name in a user's own method, and of every package that it names on the
-    way."""
+    """Existing Python files of a dotted module name in a user's own method, and of every package on the way."""
     place = folder
     for name in filter(None, names):
         place = place / name
@@ -242,8 +241,7 @@ def _places(folder: Path, names: list[str]) -> Iterator[Path]:
 
 
 def _root(file: Path) -> Path:
-    """Folder of the outermost package that the file of a user's own method belongs to; the file's folder if it is in
-    none."""
+    """Folder of the outermost package that the file of a user's own method is in; else the file's folder."""
     folder = file.parent
     while (folder / "__init__.py").is_file() and folder != folder.parent:
         folder = folder.parent

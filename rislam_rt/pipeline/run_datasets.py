@@ -129,8 +129,7 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
 
 
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
-    """Seal a run's data set: add, as attributes, `about`, schema version, number of cycles and a checksum over its
-    content."""
+    """Seal a run's data set by attributes: `about`, schema version, number of cycles, checksum of its content."""
     found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["time"]))
     return found.assign_attrs(checksum=_checksum(found))
 
@@ -183,8 +182,7 @@ def _arrays(record: Any, table: dict[str, Entry], prefix: str) -> dict[str, Any]
 
 
 def _values(data: "xr.Dataset", table: dict[str, Entry], prefix: str) -> dict[str, Any]:
-    """Arrays of the variables of a run's data set that `table` lists, by field name; complex ones joined of two
-    variables."""
+    """Arrays of the variables of a run's data set that `table` lists, by field; complex ones joined of two."""
     values: dict[str, Any] = {}
     for name in table:
         key = prefix + name

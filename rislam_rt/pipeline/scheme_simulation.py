@@ -99,15 +99,13 @@ class SchemeSimulation:
 
 
 def without_panel(paths: Paths) -> Paths:
-    """Paths for the simulation of a scheme without the RIS panel: paths over it are kept as columns, but never
-    valid."""
+    """Paths to simulate a scheme without the RIS panel: paths over it are kept as columns, but never valid."""
     panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
     return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)
 
 
 def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: RecordedInputs) -> SchemeResult:
-    """Stack the records of a scheme's simulated cycles at `time` (K,) [s] as one result, landmarks in columns by
-    number."""
+    """Stack the records of a scheme's simulated cycles at `time` (K,) [s] as one result, landmarks by number."""
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
     ident = np.unique(np.concatenate([m.ident for m in maps]))

@@ -55,8 +55,7 @@ def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Pa
 
 
 def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
-    """Draw one panel's coverage map over the room's plan, with the line where the SNR meets the threshold, as
-    advice."""
+    """Draw one panel's coverage map over the room's plan as advice, with a line where the SNR meets the threshold."""
     from matplotlib import colormaps
 
     colours = colormaps["viridis"].with_extremes(bad=UNSEEN)

@@ -92,8 +92,7 @@ def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.o
 
 
 def _side_by_side(parts: Sequence[Integers]) -> Floats:
-    """Join the phase codes of several panels in one array for a picture, with NaN between them, and below the lower
-    ones."""
+    """Join the phase codes of several panels in one array for a picture, NaN between and below them."""
     rows, cols = max(len(part) for part in parts), sum(part.shape[1] for part in parts) + len(parts) - 1
     whole, first = np.full((rows, cols), np.nan), 0
     for part in parts:

@@ -40,8 +40,7 @@ def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
-    """Headline of a run's conclusions: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes,
-    ...`"""
+    """Headline of a run's conclusions: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random ...`"""
     parts = [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in schemes.items()]
     text = f"The agent is off by {', '.join(parts)} (RMSE)"
     lost = [_words(name) for name, scores in schemes.items() if scores["diverged"]]

@@ -78,8 +78,7 @@ def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
 
 
 def largest_middle(triangles: Floats) -> Floats:
-    """Where the map from above names a wall: centroid (3,) [m] of the largest of triangles (T, 3, 3) with those in its
-    plane."""
+    """Where the map from above names a wall: centroid (3,) [m] of the largest triangle's plane, of (T, 3, 3)."""
     across = triangle_cross(triangles)
     area = np.linalg.norm(across, axis=1)
     normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
@@ -141,8 +140,7 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
 
 
 def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
-    """Draw a close-up of the trajectory's end beside the map, with the estimator's 2 sigma ellipse of the last
-    position."""
+    """Draw a close-up of the trajectory's end beside the map, with the 2 sigma ellipse of the last position."""
     truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
     colour = scheme_colour(scheme.scheme)
     low, high = scene.bounds[:, :2]

@@ -197,8 +197,7 @@ def build_panel(section: RisSection) -> RisPanel:
 
 
 def _digest(content: bytes, contents: dict[str, bytes]) -> str:
-    """SHA-256 of a loaded scene: over the scene file and every file it names, each with its name and length before
-    it."""
+    """SHA-256 of a loaded scene: over the scene file and every file it names, name and length before each."""
     digest = hashlib.sha256()
     for name, data in [("", content), *sorted(contents.items())]:
         digest.update(f"{name}\0{len(data)}\0".encode())

@@ -74,8 +74,7 @@ def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: fl
 
 
 def _simplify_chain(chain: list[int], points: Floats, tolerance: float) -> list[int]:
-    """Simplify an open chain of a polygon's corners within a tolerance by Douglas and Peucker's algorithm; its ends
-    stay."""
+    """Simplify an open chain of a polygon's corners within a tolerance by Douglas and Peucker; its ends stay."""
     keep, stack = {0, len(chain) - 1}, [(0, len(chain) - 1)]
     while stack:
         low, high = stack.pop()

@@ -91,8 +91,7 @@ def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) ->
 
 
 def _icosahedron() -> Floats:
-    """Triangles (20, 3, 3) of an icosahedron, from which a sphere's mesh is made, corners on the unit sphere, turned
-    outwards."""
+    """Triangles (20, 3, 3) of an icosahedron, corners on the unit sphere, outwards: a sphere's mesh to refine."""
     golden = (1.0 + np.sqrt(5.0)) / 2.0
     signs = np.array([[a, b * golden] for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
     corners = np.concatenate([np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)])

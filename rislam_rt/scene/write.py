@@ -105,8 +105,7 @@ def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
 
 
 def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write a scene's folder to its place by one rename of a temporary one, or its files one by one into a folder that
-    exists."""
+    """Write a scene's folder to its place by one rename of a temporary one, or file by file into one that exists."""
     if not folder.exists():
         staged.chmod(0o755)
         staged.rename(folder)
@@ -140,8 +139,7 @@ def _panel_table(panel: RisPanel) -> dict[str, Any]:
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
-    """Table of `scene.toml` as it is written for a scatterer: a cross-section where it does not follow from shape and
-    law."""
+    """Table of `scene.toml` as written for a scatterer: a cross-section where shape and law do not give it."""
     radius, table = scatterer.radius, {"name": scatterer.name, "position": scatterer.position.tolist()}
     table |= {"radius": radius} if radius is not None else {}
     if scatterer.height is not None:
@@ -186,8 +184,7 @@ def _material_table(material: Material) -> dict[str, Any]:
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:
-    """Table of `scene.toml` as it is written for the agent: a straight motion by its velocity, any other by its path
-    file."""
+    """Table of `scene.toml` as written for the agent: a straight motion by velocity, any other by path file."""
     offsets = {"tx_offset_m": agent.body.tx_offset.tolist(), "rx_offset_m": agent.body.rx_offset.tolist()}
     cycles, velocity = len(agent), agent.velocity[0]
     heading = float(np.arctan2(velocity[1], velocity[0])) if velocity[:2].any() else 0.0

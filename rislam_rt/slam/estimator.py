@@ -27,8 +27,7 @@ def step(
     state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> tuple[Any, StepInfo]:  # fmt: skip
-    """Advance the SLAM estimator by a measurement: `dt` [s] since the last, `heading` [rad], `code` held to be
-    applied."""
+    """Advance the SLAM estimator by a measurement: `dt` [s] since the last, `heading` [rad], `code` held applied."""
     advance = window.step if isinstance(state, window.WindowState) else nested.step
     return advance(state, measurement, code, dt, heading, config, rng=rng)
 
@@ -49,8 +48,7 @@ def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random
 
 
 def smoothed(state: Any) -> Floats | None:
-    """Smoothed positions (K, 3) [m] by the SLAM estimator in all cycles, with hindsight; None of a filter without
-    smoothing."""
+    """Smoothed positions (K, 3) [m] by the SLAM estimator in all cycles; None of a filter without smoothing."""
     return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 

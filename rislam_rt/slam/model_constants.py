@@ -80,8 +80,7 @@ class ModelConstants(NamedTuple):
 
     @property
     def max_log_ratio(self) -> float:
-        """Model constant: largest change of log odds by one observation, which may always be a rare event of another
-        kind."""
+        """Model constant: largest change of log odds by one observation, which may be a rare event of another kind."""
         return -self.log_rare
 
     @property
@@ -125,8 +124,7 @@ class ModelConstants(NamedTuple):
 
     @property
     def against(self) -> float:
-        """Model constant: median squared residual (3 dof, half are below 2.4) above which measurements contradict a
-        feature."""
+        """Model constant: median squared residual (3 dof, half are below 2.4) that contradicts a feature."""
         return self.fit**2
 
     @property

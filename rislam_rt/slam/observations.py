@@ -101,7 +101,6 @@ def free_space(radio: RadioConfig) -> float:
 
 
 def is_los(observations: Observations, body: Body) -> Booleans:
-    """Whether each observed component (M,) is the direct path: no longer than the baseline from Tx to Rx of the agent's
-    body."""
+    """Whether each observed component (M,) is the direct path: no longer than the body's baseline from Tx to Rx."""
     baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
     return observations.seen[:, 0] < baseline + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)

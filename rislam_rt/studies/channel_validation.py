@@ -91,8 +91,7 @@ def run_comparison(
 def compare_room(
     name: str, rooms: Mapping[str, tuple[Scene, int]], radio: RadioConfig, poses: int, seed: int, tell: Tell
 ) -> list[Validation]:
-    """Compare both channels in one room of the validation, with the tracer's own float32 numbers and with the refined
-    ones."""
+    """Compare both channels in one room of the validation, with the tracer's float32 numbers and refined ones."""
     return validate_rooms([rooms[name]], radio, poses=poses, seed=seed)
 
 

@@ -137,8 +137,7 @@ def slam_sweep(
 
 
 def typed_axis(axis: Axis) -> Axis:
-    """Axis of a pipeline's sweep with its values in the type of the setting: whole numbers become real, or values
-    lists."""
+    """Axis of a pipeline's sweep with values in the type of the setting: whole numbers become real, or lists."""
     model: Any = PipelineSpec
     *parents, leaf = axis.key.split(".")
     for part in parents:

@@ -48,8 +48,7 @@ def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], widt
 
 
 def _similar(point: Mapping[str, Any], known: Sequence[Mapping[str, Any]]) -> float:
-    """Mean time [s] of the known cells that share the most values along the axes with a point, to estimate the sweep's
-    cost."""
+    """Mean time [s] of the known cells most alike to a point along the axes, to estimate the sweep's cost."""
     shared = [sum(other["point"].get(key) == value for key, value in point.items()) for other in known]
     most = max(shared)
     seconds = [float(other["seconds"]) for other, number in zip(known, shared, strict=True) if number == most]

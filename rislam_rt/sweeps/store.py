@@ -112,8 +112,7 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) ->
 
 
 def read_row(folder: Path, cell: Cell) -> Row:
-    """Read state and result of a cell from its stored file; a file that was changed or is another cell's counts as
-    missing."""
+    """Read state and result of a cell from its stored file; a changed file, or another cell's, counts as missing."""
     file = _file(folder, cell)
     try:
         found = read_sealed(file)

@@ -111,8 +111,7 @@ def random_poses(
 
 
 def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) -> Trajectory:
-    """Trajectory for a comparison of channels: positions (K, 3) [m] at rest, one a second, with random headings and
-    baseline."""
+    """Trajectory to compare channels on: positions (K, 3) [m] at rest, one a second, random headings and baseline."""
     count = len(position)
     elevation = rng.uniform(np.radians(15.0), np.radians(60.0)) * rng.choice([-1.0, 1.0])
     offset = 0.5 * baseline * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
@@ -123,8 +122,7 @@ def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) 
 
 
 def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
-    """Which points (N, 3) [m] random poses can have: those reachable from the start by straight lines that nothing
-    blocks."""
+    """Which points (N, 3) [m] random poses can have: reachable from the start by straight lines that nothing blocks."""
     reached = np.zeros(len(points), dtype=np.bool_)
     walls = facets.possible_blockers(np.concatenate([start[None], points]))
     stations = [start]

@@ -198,8 +198,7 @@ def with_perfect_mirrors(scene: Scene) -> Scene | None:
 
 
 def _polyline(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory) -> Floats:
-    """Corners (M, V + 2, 3) [m] of compared paths from Tx to Rx, whose rounding sets the limits of errors; the Rx is
-    repeated."""
+    """Corners (M, V + 2, 3) [m] of compared paths, Tx to Rx (repeated), whose rounding sets the limits of errors."""
     tx, rx = trajectory.tx[cycle][:, None], trajectory.rx[cycle][:, None]
     there = np.arange(paths.vertices.shape[2]) < paths.num_vertices[path][:, None]
     return np.concatenate([tx, np.where(there[..., None], paths.vertices[cycle, path], rx), rx], axis=1)
@@ -226,8 +225,7 @@ def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 def _landmark_directions(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 ) -> tuple[Floats, Floats]:
-    """Unit vectors (M, 3) from the landmark of each compared path to the points before and after it, for the gain's
-    error limit."""
+    """Unit vectors (M, 3) from each compared path's landmark to the points beside it, for the gain's error limit."""
     points, row = _polyline(paths, cycle, path, trajectory), np.arange(len(path))
     at = (paths.tx_walls[path] >= 0).sum(axis=1) + 1
     return unit(points[row, at - 1] - points[row, at]), unit(points[row, at + 1] - points[row, at])
@@ -239,16 +237,16 @@ def _ratio(a: Floats, b: Floats) -> Floats:
 
 
 def _bend(segments: Floats, beside: Floats) -> Floats:
-    """Error limit (M,) [m] of a compared path's length when its corners move by `beside` (M,) [m] across its segments
-    (M, V)."""
+    """Error limit (M,) [m] of a compared path's length when corners move by `beside` (M,) [m] across segments (M,
+    V)."""
     # A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     across = np.where(segments > 0.0, beside[:, None], 0.0)
     return np.minimum(_ratio(2.0 * across**2, segments), 2.0 * across).sum(axis=1)
 
 
 def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """Largest distance (W,) [m] of corners from each wall's plane, and altitude (W,) [m] of its largest triangle, for
-    error limits."""
+    """Error limits of walls: largest distance (W,) [m] of corners from the plane, altitude (W,) [m] of the largest
+    triangle."""
     corners, owner = walls.triangles, walls.wall_of_triangle
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))

@@ -133,8 +133,7 @@ class DifferenceExplainer:
         return Explanation("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
 
     def _legs(self, identity: Identity, cycle: int) -> list[UnfoldedLeg]:
-        """Legs of an unmatched path, constructed on the walls' unbounded planes, each from its device to the far
-        end."""
+        """Legs of an unmatched path, on the walls' unbounded planes, each from its device to the far end."""
         _, landmark, tx_names, rx_names = identity
         tx_walls, rx_walls = ([self.names.index(n) for n in names] for names in (tx_names, rx_names))
         tx, rx = self.trajectory.tx[cycle], self.trajectory.rx[cycle]
@@ -161,8 +160,7 @@ class DifferenceExplainer:
         return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
-        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along a leg: why a channel may lack an
-        unmatched path."""
+        """Lateral errors (d + 1,) [m] of a float32 ray along a leg, for which the tracer may lack an unmatched path."""
         # The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
         # largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of
         # what its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came
@@ -202,8 +200,7 @@ class DifferenceExplainer:
         return found
 
     def _on_wall(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions of an unmatched path: bounce `number` of a leg lies on its wall's triangles, and on no wall that
-        covers them."""
+        """Conditions of an unmatched path: bounce `number` of a leg is on its wall, and on none that covers it."""
         wall, bounce = int(leg.walls[number]), leg.points[number + 1]
         found = []
         for surface, sign in ((wall, 1.0), *((int(upper), -1.0) for upper in self.facets.over[wall])):
@@ -242,8 +239,7 @@ class DifferenceExplainer:
         return found + self._unoccluded(leg, number)
 
     def _unoccluded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions of an unmatched path: no occluder stands across segment `number` of a leg; the far end's own does
-        not hide it."""
+        """Conditions of an unmatched path: no occluder, the far end's own apart, across segment `number`."""
         occluders, found = self.facets.occluders, []
         for shade, landmark in enumerate(occluders.landmark):
             last = number == len(leg.walls) and landmark != ALONE
@@ -267,8 +263,7 @@ class DifferenceExplainer:
 
 
 def _tilts(walls: Walls, center: Floats) -> Floats:
-    """Largest turn (W,) [rad] of each wall's normal by float32 rounding of its corners, which may cost a channel a
-    path."""
+    """Largest turn (W,) [rad] of each wall's normal by float32 rounding of corners, which may cost a channel a path."""
     largest, altitude = walls.largest_triangles()
     extent = np.abs(walls.triangles[largest] - center).max(axis=(1, 2), initial=0.0)
     return 2.0 * FLOAT32_ROUNDING * extent / np.maximum(altitude, np.finfo(np.float64).tiny)

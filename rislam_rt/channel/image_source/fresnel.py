@@ -157,8 +157,7 @@ def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
 
 
 def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors for Fresnel reflection: across the plane of incidence, and in it across incident and reflected
-    ray."""
+    """Unit vectors for Fresnel reflection: across the plane of incidence, and in it across either ray."""
     across = np.cross(incident, normal)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     level: Booleans = length < 1e-12  # normal incidence: any direction in the wall serves, TE and TM agree there
@@ -169,7 +168,7 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
-    """Reflected part `coefficient (onto . field) out` of a polarised field (N, 3): its part along `onto`, turned to
+    """Reflected part `coefficient (onto . field) out` of a polarised field (N, 3): the part along `onto`, now along
     `out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

@@ -79,8 +79,7 @@ def _reflected_rays(facets: WallFacets, cycle: Integers, walls: Integers, device
 def _plane_crossing(
     start: Floats, end: Floats, normal: Floats, offset: Floats, tolerance: tuple[float, float]
 ) -> tuple[Booleans, Floats]:
-    """Which segments (N, 3) to mirror images cross their planes, ends farther off than the tolerances [m], and where
-    (n, 3)."""
+    """Which segments (N, 3) to mirror images cross their planes, ends farther than tolerances [m], and where (n, 3)."""
     a = np.einsum("ni,ni->n", start, normal) - offset
     b = np.einsum("ni,ni->n", end, normal) - offset
     crosses = (a * b < 0.0) & (np.abs(a) > tolerance[0]) & (np.abs(b) > tolerance[1])
@@ -114,8 +113,7 @@ def _legs(
     facets: WallFacets, coatings: Coatings, found: list[ImageRays], device: Floats, depth: int,
     terminals: LegEnds | None,
 ) -> SpecularLegs:  # fmt: skip
-    """Arrange the legs that mirror images gave by cycle and wall sequence (K, S), one column for each sequence that
-    some cycle has."""
+    """Arrange the legs of mirror images by cycle and wall sequence (K, S), a column for each sequence that exists."""
     cycles = len(device)
     columns: list[Integers] = []
     parts: list[tuple[Integers, Integers, ImageRays]] = []
@@ -147,8 +145,7 @@ def _legs(
 
 
 def _followed(direction: Floats, normals: Floats) -> Floats:
-    """Directions (N, 3) of rays after specular reflection on walls with normals (N, d, 3) in turn, for legs by mirror
-    images."""
+    """Directions (N, 3) of rays, for legs by mirror images, after reflection on walls of normals (N, d, 3) in turn."""
     for normal in normals.swapaxes(0, 1):
         direction = mirror_direction(direction, normal)
     return direction

@@ -82,8 +82,7 @@ class WallFacets:
         return inside
 
     def reflects(self, points: Floats, wall: Integers) -> Booleans:
-        """Whether points (N, 3) in the planes of walls (N,) lie on a facet of their wall, and on none that covers
-        it."""
+        """Whether points (N, 3) in the planes of walls (N,) lie on a facet of their wall, and on none over it."""
         own = self.contains(points, wall)
         for lower in np.unique(wall[own]) if any(map(len, self.over)) else []:
             for upper in self.over[lower]:

@@ -88,8 +88,7 @@ class TracedChannel:
         return rephase(paths, code)
 
     def _trace(self, queries: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
-        """Trace the specular legs of several queries for the traced channel; also whether all possible wall sequences
-        were tried."""
+        """Trace the legs of several queries for the traced channel; also whether all wall sequences were tried."""
         # Queries that leave the same occluder out are solved together, block by block.
         legs: dict[int, SpecularLegs] = {}
         complete = True
@@ -104,8 +103,7 @@ class TracedChannel:
         return [legs[number] for number in range(len(queries))], complete
 
     def _solve(self, batch: QueryBatch, candidates: CandidateIndices, spared: int) -> FoundLegs:
-        """Legs of the traced channel: those the tracer confirms among candidates, with their geometry and field
-        coefficients."""
+        """Legs of the traced channel: what the tracer confirms of candidates, with geometry and coefficients."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 

@@ -117,8 +117,7 @@ def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
 
 
 def _meets(target: Any, axis: Any, size: Any, source: Any, half: Any) -> Any:
-    """Whether the cone from a ball about 0 of radius `source` over one at `axis` of radius `half` meets a third
-    ball."""
+    """Whether the cone from a ball about 0 of radius `source` over one at `axis` of radius `half` meets a third."""
     # A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the
     # ball of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size -
     # source and b = source + half: a quadratic inequality, its discriminant written without a difference of large

@@ -74,7 +74,7 @@ def traced_geometry(sequences: Integers, device: Floats, far: Floats, vertices: 
 
 
 def polyline(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Floats:
-    """Vertices (N, D + 2, 3) [m] of traced legs: device, bounce points and far end, which repeats where bounces are
+    """Vertices (N, D + 2, 3) [m] of traced legs: device, bounce points and far end, repeated where bounces are
     fewer."""
     inner = np.where((sequences != NO_WALL)[..., None], vertices, far[:, None])
     return np.concatenate([device[:, None], inner, far[:, None]], axis=1)

@@ -94,8 +94,7 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
         self._reflection = reflection
 
     def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
-        """Event probabilities of a rough radio material of constant R, which lets nothing pass; the rest is
-        Sionna's."""
+        """Event probabilities of a rough radio material of constant R, which lets nothing pass."""
         r, t = mi.Complex2f(self._reflection), mi.Complex2f(0.0)  # type: ignore[operator]
         return super()._event_probabilities(r, r, t, t, enabled_interactions)
 

@@ -99,8 +99,7 @@ class TracerScene:
         return top
 
     def _has(self, wall: int, points: Floats) -> Booleans:
-        """Which points (N, 3) of its plane are on a wall of the tracer's scene, within the uncertainty of float32
-        vertices."""
+        """Which points (N, 3) of its plane are on a wall of the tracer's scene, as far as float32 vertices tell."""
         return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
 
 

@@ -77,8 +77,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Rows of legs that stay visible: their segments to the last bounce miss the occluding mesh of the scatterer at
-    their end."""
+    """Rows of legs that stay visible: the mesh of the scatterer at their end hides no segment but the last."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
@@ -160,8 +159,7 @@ def read_vertices(tracer_scene: TracerScene, buffer: PathsBuffer, keep: Integers
 
 
 def turned_vertices(vertices: Floats, sequences: Integers) -> Floats:
-    """Bounce points (N, D, 3) of visible paths in the opposite order to the tracer's buffer, zero where there is no
-    wall."""
+    """Bounce points (N, D, 3) of visible paths, opposite to the tracer's buffer, zero where there is no wall."""
     index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
     turned = np.take_along_axis(vertices, np.maximum(index, 0)[..., None], axis=1)
     return np.where((index >= 0)[..., None], turned, 0.0)

@@ -30,8 +30,7 @@ _BLOCK = 4_000_000
 
 
 def wall_sides(walls: Walls) -> Integers:
-    """Side bits (W, W), which leave wall sequences out: on which sides of wall i's plane wall j has parts, 0 in the
-    plane."""
+    """Side bits (W, W) that rule wall sequences out: on which sides of wall i's plane wall j is, 0 in the plane."""
     order = np.argsort(walls.wall_of_triangle, kind="stable")
     corners = walls.triangles[order].reshape(-1, 3)
     first = 3 * np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls)))
@@ -44,8 +43,7 @@ def wall_sides(walls: Walls) -> Integers:
 
 
 def point_sides(walls: Walls, points: Floats) -> Integers:
-    """Side bits (N, W), which leave wall sequences out: on which side of wall j's plane point i lies, 0 in the
-    plane."""
+    """Side bits (N, W) that rule wall sequences out: on which side of wall j's plane point i is, 0 in the plane."""
     height = points @ walls.normal.T - walls.offset
     return np.where(height > SURFACE_TOLERANCE, FRONT, np.where(height < -SURFACE_TOLERANCE, BACK, 0))
 
@@ -163,8 +161,7 @@ class CandidateIndices(NamedTuple):
 
 
 def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
-    """Yield candidates for legs (indices of wall sequences) regrouped into blocks of `size` rows, the last one
-    shorter."""
+    """Yield candidates for legs (indices of wall sequences) in blocks of `size` rows, the last one shorter."""
     waiting: list[CandidateIndices] = []
     for part in parts:
         waiting.append(part)

@@ -124,8 +124,7 @@ def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complex
 
 
 def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
-    """Newton steps (3,) to a detected peak of |a^H y|^2, each parameter alone; uphill also where the curvature is
-    positive."""
+    """Newton steps (3,) to a detected peak of |a^H y|^2, each parameter alone; uphill for either curvature."""
     value, first, second = moments.T
     power = value.real**2 + value.imag**2
     gradient = value.real * first.real + value.imag * first.imag

@@ -99,8 +99,7 @@ def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: floa
 
 
 def _times(matrix: Floats, vector: Complexes) -> Complexes:
-    """Product of a real matrix (n, m) and complex amplitudes (m,) in the refinement, without making the matrix
-    complex."""
+    """Product of a real matrix (n, m) and complex amplitudes (m,) in the refinement, the matrix staying real."""
     parts = np.ascontiguousarray(vector).view(np.float64).reshape(-1, 2)
     return np.asarray((matrix @ parts).view(np.complex128)[:, 0])
 

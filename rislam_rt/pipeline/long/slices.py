@@ -121,8 +121,7 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
-    """True trajectory, paths and a scheme's result at every n-th cycle of a long run's slices, at most `SHOWN` in
-    all."""
+    """True trajectory, paths and a scheme's result at every n-th cycle of a long run's slices, at most `SHOWN`."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
     for part in parts:

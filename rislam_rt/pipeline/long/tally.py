@@ -148,8 +148,7 @@ class _Overlap:
         self.origin: Floats | None = None
 
     def add(self, estimate: Floats, truth: Floats) -> None:
-        """Tally estimated and true positions (K, 3) [m] of a slice, relative to the first true one against
-        cancellation."""
+        """Tally estimated and true positions (K, 3) [m] of a slice, relative to the first, against cancellation."""
         self.origin = truth[0].copy() if self.origin is None else self.origin
         estimate, truth = estimate - self.origin, truth - self.origin
         self.count += len(truth)

@@ -177,8 +177,7 @@ def replay(
 
 
 def _alternated_panels(inputs: Inputs) -> int:
-    """Number of RIS panels that the receiver of a replayed recording told apart by alternated codes; 0 where it did
-    not."""
+    """Number of RIS panels that a replayed recording's receiver told apart by alternated codes; 0 for none."""
     if all(one.from_panel is None for one in inputs.measurements):
         return 0
     return 1 if inputs.panel is None else len(inputs.panel.panels)

@@ -53,8 +53,7 @@ def _changed(panel: RisPanel, room: RoomSection) -> RisPanel:
 
 
 def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[Scatterer, ...]:
-    """Scatterers as `[room]` overrides their number: the scene's first `count`, or spheres added at random free
-    places."""
+    """Scatterers as `[room]` overrides their number: the scene's first `count`, or spheres at random free places."""
     found = list(scene.scatterers[:count])
     walls = build_walls(scene)
     surfaces = np.concatenate([walls.triangles, walls.occluders.triangles])
@@ -73,8 +72,7 @@ def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[
 
 
 def _is_free(point: Floats, surfaces: Floats, others: Floats, way: Floats) -> bool:
-    """Whether a scatterer added by scene overrides keeps the least distances from triangles, landmarks and the agent's
-    positions."""
+    """Whether a scatterer added by scene overrides keeps clear of triangles, landmarks and the agent's positions."""
     if float(distance_to_triangles(point[None], surfaces).min()) < OFF_WALLS:
         return False
     nearest = float(np.linalg.norm(others - point, axis=1).min(initial=np.inf))

@@ -125,8 +125,7 @@ class DesignSection(DesignerSection):
 
     @property
     def least_snr(self) -> float:
-        """SNR (linear) by the pipeline file at which the design takes a path to be detected every other time; 0 if not
-        set."""
+        """SNR (linear) at which the pipeline's design takes a path to be detected every other time; 0 if not set."""
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
@@ -254,8 +253,7 @@ class PipelineSpec(Section):
     @model_validator(mode="before")
     @classmethod
     def _tell_all_estimators(cls, content: Any) -> Any:
-        """Copy a pipeline's process noise, `height` and `use_vt` to every estimator for which the file does not give
-        them."""
+        """Copy a pipeline's process noise, `height`, `use_vt` to estimators for which the file gives none."""
         return share_settings(content) if isinstance(content, dict) else content
 
     @model_validator(mode="after")

@@ -93,8 +93,7 @@ def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
-    """The class that declares a setting in the list, and the configuration record whose fields it takes over, if
-    any."""
+    """The class that declares a listed setting, and the configuration record whose fields it takes over, if any."""
     owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
     return owner, RECORDS.get(owner)
 
@@ -196,8 +195,7 @@ def _of_record(record: type, name: str) -> str:
 
 
 def _edge(passes: Callable[[Any], bool], inside: float, sign: int, whole: bool) -> str:
-    """End of a setting's range in words, for the list, found by bisection from a valid value to one side; empty if
-    unlimited."""
+    """End of a listed setting's range in words, found by bisection from a valid value; empty if unlimited."""
     outside: float = sign * (int(LARGEST) if whole else LARGEST)
     step = 1 if whole else 1e-9
     if passes(outside):

@@ -51,8 +51,7 @@ def draw_certificate(certificate: Certificate) -> Figure:
 
 
 def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) -> None:
-    """Draw all paths of one channel from above for the channel validation, those that the other channel lacks on
-    top."""
+    """Draw all paths of one channel from above for the validation, those that the other channel lacks on top."""
     _draw_plan(axis, certificate)
     columns = np.flatnonzero(paths.valid[0])
     only = {path.label for path in certificate.report.one_sided if path.side == name}

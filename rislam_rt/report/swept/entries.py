@@ -101,8 +101,7 @@ def panels_of(group: Group, scheme: str) -> list[str]:
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """Entry of panel and scatterers: RMS errors and bounds at the end of the runs, and the share mapped; None of
-    nothing."""
+    """Entry of panel and scatterers: RMS errors and bounds at the runs' end, and the share mapped; None of nothing."""
     panels = panels_of(group, scheme)
     names = group.parts(scheme, "landmarks")
     own = panels if SCHEMES[scheme].panel else []
@@ -115,8 +114,7 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """Entry of walls found at the end: RMS errors, bounds and own std; the share is of those heard for `HEARD` s in
-    all."""
+    """Entry of walls found at the end: RMS errors, bounds and own std; share of those heard for `HEARD` s in all."""
     names = group.parts(scheme, "walls")
     angle, offset, own, least, near, audible = (
         _pooled(group, scheme, "walls", names, part)

@@ -116,8 +116,7 @@ def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str
 
 
 def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table for Fig. 4(b) of the RMSE reductions by the paper's scheme, from pairs of runs with the same motion and
-    noise."""
+    """Table for Fig. 4(b) of the RMSE reductions by the paper's scheme, from pairs of equal motion and noise."""
     rivals = list(dict.fromkeys(entry["over"] for entry in gains))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in gains):

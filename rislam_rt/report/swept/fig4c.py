@@ -75,8 +75,7 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
 
 
 def panel_error(group: Group, scheme: str) -> Any:
-    """Position error (R,) [m] of the (first) panel at the end of each run, for Fig. 4(c); NaN where it is not
-    mapped."""
+    """Position error (R,) [m] of the (first) panel at the end of each run, for Fig. 4(c); NaN if not mapped."""
     panels = panels_of(group, scheme)
     return group.column(scheme, "landmarks", panels[0], "final_m") if panels else np.full(len(group.results), np.nan)
 

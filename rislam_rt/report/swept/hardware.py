@@ -107,8 +107,7 @@ def _means(group: Group | None, key: str) -> dict[str, Any]:
 def _limit(
     fault: MismatchSection, entries: Sequence[Mapping[str, Any]], way: str, ideal: Mapping[str, Any]
 ) -> str | None:
-    """Largest tolerable level of a hardware impairment, in the file's order; None if not even the first is
-    tolerable."""
+    """Largest tolerable level of a hardware impairment, in the file's order; None if even the first is not."""
     limit = None
     for entry in entries:
         if entry["fault"] == fault.name and entry["way"] == way:

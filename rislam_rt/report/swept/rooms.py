@@ -64,8 +64,7 @@ def missed_aims(entry: Mapping[str, Any]) -> list[str]:
 
 
 def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
-    """Draw the agent's RMSE of all schemes in every one of many rooms, with posterior bounds as short bars, and the
-    aim."""
+    """Draw the agent's RMSE of all schemes in many rooms, with posterior bounds as short bars, and the aim."""
     entries = content["entries"]
     rooms = list(dict.fromkeys(entry["room"] for entry in entries))
     series = {entry["series"]: entry["scheme"] for entry in entries}

@@ -142,8 +142,7 @@ def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
 def cycle_times(
     runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
 ) -> dict[str, float | None]:
-    """Median CPU time [ms] of the estimator per cycle for a score card, by series; the last of a cell's times
-    counts."""
+    """Median CPU time [ms] of the estimator per cycle for a score card, by series; a cell's last time counts."""
     told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
     found: dict[str, float | None] = {}
     for name, members in runs.items():

@@ -45,8 +45,7 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
 
 
 def _lost(scheme: SchemeResult, rows: Integers) -> str:
-    """Digits in the view of a run, one for each cycle shown: 1 if the filter reported divergence since the one
-    before."""
+    """Digits in the view of a run, one a cycle shown: 1 if the filter reported divergence since the one before."""
     lost = np.array([outcome == "diverged" for outcome in scheme.outcome], dtype=np.int64)
     begins = np.append(0, rows[:-1] + 1)
     return "".join("1" if lost[first : last + 1].any() else "0" for first, last in zip(begins, rows, strict=True))

@@ -7,8 +7,7 @@ from rislam_rt.geometry.triangles import edge_planes, triangle_planes
 
 
 def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
-    """Query to a mesh: pairs (point, triangle) no more than `distance` [m] apart, of points (K, 3) and triangles (T, 3,
-    3)."""
+    """Query to a mesh: pairs (point, triangle) up to `distance` [m] apart, of points (K, 3), triangles (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -20,8 +19,7 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
 
 
 def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
-    """Query to a mesh: pairs (segment, triangle) where a segment, `start` to `end` (K, 3), passes through a triangle
-    (T, 3, 3)."""
+    """Query to a mesh: pairs (segment, triangle) where `start` to `end` (K, 3) passes through a triangle (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -73,8 +71,7 @@ def winding(point: Floats, triangles: Floats) -> float:
 
 
 def sphere_directions(count: int) -> Floats:
-    """Unit vectors (count, 3) of rays to query a mesh in all directions, spread evenly over the sphere (Fibonacci
-    lattice)."""
+    """Unit vectors (count, 3) of rays to query a mesh, spread evenly over the sphere (Fibonacci lattice)."""
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     phi = k * np.pi * (3.0 - np.sqrt(5.0))
@@ -83,8 +80,7 @@ def sphere_directions(count: int) -> Floats:
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
-    """Query to a mesh: distance (S,) [m] of points (S, 3) from the nearest edge line of their triangle, positive
-    inside."""
+    """Query to a mesh: distance (S,) [m] of points (S, 3) from their triangle's nearest edge, positive inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
 

@@ -146,8 +146,7 @@ def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]
 
 
 def _delay_spread(room: TriangleArray, panel: RisPanel) -> float:
-    """Scene check: delay spread over a RIS panel [s], the largest difference over elements of Tx, element, Rx, at 50
-    cycles."""
+    """Scene check: delay spread over a RIS panel [s], the largest difference of Tx, element, Rx, at 50 cycles."""
     motion = room.scene.agent
     cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))
     corners = panel.spec.offsets()[:: max(panel.spec.rows - 1, 1), :: max(panel.spec.cols - 1, 1)].reshape(-1, 3)

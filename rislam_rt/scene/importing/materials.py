@@ -129,8 +129,7 @@ class MaterialAssignment:
 
 
 def itu_by_word(name: str) -> str | None:
-    """ITU material that a word in the name of an imported material or node stands for, `Oak.003` for wood; None if
-    none."""
+    """ITU material that a word in the name of an imported material or node stands for, `Oak.003` for wood."""
     plain = re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
     for itu in get_args(ItuMaterial):
         if f"_{itu}_" in f"_{plain}_":

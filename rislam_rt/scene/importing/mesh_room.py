@@ -44,8 +44,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from an imported mesh, by its flat regions or a scan's planes: reflectors with materials,
-    occluders."""
+    """Draft of a room from an imported mesh, by flat regions or a scan's planes: reflectors, materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]

@@ -93,8 +93,7 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
 
 
 def along_heading(course: Floats) -> Floats:
-    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one, that of the one before,
-    or after."""
+    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one, its neighbour's."""
     level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
     if not level.any():
         return np.zeros(len(course))

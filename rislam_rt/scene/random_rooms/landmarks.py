@@ -64,8 +64,7 @@ def draw_scatterer(
 
 
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
-    """Share of the agent's path (K, 3) from which furniture hides a random landmark (3,), every tenth position looked
-    at."""
+    """Share of the agent's path (K, 3) from which furniture hides a random landmark (3,), at every tenth position."""
     seen_from = way[::10]
     triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
     if not triangles:
@@ -99,8 +98,7 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Draw the place of a random RIS panel on a wall, above the start: host, centre, normal and up; None where it does
-    not fit."""
+    """Draw a random RIS panel's place on a wall, above the start: host, centre, normal, up; None if it does not fit."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)

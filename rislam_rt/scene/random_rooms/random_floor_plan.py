@@ -109,8 +109,7 @@ def _horseshoe(sides: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _is_ear(outline: Floats, left: list[int], place: int) -> bool:
-    """Whether a random floor plan's corner is an ear that can be cut off: convex, with no other corner in its
-    triangle."""
+    """Whether a random floor plan's corner is an ear to cut off: convex, with no other corner in its triangle."""
     before, here, after = left[place - 1], left[place], left[(place + 1) % len(left)]
     corners = outline[[before, here, after]]
     if area(corners) <= 0.0:

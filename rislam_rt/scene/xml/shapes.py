@@ -121,8 +121,7 @@ def _part(part: Element) -> Floats:
 
 
 def _triple(part: Element, default: float) -> Floats:
-    """Three numbers of a shape's element in an XML scene file, from `value` (one for all, or three) or from x, y and
-    z."""
+    """Three numbers of a shape's element in an XML scene file, from `value` (one for all, or three) or x, y, z."""
     if part.get("value") is None:
         return np.array([number(part, axis, default) for axis in "xyz"])
     values = _numbers(part)
@@ -141,8 +140,7 @@ def _numbers(part: Element) -> list[float]:
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:
-    """Rotation (3, 3) of a shape by an angle [rad] about an axis (3,), as `<rotate>` of an XML scene file asks for
-    it."""
+    """Rotation (3, 3) of a shape by an angle [rad] about an axis (3,), as `<rotate>` of an XML scene asks for it."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         raise Fault("<rotate> without an axis", "give x, y and z of one")

@@ -185,8 +185,7 @@ def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> 
 
 
 def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) -> _Fitted:
-    """Feature of tracks: least-squares approach, the change of their lengths with the agent's motion; mean lengths are
-    free."""
+    """Feature of tracks: least-squares approach, change of length with the agent's motion; mean lengths are free."""
     total = np.maximum(weight.sum(axis=1), 1e-300)
     x, y, z = (v - (np.sum(weight * v, axis=1) / total)[:, None] for v in (towards, seen, bulge))
     mean, spread = APPROACH_PRIOR

@@ -204,8 +204,7 @@ def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Bool
 def _follow_map(
     belief: Nested, before: WindowState, after: WindowState, config: SlamConfig, *, rng: np.random.Generator
 ) -> Nested:
-    """Particles of the nested filter with the landmarks that the map holds now: removed ones dropped, a new one
-    initialised."""
+    """Particles of the nested filter with the map's present landmarks: removed ones dropped, a new one initialised."""
     keep = np.isin(before.landmarks.ident, after.landmarks.ident)
     belief = belief if keep.all() else drop(belief, keep)
     for row in range(len(belief.clouds), len(after.landmarks.ident)):
@@ -215,8 +214,7 @@ def _follow_map(
 
 
 def _history(front: WindowState, row: int) -> LandmarkHistory:
-    """Measurements from which a new feature of the map was found, and its prior, to initialise it in the particle
-    filter."""
+    """Measurements in which a new feature of the map was found, and its prior, for the particle filter to start."""
     landmarks, log, window = front.landmarks, front.log, front.window
     at = (log.form[:, 0] == landmarks.ident[row]).any(axis=1).nonzero()[0]
     forms = landmarks.rows(log.form[at[0]])

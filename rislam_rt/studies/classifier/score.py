@@ -83,8 +83,7 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
 
 
 def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
-    """Score of the classifier: mean over rooms of a rule's F1, (3,) with its interval, walks resampled within each
-    room."""
+    """Score of the classifier: mean over rooms of a rule's F1, (3,) with interval, walks resampled in each room."""
     draws = []
     for examples in rooms:
         tables = _tables(examples, rule(examples))

@@ -76,7 +76,6 @@ def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.ran
 
 
 def _middle(paths: Paths) -> int:
-    """Cycle of a walk at which the code of the policy `aimed` is designed: the middle one of those with a direct panel
-    path."""
+    """Cycle of a walk at which the code of the policy `aimed` is designed: the middle one with a direct panel path."""
     there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
     return int(there[len(there) // 2]) if len(there) else 0

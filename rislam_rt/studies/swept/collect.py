@@ -39,8 +39,7 @@ class Group(NamedTuple):
         return np.array([_look(result, scheme, name) for result in self.results], dtype=np.float64)
 
     def parts(self, scheme: str, name: str) -> list[str]:
-        """Keys that a collected nested score of a scheme has in any repetition: names of landmarks (`landmarks`) or
-        `walls`."""
+        """Keys that a collected nested score of a scheme has in any repetition: landmarks' names, or `walls`."""
         found = [result["schemes"].get(scheme, {}).get(name, {}) for result in self.results if result]
         return list(dict.fromkeys(part for entry in found for part in entry))
 
@@ -99,8 +98,7 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
-    """Difference [m] of their collected RMSE and ours, with its interval, over seeds that both have; None of fewer than
-    two."""
+    """Difference [m] of their collected RMSE and ours, with interval, over common seeds; None of fewer than two."""
 
     def difference(samples: Floats) -> Floats:
         root = rms_over_runs(samples)

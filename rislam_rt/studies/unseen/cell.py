@@ -103,8 +103,7 @@ def scheme_here(asked: str, room: RandomRoom) -> str:
 
 
 def trace_key(spec: PipelineSpec) -> str:
-    """Settings that true motion and paths of a cell in unseen rooms depend on, as text: the key under which they are
-    cached."""
+    """Settings that true motion and paths of a cell in unseen rooms depend on, as text: the key of the cache."""
     content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, *ESTIMATOR_SECTIONS})
     content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
     return json.dumps(content, sort_keys=True)

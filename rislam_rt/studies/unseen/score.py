@@ -84,8 +84,7 @@ def _lasting(flag: Booleans, time: Floats) -> Booleans:
 
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:
-    """Scores of walls in an unseen room: how many detectable ones the last map has, their errors and delays, and ghost
-    walls."""
+    """Scores of walls in an unseen room: how many detectable ones the map has, errors, delays, ghost walls."""
     heard, walls = heard_long(truth.wall_audible, time), truth.walls(told)
     first = np.full(len(heard), -1)
     match = np.full(len(heard), -1)

@@ -109,8 +109,7 @@ def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> 
 
 
 def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -> Booleans:
-    """Whether (R,) each surface of an imported object lies on a wall of the room's shell from which the object
-    rises."""
+    """Whether (R,) each surface of an imported object lies on a wall of the shell from which the object rises."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
     corners = facets.mesh.vertices[facets.mesh.faces]
@@ -131,8 +130,7 @@ def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -
 
 
 def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
-    """Wall (R,) that each surface of an imported mesh belongs to: in the shell, those of one plane and part are one
-    wall."""
+    """Wall (R,) that each surface of an imported mesh belongs to: in the shell, those of one plane and part are one."""
     group = np.arange(len(mirror))
     rows = shell[mirror[shell]]
     for place, i in enumerate(rows):

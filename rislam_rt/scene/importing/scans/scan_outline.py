@@ -113,8 +113,7 @@ def _meeting_cells(
 
 
 def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Booleans) -> Booleans:
-    """Whether (S,) points (S, 2) of an outline's meeting line lie between its end and its crossing with one that ends
-    there."""
+    """Whether (S,) points (S, 2) of an outline's meeting line lie between its end and the crossing of another."""
     distance, at = cKDTree(other_flat).query(flat)
     meet = int(np.argmin(distance))
     steps = int(BREAK / (0.5 * CELL))

@@ -102,8 +102,7 @@ def posterior(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _likelihood(log_weight: Floats, known: Floats) -> tuple[Floats, Floats] | None:
-    """Gaussian fitted to the weights of agent particles: slope b (K,), precision I + C of `exp(a + b y - y C y /
-    2)`."""
+    """Gaussian fitted to agent particles' weights: slope b (K,), precision I + C of `exp(a + b y - y C y / 2)`."""
     # Poisson regression with a logarithmic link: its solution gives the sample the same mean and second moment as the
     # weights do, and noise on the weights only costs accuracy. None where it does not exist or is no Gaussian.
     count, dims = known.shape

@@ -70,8 +70,7 @@ def decode(words: Words, step: Floats) -> Floats:
 
 
 def join(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
-    """Pack three signed coordinates of 21 bits of the engine's particles into two 32-bit words, for numpy and Dr.Jit
-    alike."""
+    """Pack three signed 21-bit coordinates of the engine's particles into two 32-bit words, for numpy and Dr.Jit."""
     return (x << 11) | ((z >> 10) & LOW), (y << 11) | ((z & 1023) << 1)
 
 
@@ -183,15 +182,13 @@ class DrJitEngine:
         )
 
     def _dot(self, start: Any, first: Any, second: Any) -> Any:
-        """Add the products of two packets to `start` in a Dr.Jit kernel: one sum a lane, so that all sums stay in
-        registers."""
+        """Add the products of two packets to `start` in a Dr.Jit kernel, a sum a lane: all sums stay in registers."""
         for a, b in zip(first, second, strict=True):
             start = self._dr.fma(a, b, start)
         return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
-        """Ancestors (N * size,) in Dr.Jit by systematic resampling: survivors mark first children, a running maximum
-        fills in."""
+        """Ancestors (N * size,) in Dr.Jit by systematic resampling: first children marked, a running maximum fills."""
         dr, count, old = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, old)
         packets = old // PACKET

@@ -35,14 +35,12 @@ class NumpyEngine:
         return Cloud(flat, log_weight.astype(np.float32), block, row, total, points.shape[1])
 
     def read(self, cloud: Cloud) -> tuple[Floats, Floats]:
-        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle in numpy, for tests and
-        pictures."""
+        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle, numpy's, for tests."""
         points = np.swapaxes(cloud.points[cloud.block], 1, 2)
         return points.astype(np.float64), cloud.log_weight[cloud.row] - cloud.log_total[:, None]
 
     def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
-        """Multiply the weights of a cloud, in numpy, by the likelihood of some returns, given by constants (K, N)
-        float32."""
+        """Multiply the weights of a cloud, in numpy, by the likelihood of returns, constants (K, N) float32."""
         count, size = len(cloud.block), cloud.size
         new = np.empty((count, size), dtype=np.float32)
         lanes = np.empty((12, count, 1))
@@ -60,8 +58,7 @@ class NumpyEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=sums.log_total), sums
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a cloud, in numpy, to `size` equally weighted particles per agent particle, of mean 0, covariance
-        (N, 3, 3)."""
+        """Resample a cloud, in numpy, to `size` equal particles per agent particle, mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         fresh = np.empty((count, 3, size), dtype=np.float32)
         child = np.arange(size)

@@ -251,8 +251,7 @@ def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
 
 
 def _normalised(log_weight: Floats) -> tuple[Floats, float]:
-    """Normalised log weights of the belief's agent particles, and the logarithm of their former sum; hopeless ones
-    become equal."""
+    """Normalised log weights of the belief's agent particles, and their former log sum; hopeless ones become equal."""
     top = float(np.max(log_weight))
     if not np.isfinite(top):
         return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
@@ -261,6 +260,5 @@ def _normalised(log_weight: Floats) -> tuple[Floats, float]:
 
 
 def _root(covariance: Floats) -> Floats:
-    """Lower Cholesky factor of a new landmark's covariance (3, 3) in the particles' belief, which may be singular by
-    rounding."""
+    """Lower Cholesky factor of a new landmark's covariance (3, 3) in the particles' belief, even a singular one."""
     return np.linalg.cholesky(covariance + 1e-12 * (np.trace(covariance) + 1e-12) * np.eye(3))

@@ -100,7 +100,7 @@ def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | 
 
 
 def log_density(miss: Floats, precision: Floats) -> Floats:
-    """Log normal densities (N,) of association pairs' innovations (N, 3) with precisions (N, 3, 3); -inf beyond the
+    """Log normal densities (N,) of association pairs' innovations (N, 3), precisions (N, 3, 3); -inf beyond the
     gate."""
     square = np.einsum("ni,nij,nj->n", miss, precision, miss)
     log = 0.5 * (np.log(np.maximum(np.linalg.det(precision), 1e-300)) - square - 3.0 * np.log(2.0 * np.pi))

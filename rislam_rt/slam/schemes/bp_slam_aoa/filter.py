@@ -159,8 +159,7 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:
-    """Acceleration deviations (4, 3) [m/s^2] of the motion modes in BP-SLAM with angles: calm, lively, fast,
-    climbing."""
+    """Acceleration deviations (4, 3) [m/s^2] of motion modes in BP-SLAM with angles: calm, lively, fast, climbing."""
     calm, lively, fast = config.sigma_a, config.lively_std, FAST * config.lively_std
     up = min(VERTICAL_STD, calm)
     return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
@@ -179,8 +178,7 @@ def _mode_changes(config: BpSlamAoaConfig) -> Floats:
 def _predict(
     state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
 ) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
-    """Predict agent and features of BP-SLAM with angles to this cycle, by the motion mode that explains its components
-    best."""
+    """Predict agent and features of BP-SLAM with angles to this cycle, by the motion mode that explains it best."""
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
     ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
@@ -221,8 +219,7 @@ def _predict(
 def _claimed(
     state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
-    """BP-SLAM with angles: feature number (M,) of each component, `UNUSED` for none, and the NIS over components so
-    claimed."""
+    """BP-SLAM with angles: feature (M,) of each component, `UNUSED` for none, and the NIS over those so claimed."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
     sure = (features.existence > config.detection_threshold)[:, None]
     for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):

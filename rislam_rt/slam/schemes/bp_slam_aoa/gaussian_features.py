@@ -146,6 +146,5 @@ def through(rows: Floats, matrix: Floats) -> Floats:
 
 
 def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
-    """Covariances (C, 3, 3) of features' returns that the trajectory's covariance makes through derivatives (C, 3,
-    n)."""
+    """Covariances (C, 3, 3) of features' returns by the trajectory's covariance and derivatives (C, 3, n)."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)

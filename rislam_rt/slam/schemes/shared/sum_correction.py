@@ -103,8 +103,7 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
 
 
 def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:
-    """Correction of the agent's trajectory by one feature's message: moments over its Gaussians, the rest changing
-    nothing."""
+    """Correction of the agent's trajectory by one feature's message: moments over Gaussians, the rest as before."""
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):
         return course
@@ -117,8 +116,7 @@ def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, 
 
 
 def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[Integers, Floats]:
-    """Rows of a scan's ranges that no feature's sum claims and that start new ones, and their existence
-    probabilities."""
+    """Rows of a scan's ranges that no feature's sum claims and that start new ones, and existence probabilities."""
     alive = found.unclaimed * (fresh - 1.0) / fresh
     rows = np.flatnonzero(alive >= birth_threshold)
     return rows, alive[rows]

@@ -213,8 +213,7 @@ LEVEL_RISE, UPRIGHT_RISE = 0.9, 0.35
 def direction_beliefs(
     place: Floats, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> DirectionPriors:
-    """Direction priors of a hypothesis's new wall at `place` (3,): upright, at right angles to a known wall, or
-    level."""
+    """Direction priors of a hypothesis's wall at `place` (3,): upright, at right angles to a known one, or level."""
     span = place - summary.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach

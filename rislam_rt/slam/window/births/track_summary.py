@@ -182,8 +182,7 @@ def expected_scatter(shown: Floats, free: Floats, snr: Floats) -> Floats:
 
 
 def _terms(number: Integers | int) -> Integers:
-    """Number of polynomial terms in a track's summary through so many measurements: a line's, or a quadratic's from
-    nine on."""
+    """Number of polynomial terms in a track's summary of so many measurements: a line, a quadratic from nine on."""
     return np.where(np.asarray(number) >= 9, 3, 2)
 
 

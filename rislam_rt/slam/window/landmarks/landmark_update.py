@@ -107,8 +107,7 @@ def _joined(
 
 
 def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
-    """Probability (C,) that each cluster of unresolved returns is detected, occlusion included, for the landmark
-    update."""
+    """Probability (C,) that each cluster of unresolved returns is detected, with occlusion, for the landmark update."""
     return np.asarray(CONSTANTS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
         1e-4, CONSTANTS.shown
     )

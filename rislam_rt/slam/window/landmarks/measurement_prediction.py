@@ -318,8 +318,7 @@ def reciprocal(forms: Integers) -> Integers:
 
 
 def _above(z: Floats) -> Floats:
-    """Probability that a standard normal variable is below z, for predicted measurements, by a logistic
-    approximation."""
+    """Probability that a standard normal variable is below z, for predicted measurements, by a logistic curve."""
     return np.asarray(1.0 / (1.0 + np.exp(-1.7 * np.clip(z, -20.0, 20.0))))
 
 

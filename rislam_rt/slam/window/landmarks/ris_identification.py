@@ -63,8 +63,7 @@ class PanelIdentity(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _strength_prior(middle: float, spread: float) -> Floats:
-    """Prior log probabilities (G,) for RIS identification of a scatterer's strength on its grid, log-normal about
-    `middle`."""
+    """Prior log probabilities (G,), for RIS identification, of scatterers' strengths, log-normal about `middle`."""
     log = -0.5 * ((STRENGTHS - np.log(middle)) / spread) ** 2
     return np.asarray(log - np.logaddexp.reduce(log))
 
@@ -98,8 +97,7 @@ class PanelObservation(NamedTuple):
 
 
 def spread_places(mean: Floats, covariance: Floats) -> Floats:
-    """Equally likely samples (N, S, 3) for RIS identification of Gaussian places of means (N, 3) and covariances (N, 3,
-    3)."""
+    """Equally likely samples (N, S, 3), for RIS identification, of Gaussian means (N, 3), covariances (N, 3, 3)."""
     return np.asarray(mean[:, None] + even_draws(DRAWS, mean.shape[1]) @ np.swapaxes(square_roots(covariance), 1, 2))
 
 

@@ -138,8 +138,7 @@ LEVEL_BODY = Tilts(np.zeros((SWAYS, 1, 2)), np.full((SWAYS, 1), 1.0 / SWAYS))
 
 
 def tilts(probability: Floats, told: Attitude | None) -> Tilts:
-    """Tilts (attitude) of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if
-    anything."""
+    """Tilts (attitude) of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if any."""
     every = _variances(probability)[0]
     precision = np.eye(every.shape[1]) / every[:, None, :] if told is None else _precision(every, told)
     covariance = np.linalg.inv(precision)
