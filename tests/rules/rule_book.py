@@ -21,7 +21,6 @@ FLOORS = {
         "input_messages",
         "progress",
         "shipped",
-        "spelling",
         "toml",
         "worker_pool",
     ),
