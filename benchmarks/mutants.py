@@ -221,7 +221,7 @@ MUTANTS = (
         ),
     ),
     Mutant(
-        "a damaged file passes", "storage/seal.py",
+        "a damaged file passes", "storage/checksums.py",
         '    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):',
         '    if not content["checksum"]:',
         (

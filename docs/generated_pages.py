@@ -7,7 +7,7 @@ import typer
 from mkdocs.structure.files import File, Files
 
 from rislam_rt.cli.app import app
-from rislam_rt.pipeline.specification.settings import Setting, list_settings
+from rislam_rt.pipeline.specification.settings_list import Setting, list_settings
 from rislam_rt.shipped import first_sentence, shipped_pipelines
 from rislam_rt.studies import load_any
 

@@ -1,5 +1,4 @@
-"""Array types, and the checks of dtype, shape and NaN that frozen dataclasses make of their array fields on
-construction."""
+"""Arrays: their types, checks of dtype, shape and NaN that frozen dataclasses make of their fields, blocks of rows."""
 
 from typing import Any
 
@@ -44,7 +43,7 @@ def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: st
 
 
 def phasor(phase: ArrayLike) -> Complexes:
-    """`exp(j phase)` (...,) of phases (...,) [rad]: numpy's own, of a complex argument, takes three times as long."""
+    """Array `exp(j phase)` (...,) of phases (...,) [rad]: numpy's own, of a complex argument, takes thrice as long."""
     angle = np.asarray(phase, dtype=np.float64)
     found = np.empty(angle.shape, dtype=np.complex128)
     np.cos(angle, out=found.real)
@@ -53,7 +52,7 @@ def phasor(phase: ArrayLike) -> Complexes:
 
 
 def show_point(point: ArrayLike) -> str:
-    """Text of a point's coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
+    """Text of an array of three coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
     return f"({', '.join(f'{value:.4g}' for value in np.asarray(point))})"
 
 
@@ -66,3 +65,9 @@ def freeze(record: Any, name: str, dtype: Any, shape: tuple[int | None, ...]) ->
     """Replace a field of a frozen dataclass by its checked, read-only array (for `__post_init__`)."""
     label = f"{type(record).__name__}.{name}"
     object.__setattr__(record, name, frozen(getattr(record, name), dtype, shape, label))
+
+
+def row_blocks(count: int, width: int, most: int = 2_000_000, least: int = 1) -> list[slice]:
+    """Slices of an array's rows of `width` numbers, so that one holds about `most`, `least` rows or more."""
+    step = max(least, most // max(width, 1))
+    return [slice(first, min(first + step, count)) for first in range(0, count, step)]

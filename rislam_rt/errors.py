@@ -83,7 +83,7 @@ def disk_error(error: OSError) -> RislamError:
 
 
 def _printable(text: str) -> str:
-    """Text with every unprintable character as a space."""
+    """Text of an error with every unprintable character as a space."""
     return "".join(c if c.isprintable() else " " for c in text)
 
 

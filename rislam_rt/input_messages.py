@@ -1,6 +1,9 @@
-"""Messages on a bad value in a file or on the command line: what to give instead, in the unit of the setting."""
+"""Messages on bad input, in a file or on the command line: what to give instead, in the setting's unit, and spelling
+suggestions for an unknown word.
+"""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 from rislam_rt.toml import toml_value
@@ -49,9 +52,29 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
 
 
 def _entry(word: str) -> str:
-    """A word as an entry of a list: numbers as they are, text in quotes."""
+    """A word as an entry of a list that a message proposes: numbers as they are, text in quotes."""
     try:
         float(word)
     except ValueError:
         return toml_value(word)
     return word
+
+
+LEAST_LIKE = 0.75
+"""Least similarity (share of letters in common) of two spellings of one word; `num_particles` and `num_samples` have
+0.67."""
+
+
+def nearest(word: str, known: Iterable[str], most: int = 1) -> list[str]:
+    """Known words that are spelled nearly like a given word, the nearest first, at most `most` of them."""
+    return get_close_matches(word, list(known), n=most, cutoff=LEAST_LIKE)
+
+
+def did_you_mean(near: Sequence[str]) -> str:
+    """Question `did you mean 'x' or 'y'?` for an error message from suggested words; empty if there are none."""
+    return f"did you mean {' or '.join(repr(word) for word in near)}?" if near else ""
+
+
+def counted(number: int, thing: str) -> str:
+    """Spelling of a number of things: `1 error`, `2 errors`."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"

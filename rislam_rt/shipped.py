@@ -42,7 +42,7 @@ def room_beside(folder: Path, name: str) -> Path:
 
 
 def name_from_here(folder: Path) -> str:
-    """What a pipeline file in the working folder calls a scene folder: a built-in room's name, or the way there."""
+    """What a pipeline file in the working folder calls a shipped scene (its name) or a folder (the way there)."""
     built_in = shipped_rooms().get(folder.name)
     if built_in is not None and folder.resolve() == built_in.resolve() and not Path(folder.name).exists():
         return folder.name
@@ -50,6 +50,6 @@ def name_from_here(folder: Path) -> str:
 
 
 def first_sentence(pipeline: Path) -> str:
-    """Description of a pipeline file: the first sentence of its leading comment."""
+    """Description of a shipped pipeline file: the first sentence of its leading comment."""
     lines = takewhile(lambda line: line.startswith("#"), pipeline.read_text(encoding="utf-8").splitlines())
     return re.split(r"(?<=(?<!Fig)\.) ", " ".join(line.removeprefix("#").strip() for line in lines))[0]

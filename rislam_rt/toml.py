@@ -65,7 +65,8 @@ def parse_value(text: str) -> Any:
 
 
 def put_dotted(settings: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """Copy of nested settings with the value at one dotted key (`a.b.c`) replaced; missing tables on the way are made.
+    """Copy of nested settings (a TOML table) with the value at one dotted key (`a.b.c`) replaced; missing tables on the
+    way are made.
 
     Raises
     ------

@@ -235,7 +235,7 @@ def serve(handle: int) -> None:
 
 
 def _listen(channel: Any, pieces: "SimpleQueue[bytes]") -> None:
-    """Put the messages of a worker's pipe into a queue, and end the process when the pipe closes."""
+    """Put the messages of a worker process's pipe into a queue, and end the process when the pipe closes."""
     try:
         while True:
             pieces.put(channel.recv_bytes())

@@ -22,7 +22,7 @@ import numpy as np
 
 from rislam_rt.channel.compare import compare_paths, random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.traced import TracedChannel, sequences, shortest_segment
+from rislam_rt.channel.traced import TracedChannel, shortest_segment, wall_sequences
 from rislam_rt.model import Material, Paths, RadioConfig, Reflector, Scene, Trajectory
 from rislam_rt.scene import load_scene
 
@@ -58,9 +58,9 @@ def lost(scene: Scene, trajectory: Trajectory, depth: int) -> list[int]:
     image = {how: ImageSourceChannel(scene, RADIO, depth, how).paths(trajectory) for how in ("exhaustive", "beams")}
     channel, traced = TracedChannel(scene, RADIO, depth), {}
     for how, many in (("exhaustive", NEVER), ("cones", ALWAYS)):
-        sequences.MANY = many
+        wall_sequences.MANY = many
         traced[how] = channel.paths(trajectory)
-    sequences.MANY = 100_000
+    wall_sequences.MANY = 100_000
     every, beams = identities(image["exhaustive"]), identities(image["beams"])
     asked, cones = identities(traced["exhaustive"]), identities(traced["cones"])
     return [len(every), len(every - beams), len(beams - every), len(asked), len(asked - cones), len(cones - asked)]

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.design.designers import best_magnitudes
 from rislam_rt.design.objective import build_objective
-from rislam_rt.design.problem import DesignProblem
 
 _TINY = 1e-300
 

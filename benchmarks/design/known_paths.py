@@ -7,7 +7,7 @@ from rislam_rt.design import DesignConfig, problem_from_paths
 from rislam_rt.design.designers import designer
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import GradientMode, position_bound, position_information, vertex_gradient
-from rislam_rt.information.position import PositionBound
+from rislam_rt.information.position_bound import PositionBound
 from rislam_rt.model import DataSheet, PathKind, Paths, RadioConfig, RisCode
 
 LANDMARK_PATHS = (PathKind.PS, PathKind.VS, PathKind.RIS, PathKind.VRIS)

@@ -29,12 +29,12 @@ from rislam_rt.information import (
 )
 from rislam_rt.information.heard_paths import SILENT
 from rislam_rt.information.landmark_model import LandmarkModel
-from rislam_rt.information.position import range_information
+from rislam_rt.information.position_bound import range_information
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SlamResult
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import run_slam
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

@@ -16,7 +16,7 @@ import numpy as np
 from rislam_rt.evaluate import normalised_squares
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import run_slam
-from rislam_rt.pipeline.scores.bound import scheme_bound
+from rislam_rt.pipeline.scores.posterior_bound import scheme_bound
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

@@ -21,7 +21,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.backend import prepare_backend
 from rislam_rt.model import Body
 from rislam_rt.slam import NestedConfig
 from rislam_rt.slam.nested.particles import particle_belief
@@ -30,6 +29,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import CloudEngine, Kernel, 
 from rislam_rt.slam.nested.particles.sightline import Sighting, linear_sightline, pack, trace_sightline
 from rislam_rt.slam.nested.particles.weights import Seen, update
 from rislam_rt.slam.predicted_returns import NONE, Returns, observe, poses_of
+from rislam_rt.tracer_backend import prepare_backend
 
 BODY = Body(np.array([-0.04388, -0.02397, 0.0]), np.array([0.04388, 0.02397, 0.0]))
 START, VELOCITY, HEADING, CYCLE, SIGMA_A = np.array([0.5, 0.7, 0.5]), np.array([0.07, 0.07, 0.0]), 0.3, 0.1, 0.01

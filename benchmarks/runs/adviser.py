@@ -22,12 +22,12 @@ import numpy as np
 
 import rislam_rt
 from rislam_rt.adviser.advice import Advice, advise
-from rislam_rt.adviser.cost import trace_cost
 from rislam_rt.adviser.remedies import HEARD, SELDOM
+from rislam_rt.adviser.tracing_cost import trace_cost
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline import PipelineSpec, build_radio, load_spec
-from rislam_rt.pipeline.run import build_channel
-from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.channels import build_channel
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.report.conclusions import panel_found_at
 from rislam_rt.scene.random_rooms import draw_room
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline import cycle
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.cycle import Receptions
-from rislam_rt.pipeline.run import prepare_channel, prepare_setup, result_of, run_scheme
+from rislam_rt.pipeline.run import prepare_setup, result_of, run_scheme
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene import load_scene

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.path_composition import compose_paths
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.path_geometry import traced_geometry
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import Walls, build_walls

@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink, link_budget, survey
-from rislam_rt.adviser.cost import TraceCost, trace_cost
+from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink, link_budget, survey
 from rislam_rt.adviser.remedies import detection_label, remedies
+from rislam_rt.adviser.tracing_cost import TraceCost, trace_cost
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 
 class Advice(NamedTuple):

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.budget import NOTHING_DB
-from rislam_rt.adviser.codes import aimed_paths
+from rislam_rt.adviser.forecast_codes import aimed_paths
+from rislam_rt.adviser.link_budget import NOTHING_DB
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.measurement.received import HORIZON_MARGIN
+from rislam_rt.measurement.received_paths import HORIZON_MARGIN
 from rislam_rt.model import PathKind, Scene, Trajectory
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 POINTS, ELEMENTS = 6000, 2_000_000
 """Most positions of a coverage map, and most of positions times RIS elements: a second or two."""

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement.received import HORIZON_MARGIN
+from rislam_rt.measurement.received_paths import HORIZON_MARGIN
 from rislam_rt.model import Paths, Scene
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.scene.check.mesh_queries import crossings
 
 WEAK = "too weak"
@@ -49,7 +49,7 @@ class Reasons(NamedTuple):
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:
-        """Name of the mesh, not its own, that hides a landmark from Tx or Rx at a position; empty if none does."""
+        """Reason why a landmark is not detected: the mesh, not its own, that hides it from Tx or Rx; empty if none."""
         scatterers = self.scene.scatterers
         own = scatterers[number].name if number < len(scatterers) and scatterers[number].shade is not None else ""
         for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):

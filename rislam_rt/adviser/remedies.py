@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.adviser.budget import LandmarkLink, Survey
+from rislam_rt.adviser.link_budget import LandmarkLink, Survey
 from rislam_rt.adviser.reasons import WEAK
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.antennas import amplitude
@@ -24,7 +24,7 @@ GROWTH = 1.05
 
 
 def detection_label(link: LandmarkLink) -> str:
-    """Label of a landmark's link budget by its share: `heard`, `heard at times` or `not heard`."""
+    """Label that the adviser gives a landmark, by which it picks remedies: `heard`, `heard at times` or `not heard`."""
     return "heard" if link.share >= HEARD else "heard at times" if link.share >= SELDOM else "not heard"
 
 
@@ -40,20 +40,20 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
 
 
 def weak_places(link: LandmarkLink) -> Integers:
-    """Indices of a link budget's positions at which more SNR would help: a path comes in that is only too weak."""
+    """Indices of a link budget's positions at which a remedy of more SNR helps: a path comes in that is only too
+    weak."""
     return np.array([place for place, reason in enumerate(link.reason) if reason == WEAK], dtype=np.int64)
 
 
 def lack_db(link: LandmarkLink) -> float:
-    """SNR [dB] that a landmark lacks, at the median of the positions where it is only too weak; 0 without any."""
+    """SNR [dB] that remedies must add for a landmark to be detected, the median where it is too weak; 0 without any."""
     weak = weak_places(link)
     return -float(np.median(link.margin_db[weak])) if len(weak) else 0.0
 
 
 def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisSpec | None:
-    """Smallest RIS panel, grown alike along both sides, whose direct path under the best code is above the detection
-    threshold at the median of the positions where it is too weak; None if none of up to `LARGEST` elements a side
-    is."""
+    """Remedy of a larger RIS panel: the smallest, grown alike along both sides, whose direct path under the best code
+    is above the detection threshold at the median of the positions."""
     spec, weak = panel.spec, weak_places(link)
     scale = 10.0 ** (lack_db(link) / 40.0) * 0.9  # the amplitude goes with the sides' product
     while True:
@@ -103,7 +103,7 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
 
 
 def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """Warning of a RIS panel that is detected under an aimed code, but hardly ever by the beam sweep."""
+    """Remedy for a search: warning of a panel that is detected under an aimed code, but hardly ever by the sweep."""
     aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
     if aimed.share >= HEARD and link.share < SELDOM:
         yield (
@@ -126,7 +126,7 @@ def _way_round(why: str, *, panel_held: bool) -> str:
 
 
 def _margins(looked: Survey, panel: RisPanel, spec: RisSpec) -> Floats:
-    """Margin (K,) [dB] of a RIS panel's direct path under the best code for a data sheet, nothing in its way."""
+    """Margin (K,) [dB], for remedies, of a RIS panel's unhindered direct path under the best code for a data sheet."""
     radio, agent = looked.settings.radio, looked.scene.agent
     ends, patterns = ((agent.tx, radio.tx_gain), (agent.rx, radio.rx_gain)), (radio.antennas.tx, radio.antennas.rx)
     tx, rx = (

@@ -52,7 +52,8 @@ def sphere_rcs(radius: float, wavelength: float, angle: Floats) -> tuple[Floats,
 
 
 def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes]:
-    """Mie amplitudes S1 and S2 (...,) of a conducting sphere of size parameter k r, at cosines (...,) of scattering.
+    """Mie amplitudes S1 and S2 (...,) of a conducting sphere's cross-section at size parameter k r, by cosines (...,)
+    of scattering.
 
     Raises
     ------
@@ -78,7 +79,8 @@ def mie_amplitudes(size: float, cos_angle: Floats) -> tuple[Complexes, Complexes
 
 
 def mie_coefficients(size: float) -> tuple[Complexes, Complexes]:
-    """Mie coefficients a_n and b_n (N,), n = 1 .. N, of a perfectly conducting sphere of size parameter k r.
+    """Mie coefficients a_n and b_n (N,), n = 1 .. N, of a conducting sphere of size parameter k r, for its
+    cross-section.
 
     With psi and xi the Riccati-Bessel functions, `a_n = psi_n' / xi_n'`, `b_n = psi_n / xi_n`; Wiscombe's number of
     terms.

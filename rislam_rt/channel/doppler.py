@@ -32,7 +32,7 @@ def end_velocities(trajectory: Trajectory) -> tuple[Floats, Floats]:
 
 
 def turn_rate(trajectory: Trajectory) -> Floats:
-    """Turn rate (K,) [rad/s] of the agent, from differences of its heading between cycles; 0 for a single cycle."""
+    """Turn rate (K,) [rad/s] of the agent for Doppler shifts, from differences of its heading; 0 for a single cycle."""
     if len(trajectory) < 2:
         return np.zeros(len(trajectory))
     return np.gradient(np.unwrap(trajectory.heading), trajectory.time)

@@ -98,7 +98,7 @@ def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
 
 
 def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
-    """Distance (N,) [m] of one point (3,) from segments `start` to `end` (N, 3)."""
+    """Distance (N,) [m] of an occluder's point (3,) from segments `start` to `end` (N, 3)."""
     along = end - start
     square = np.einsum("ni,ni->n", along, along)
     fraction = np.einsum("ni,ni->n", point - start, along) / np.where(square > 0.0, square, 1.0)
@@ -106,7 +106,7 @@ def _distance_to_segments(point: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _outline(triangles: Floats, direction: Floats) -> Floats:
-    """Silhouette edges (E, 2, 3) [m] of triangles (T, 3, 3) seen along a direction, and edges of one triangle alone."""
+    """Silhouette edges (E, 2, 3) [m] of an occluder's triangles (T, 3, 3) along a direction, and its open edges."""
     normal, _ = triangle_planes(triangles)
     ahead = np.repeat(normal @ direction > 0.0, 3)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
@@ -118,7 +118,7 @@ def _outline(triangles: Floats, direction: Floats) -> Floats:
 
 
 def _distance_between(start: Floats, end: Floats, edges: Floats) -> float:
-    """Least distance [m] of a segment (3,) to (3,) from edges (E, 2, 3), infinite without any."""
+    """Least distance [m] of a segment (3,) to (3,) from an occluder's edges (E, 2, 3), infinite without any."""
     along, across, gap = end - start, edges[:, 1] - edges[:, 0], start - edges[:, 0]
     aa, ee = along @ along, np.einsum("ei,ei->e", across, across)
     ae, ag, eg = across @ along, gap @ along, np.einsum("ei,ei->e", across, gap)

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisLegs, Scene
@@ -19,7 +19,7 @@ def compose_paths(
     scene: Scene, radio: RadioConfig, walls: Walls, depth: int, direct: SpecularLegs, tx_legs: Sequence[SpecularLegs],
     rx_legs: Sequence[SpecularLegs], source: str,
 ) -> Paths:  # fmt: skip
-    """Compose specular legs into all paths of up to `depth` wall bounces, with gains, that some cycle has.
+    """Compose specular legs to all paths of up to `depth` wall bounces, with gains, that some cycle has.
 
     Parameters
     ----------
@@ -128,7 +128,8 @@ def _join_block(
 def _panel_responses(
     scene: Scene, radio: RadioConfig, number: int, tx: SpecularLegs, rx: SpecularLegs
 ) -> tuple[Complexes, Complexes]:
-    """Responses (K, I, N, M), (K, J, N, M) of a panel's elements to its Tx and Rx legs, by mirrored devices."""
+    """Responses (K, I, N, M), (K, J, N, M) of a panel's elements to the Tx and Rx legs that compose its paths, by
+    mirrored devices."""
     assert scene.ris is not None
     spec, center = scene.panels[number].spec, scene.panels[number].center
     responses = []
@@ -143,26 +144,26 @@ def _panel_responses(
 
 
 def _padded(walls: Integers, depth: int) -> Integers:
-    """Pad or cut wall sequences (P, d) to exactly `depth` columns."""
+    """Composition of paths: pad or cut the legs' wall sequences (P, d) to exactly `depth` columns."""
     fill = np.full((len(walls), max(depth - walls.shape[1], 0)), -1)
     return np.concatenate([walls, fill], axis=1)[:, :depth]
 
 
 def _padded_vertices(vertices: Floats, count: int) -> Floats:
-    """Pad or cut vertices (K, S, D, 3) of paths to exactly `count` points."""
+    """Composition of paths: pad or cut the legs' vertices (K, S, D, 3) to exactly `count` points."""
     cycles, paths, depth, _ = vertices.shape
     fill = np.zeros((cycles, paths, max(count - depth, 0), 3))
     return np.concatenate([vertices, fill], axis=2)[:, :, :count]
 
 
 def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
-    """Reverse the first `bounces` (S,) entries of each wall sequence (S, d); the padding of -1 stays behind."""
+    """Reverse the first `bounces` (S,) walls of each leg (S, d) to compose paths of them; the padding stays behind."""
     index = bounces[:, None] - 1 - np.arange(walls.shape[1])
     return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
 
 
 def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:
-    """Vertices (K, P, count, 3) [m] of paths over a landmark in order of travel: Tx bounces, landmark, Rx bounces."""
+    """Vertices (K, P, count, 3) [m] of paths composed of two legs, in the order of travel over the landmark."""
     vertices = np.zeros((tx.valid.shape[0], len(i), count, 3))
     for path, (a, b) in enumerate(zip(i, j, strict=True)):
         first, last = int(tx.num_bounces[a]), int(rx.num_bounces[b])

@@ -10,23 +10,23 @@ class Channel(Protocol):
 
     @property
     def scene(self) -> Scene:
-        """The room whose paths the channel computes."""
+        """The room whose paths a channel computes."""
         ...
 
     @property
     def radio(self) -> RadioConfig:
-        """The agent's radio, which decides carrier and antenna gains."""
+        """The radio of a channel, which decides carrier and antenna gains."""
         ...
 
     @property
     def depth(self) -> int:
-        """Largest number of wall bounces on a path, both legs together."""
+        """Largest number of wall bounces on a path of a channel, both legs together."""
         ...
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Propagation paths of every cycle of a trajectory, with the panel's code at level 0."""
+        """Propagation paths by a channel in every cycle of a trajectory, with the panel's code at level 0."""
         ...
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths with their gains under another panel code, without tracing again."""
+        """A channel's same paths with their gains under another panel code, without tracing again."""
         ...

@@ -42,11 +42,12 @@ class Walls:
         return len(self.names)
 
     def beside(self, wall: int) -> Booleans:
-        """Which walls (W,) share a wall's plane by lying on each other, itself among them; none for -1."""
+        """Which walls (W,) of a scene share a wall's plane by lying on each other, itself among them; none for -1."""
         return (self.plane == self.plane[wall]) if wall >= 0 else np.zeros(len(self), dtype=np.bool_)
 
     def largest_triangles(self) -> tuple[Integers, Floats]:
-        """Number (W,) of each wall's largest triangle, and the altitude (W,) [m] of that on its longest side."""
+        """Number (W,) of the largest triangle of each wall of a scene, and its altitude (W,) [m] on its longest
+        side."""
         edges = self.triangles[:, 1:] - self.triangles[:, :1]
         area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
         order = np.lexsort((-area, self.wall_of_triangle))
@@ -55,7 +56,7 @@ class Walls:
         return largest, area[largest] / np.linalg.norm(sides, axis=-1).max(axis=1, initial=np.finfo(np.float64).tiny)
 
     def surface(self, wall: int) -> tuple[Floats, Floats]:
-        """Centroid (3,) [m] of a wall, and the share (t,) of each of its triangles in its area."""
+        """Centroid (3,) [m] of one of the scene's walls, and the share (t,) of each of its triangles in its area."""
         triangles = self.triangles[self.wall_of_triangle == wall]
         edges = triangles[:, 1:] - triangles[:, :1]
         area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=-1)
@@ -97,12 +98,12 @@ def build_walls(scene: Scene) -> Walls:
 
 
 def _names(reflector: str, count: int) -> list[str]:
-    """Names of the `count` walls of one reflector: its own, or `reflector#facet` where it has several planes."""
+    """Names of a reflector's `count` walls: its own, or `reflector#facet` where it has several planes."""
     return [reflector] if count == 1 else [f"{reflector}#{facet}" for facet in range(count)]
 
 
 def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """Number of the wall behind a panel, -1 without: its host reflector's nearest plane; `reflector` (W,) of walls."""
+    """Number of the scene's wall behind a panel, -1 without: its host's nearest plane; `reflector` (W,) of walls."""
     names = [r.name for r in scene.reflectors]
     if panel.host not in names:
         return -1

@@ -7,10 +7,10 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, settings_of, write_json
 from rislam_rt.cli.output_files import OUTPUT
-from rislam_rt.spelling import counted
+from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.specification.spec import Settings as Records
+    from rislam_rt.pipeline.specification.pipeline_spec import Settings as Records
 
 SEED = 0
 """Seed of the random phase codes under which the advice computes a panel's detectability."""
@@ -69,7 +69,8 @@ def command(
 
 
 def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:
-    """Print which landmarks the receiver will detect, draw the coverage map if asked, return the advice for JSON."""
+    """Part of `rislam-rt check`: print which landmarks will be detected, draw the coverage if asked, return the
+    advice."""
     import numpy as np
 
     from rislam_rt.adviser.advice import advise

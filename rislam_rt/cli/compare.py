@@ -21,11 +21,11 @@ def command(
     """
     import numpy as np
 
-    from rislam_rt.backend import prepare_backend
     from rislam_rt.channel.compare import compare_channels
-    from rislam_rt.cli.scenes import open_scene
-    from rislam_rt.pipeline.specification.read import load_radio
+    from rislam_rt.cli.scene_arguments import open_scene
+    from rislam_rt.pipeline.specification.read_pipeline import load_radio
     from rislam_rt.report.terminal_tables import print_comparison
+    from rislam_rt.tracer_backend import prepare_backend
 
     radio = load_radio(set_ or ())
     opened = open_scene(scene, radio)

@@ -9,7 +9,7 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings, wr
 from rislam_rt.shipped import name_from_here, room_beside
 
 if TYPE_CHECKING:
-    from rislam_rt.pipeline.specification.settings import Setting
+    from rislam_rt.pipeline.specification.settings_list import Setting
 
 Value = dict[str, Any]
 
@@ -26,8 +26,8 @@ def command(
 
     Example: rislam-rt config trace_then_slam --explain slam.sigma_a
     """
-    from rislam_rt.pipeline.specification.settings import explain as find
-    from rislam_rt.pipeline.specification.settings import list_settings
+    from rislam_rt.pipeline.specification.settings_list import explain as find
+    from rislam_rt.pipeline.specification.settings_list import list_settings
     from rislam_rt.studies import load_any
 
     spec = load_any(pipeline, set_ or ())
@@ -73,7 +73,7 @@ def _facts(one: "Setting") -> str:
 
 
 def _value(spec: Any, key: str) -> Any:
-    """Value of the setting with a dotted key in a specification."""
+    """Value of the setting with a dotted key in a specification, for `rislam-rt config`."""
     for part in key.split("."):
         spec = getattr(spec, part)
     return spec
@@ -90,7 +90,7 @@ def _from_here(value: Any, folder: Path, key: str = "") -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Value of a setting as plain data for TOML and JSON."""
+    """Value of a setting as plain data for TOML and JSON, for `rislam-rt config`."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):

@@ -22,10 +22,10 @@ def command(
     """
     import numpy as np
 
-    from rislam_rt.cli.scenes import open_scene, point_in
-    from rislam_rt.pipeline.design_at import design_at, design_table
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.specification.read import load_radio
+    from rislam_rt.cli.scene_arguments import open_scene, point_in
+    from rislam_rt.pipeline.channels import prepare_channel
+    from rislam_rt.pipeline.design_at_position import design_at, design_table
+    from rislam_rt.pipeline.specification.read_pipeline import load_radio
     from rislam_rt.report.terminal_tables import print_designs
 
     radio = load_radio(set_ or ())

@@ -12,7 +12,7 @@ def command(json: JsonFile = None) -> None:
     """
     from dataclasses import asdict
 
-    from rislam_rt.backend import diagnose, prepare_backend
+    from rislam_rt.tracer_backend import diagnose, prepare_backend
 
     findings = diagnose()
     width = max(len(finding.name) for finding in findings)

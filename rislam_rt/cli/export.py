@@ -21,7 +21,7 @@ def command(
 
     Example: rislam-rt export office --xml office_xml
     """
-    from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.cli.scene_arguments import open_scene
     from rislam_rt.scene.xml import write_xml
 
     opened = open_scene(scene)

@@ -119,7 +119,8 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
 
 
 def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:
-    """Write a scene folder from an XML scene, for whose units and materials options are `useless`."""
+    """Part of `rislam-rt new`: a scene folder from an XML scene, for whose units and materials options are
+    `useless`."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.xml import new_from_xml
 

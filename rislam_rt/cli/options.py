@@ -13,14 +13,14 @@ from rislam_rt.shipped import find_pipeline, find_room
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
-    from rislam_rt.pipeline.specification.spec import Settings as RunSettings
+    from rislam_rt.pipeline.specification.pipeline_spec import Settings as RunSettings
 
 FARTHEST = 1e5
 """Largest coordinate [m] of a point on the command line, as in a scene."""
 
 
 def pipeline_file(name: str) -> Path:
-    """Path of a pipeline file, or of a built-in one by its name.
+    """Command line argument of a pipeline: the path of its file, or of a built-in one by its name.
 
     Its folder and the working folder are added to Python's module path, so that it can name a user's own methods.
     """
@@ -108,7 +108,8 @@ def parse_point(option: str, text: str) -> "Floats":
 
 
 def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
-    """Settings of a pipeline in SI units (radio, receiver, estimators), with `KEY=VALUE` settings put over them.
+    """Settings of a pipeline in SI units (radio, receiver, estimators), with the command line's `--set KEY=VALUE` put
+    over them.
 
     Raises
     ------
@@ -116,7 +117,7 @@ def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
         The pipeline or a setting is unusable.
     """
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.specification.spec import build_settings
+    from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
     return build_settings(load_spec(pipeline, changed))
 

@@ -65,7 +65,7 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
 
 
 def page_files(name: str, *, figure: bool = False) -> tuple[str, ...]:
-    """Names of the files that a study writes: page, table, data, and the figure if there is one."""
+    """Names of the output files of a study: page, table, data, and the figure if there is one."""
     return (f"{name}.md", f"{name}.csv", f"{name}.json", *([f"figures/{name}.png"] if figure else []))
 
 
@@ -84,8 +84,8 @@ def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: 
     """
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.store.identity import short_name
+    from rislam_rt.storage.checksums import checksum
     from rislam_rt.storage.files import check_writable
-    from rislam_rt.storage.seal import checksum
 
     folder = out or Path("runs") / short_name(name, checksum(record))
     if folder.exists() and not folder.is_dir():
@@ -104,7 +104,7 @@ def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: 
 
 
 def _is_page(file: Path) -> bool:
-    """Whether a file is a page that a study of this program wrote."""
+    """Whether an output file is a page that a study of this program wrote, and may be replaced."""
     try:
         return PAGE_MARK.search(file.read_bytes()) is not None
     except OSError:

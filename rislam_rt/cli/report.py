@@ -54,7 +54,7 @@ def command(
 
 def _write_gif(result: "SlamResult", file: Path) -> Path:
     """Write the animation of a run as a GIF, with a progress bar."""
-    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.report.exports.animation import gif_bytes
     from rislam_rt.storage.files import write_atomic
 

@@ -8,7 +8,7 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
 from rislam_rt.cli.verbosity import warn
-from rislam_rt.spelling import counted
+from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -31,7 +31,8 @@ def command(
         bool, typer.Option("--report/--no-report", help="Whether to draw the figures and the page.")
     ] = True,
 ) -> None:
-    """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
+    """The command `rislam-rt run`: run a pipeline in a room: trace, then design, measure, localise and map, cycle by
+    cycle.
 
     An interrupted run goes on where it stopped when the same command is given again, and a completed one is shown;
     other settings make another folder.
@@ -61,8 +62,9 @@ def command(
 
 def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
     """Run all schemes of a SLAM pipeline in a scene, as `rislam-rt run` does; a completed run is shown instead."""
-    from rislam_rt.cli.scenes import open_scene, scene_of
-    from rislam_rt.pipeline.run import check_run, prepare_channel
+    from rislam_rt.cli.scene_arguments import open_scene, scene_of
+    from rislam_rt.pipeline.channels import prepare_channel
+    from rislam_rt.pipeline.run import check_run
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.pipeline.store.identity import run_identity
     from rislam_rt.pipeline.store.run_folder import DONE, find_run
@@ -81,7 +83,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
 
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
-    """Print the scores of a completed run from its folder, and draw its page if that is missing."""
+    """For `rislam-rt run`: print the scores of a completed run from its folder, draw its page if that is missing."""
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, read_summary
     from rislam_rt.report.page import PAGE, write_report
@@ -105,13 +107,13 @@ def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> N
 def compute_run(
     spec: "PipelineSpec", room: "Scene", identity: "RunIdentity", folder: Path, given: StudyOptions
 ) -> None:
-    """Compute a run, or the schemes of it that are not there yet, in its folder; print scores and write the page."""
+    """For `rislam-rt run`: compute a run, or its missing schemes, in its folder; print scores and write the page."""
     import os
 
     import numpy as np
 
     from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.pipeline import run_slam
     from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
     from rislam_rt.pipeline.scores.summary import summarise
@@ -147,7 +149,7 @@ def compute_run(
 
 
 def show_scores(summary: Mapping[str, Any]) -> None:
-    """Print the scores of a run from its summary, then its warnings on the error stream."""
+    """For `rislam-rt run`: print the scores of a run from its summary, then its warnings on the error stream."""
     from rislam_rt.report.terminal_tables import print_summary
 
     print_summary(summary)

@@ -10,7 +10,7 @@ from rislam_rt.cli.output_files import OUTPUT, check_output
 
 if TYPE_CHECKING:
     from rislam_rt.model import Scene
-    from rislam_rt.pipeline.specification.spec import Settings as Records
+    from rislam_rt.pipeline.specification.pipeline_spec import Settings as Records
 
 
 def command(
@@ -37,10 +37,10 @@ def command(
 
     Example: rislam-rt show office --html office.html --depth 2
     """
-    from rislam_rt.cli.progress import show_progress
-    from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.cli.progress_bars import show_progress
+    from rislam_rt.cli.scene_arguments import open_scene
     from rislam_rt.report.terminal_tables import print_scene
-    from rislam_rt.scene.file_names import safe_name
+    from rislam_rt.scene.scene_folder import safe_name
 
     settings = settings_of(pipeline, set_ or ()) if html is not None else None
     if out is not None:
@@ -66,9 +66,9 @@ def command(
 
 
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
-    """Write the HTML view of a scene (`show --html`) with the paths at some poses of its trajectory."""
+    """Part of `rislam-rt show --html`: write the view of a scene with the paths at some poses of its trajectory."""
     from rislam_rt.channel.image_source import ImageSourceChannel
-    from rislam_rt.cli.progress import show_progress
+    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.report.view.page import view_page
     from rislam_rt.report.view.paths_data import paths_data, poses_of
     from rislam_rt.storage.files import write_atomic

@@ -77,7 +77,7 @@ def command(
 
 
 def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "StartPrior":
-    """Start prior from the options `--start` and `--velocity`; the heading is that of the velocity."""
+    """Start prior for `rislam-rt slam` from the options `--start` and `--velocity`, along which the heading is."""
     import numpy as np
 
     from rislam_rt.slam import StartPrior
@@ -88,7 +88,7 @@ def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "Star
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
-    """Offsets of Tx and Rx from the agent's position, from the options `--tx` and `--rx`; None without them."""
+    """Offsets of Tx and Rx for `rislam-rt slam` from the options `--tx` and `--rx`; None without them."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.model import Body
 
@@ -100,10 +100,10 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
 
 
 def _true_positions(file: Path, cycles: int) -> "Floats":
-    """True positions (K, 3) [m] from the TUM file of `--truth`, one a cycle."""
+    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM file of `--truth`, one a cycle."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.recorded_poses import parse_tum
+    from rislam_rt.scene.motion.recorded_poses import parse_tum
 
     try:
         _, position, _ = parse_tum(file.read_bytes())
@@ -117,7 +117,7 @@ def _true_positions(file: Path, cycles: int) -> "Floats":
 
 
 def _new_folder(folder: Path) -> Path:
-    """Output folder of `slam`, which must not exist or be empty."""
+    """Output folder of `rislam-rt slam`, which must not exist or be empty."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.storage.files import check_writable
 
@@ -157,7 +157,7 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
 
 
 def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
-    """Write the results of `slam`: estimated trajectory as TUM and CSV, and the last map as JSON."""
+    """Write the results of `rislam-rt slam`: estimated trajectory as TUM and CSV, and the last map as JSON."""
     import numpy as np
 
     from rislam_rt.scene.write import tum_bytes

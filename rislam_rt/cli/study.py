@@ -12,10 +12,10 @@ import typer
 from rislam_rt.cli.interrupts import Interrupted
 from rislam_rt.cli.options import StudyOptions, write_json
 from rislam_rt.cli.output_files import page_files, study_folder
-from rislam_rt.cli.progress import show_progress, show_sweep
-from rislam_rt.cli.scenes import open_scene, scene_of
+from rislam_rt.cli.progress_bars import show_progress, show_sweep
+from rislam_rt.cli.scene_arguments import open_scene, scene_of
 from rislam_rt.errors import ConfigError
-from rislam_rt.pipeline.run import prepare_channel
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.report.studies import classifier
 from rislam_rt.report.studies.channel_validation import CERTIFICATE, COMPARISON, write_comparison
@@ -25,15 +25,15 @@ from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import write_swept
 from rislam_rt.report.terminal_tables import print_cards, print_validation
 from rislam_rt.report.unseen import write_unseen
-from rislam_rt.scene.file_names import safe_name
+from rislam_rt.scene.scene_folder import safe_name
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies import ClaimsSpec, CompareSpec, Fig4aSpec, SweptSpec, UnseenSpec
+from rislam_rt.studies.channel_validation import comparison_table, run_comparison
 from rislam_rt.studies.claims import SOURCE, judge, read_results
 from rislam_rt.studies.classifier.sets import gather_sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import ALL, train_and_score
-from rislam_rt.studies.compare import comparison_table, run_comparison
 from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept import build_sweep
@@ -45,13 +45,13 @@ from rislam_rt.sweeps.store import check_folder, read_timings
 
 
 def _refuse_scene(given: StudyOptions, kind: str, why: str) -> None:
-    """Raise an error if `--scene` is given for a study that names its own rooms, or has none."""
+    """Raise an error if `rislam-rt run` gets `--scene` for a study that names its own rooms, or has none."""
     if given.scene is not None:
         raise ConfigError(f"--scene {given.scene}: a pipeline of kind '{kind}' {why}")
 
 
 def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
-    """Run the study that compares ray tracer and image sources, and write its page; exit code 1 if they differ."""
+    """For `rislam-rt run` of a study: compare both channels, and write the page; exit code 1 if they differ."""
     _refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
@@ -74,7 +74,7 @@ def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
 
 
 def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
-    """Run the study of Fig. 4(a), panel gain against distance, and write its page."""
+    """For `rislam-rt run` of a study: compute Fig. 4(a), panel gain against distance, and write its page."""
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     scene = opened.scene
     check_fig4a(scene, spec)
@@ -93,7 +93,7 @@ def run_gain_curves(spec: Fig4aSpec, given: StudyOptions) -> None:
 
 
 def run_swept(spec: SweptSpec, given: StudyOptions) -> None:
-    """Run a swept study (Fig. 4(b), rooms, ablations, ...) and write its page; exit code 1 if a cell failed."""
+    """For `rislam-rt run` of a swept study (rooms, ablations, ...): write its page; exit code 1 if a cell failed."""
     sweep = build_sweep(spec, given.pipeline, given.scene)
     found = build_cells(sweep)
     record, cells = swept_record(spec, sweep, given.pipeline), Path("sweeps") / spec.name
@@ -111,7 +111,7 @@ def run_cells(
     sweep: Sweep, cells: Path, limit: float | None, given: StudyOptions, record: Mapping[str, Any],
     write: Callable[[Sequence[Row]], Path | None], show: Callable[[Sequence[Row]], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run the cells of a study's sweep, rewriting its page as they end, and `show` them; exit code 1 if one failed."""
+    """For `rislam-rt run` of a study: its cells; page and `show` as they end; exit code 1 if one failed."""
     effort = SweepOptions(given.jobs or os.cpu_count() or 1, None, limit)
     try:
         with show_sweep() as tell:
@@ -128,7 +128,7 @@ def run_cells(
 
 
 def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
-    """Check the paper's claims against the results of other studies, and write the page."""
+    """For `rislam-rt run` of a study: check the paper's claims against the results of others, and write the page."""
     _refuse_scene(given, "claims", "runs in no room; leave it out")
     results = read_results(Path(os.path.normpath(given.pipeline.parent / spec.results)))
     found = judge(results)
@@ -141,7 +141,7 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
 
 
 def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
-    """Run the study in unseen random rooms, print the scores and write its page; exit code 1 if a room failed."""
+    """For `rislam-rt run` of the study in unseen rooms: print scores, write its page; exit code 1 if a room failed."""
     _refuse_scene(given, "unseen", "draws its rooms; leave it out")
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
@@ -171,7 +171,7 @@ PICTURES = {
 
 
 def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
-    """Train and score the classifier of multipath components, and write weights, page, data and figures."""
+    """For `rislam-rt run` of a study: train and score the classifier, and write weights, page, data and figures."""
     _refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]

@@ -68,9 +68,9 @@ def command(
 
 
 def _run(sweep: "Sweep", target: Path, effort: "SweepOptions") -> "SweepReport":
-    """Run a pipeline's sweep with a progress bar, updating scores and their figure as cells end."""
-    from rislam_rt.cli.progress import show_sweep
-    from rislam_rt.pipeline.run import prepare_channel
+    """Part of `rislam-rt sweep`: run the cells with a progress bar, updating scores and their figure as cells end."""
+    from rislam_rt.cli.progress_bars import show_sweep
+    from rislam_rt.pipeline.channels import prepare_channel
     from rislam_rt.report.studies.sweep import draw_scores
     from rislam_rt.studies.pipeline_sweep import score_rows, write_scores
     from rislam_rt.sweeps import build_cells, run_sweep

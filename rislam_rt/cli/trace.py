@@ -63,14 +63,14 @@ def command(
 
     Example: rislam-rt trace paper_room --stride 50 --deepmimo scenarios/paper_room
     """
-    from rislam_rt.cli.scenes import open_scene
+    from rislam_rt.cli.scene_arguments import open_scene
     from rislam_rt.errors import ConfigError
-    from rislam_rt.pipeline.run import prepare_channel
-    from rislam_rt.pipeline.signals import load_signals_spec, signal_settings
-    from rislam_rt.pipeline.specification.read import load_radio
+    from rislam_rt.pipeline.channels import prepare_channel
+    from rislam_rt.pipeline.signal_simulation import load_signals_spec, signal_settings
+    from rislam_rt.pipeline.specification.read_pipeline import load_radio
     from rislam_rt.report.exports.deepmimo import deepmimo_files
     from rislam_rt.report.terminal_tables import path_table, print_paths
-    from rislam_rt.scene.file_names import safe_name
+    from rislam_rt.scene.scene_folder import safe_name
     from rislam_rt.scene.write import write_files
 
     beyond = [word for word in set_ or () if not signals and not word.startswith("radio.")]
@@ -101,7 +101,7 @@ def command(
 
 
 def _check_new(folder: Path) -> None:
-    """Check the folder of `trace --deepmimo` before paths are traced: it must not exist, and have a name that loads."""
+    """Check the folder of `rislam-rt trace --deepmimo` before paths are traced: new, and of a name that loads."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.report.exports.deepmimo import check_name
 
@@ -111,7 +111,7 @@ def _check_new(folder: Path) -> None:
 
 
 def _part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
-    """Scene with the first `cycles` of its trajectory alone, of these every `stride`-th; an error if it has fewer."""
+    """Scene for `rislam-rt trace` with every `stride`-th of its first `cycles`; an error if it has fewer."""
     from dataclasses import replace
 
     from rislam_rt.errors import ConfigError
@@ -128,8 +128,8 @@ def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int,
     """Find all paths along a scene's trajectory, RIS panel at phase level 0, and write them to a file if given."""
     from time import perf_counter
 
-    from rislam_rt.pipeline.dataset import paths_to_dataset
-    from rislam_rt.pipeline.run import build_channel
+    from rislam_rt.pipeline.channels import build_channel
+    from rislam_rt.pipeline.run_datasets import paths_to_dataset
     from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
@@ -145,36 +145,40 @@ def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int,
 def _trace_signals(
     scene: "Scene", channel: str, depth: int, settings: Sequence[str], file: Path, warn: Callable[[], None]
 ) -> TraceResult:
-    """Find all paths under phase codes, simulate received samples and components, and write the data set to a file."""
+    """Write the signals of `rislam-rt trace --signals`: find paths under codes, simulate samples and components."""
     from itertools import count
     from time import perf_counter
 
     import numpy as np
 
-    from rislam_rt.cli.progress import show_progress
-    from rislam_rt.pipeline import signals
+    from rislam_rt.cli.progress_bars import show_progress
+    from rislam_rt.pipeline import signal_simulation
     from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
     check_output(file)
-    spec = signals.load_signals_spec(settings)
-    size = signals.signals_size(scene, spec)
-    signals.check_space(file, size)
+    spec = signal_simulation.load_signals_spec(settings)
+    size = signal_simulation.signals_size(scene, spec)
+    signal_simulation.check_space(file, size)
     warn()
     typer.echo(f"samples: {size}", err=True)
     codes, noise = np.random.default_rng(spec.seed).spawn(2)
     with show_progress() as tell:
         tell("trace", 0, 1)
         begin = perf_counter()
-        paths = signals.coded_paths(scene, channel, depth, spec, rng=codes)
+        paths = signal_simulation.coded_paths(scene, channel, depth, spec, rng=codes)
         seconds = perf_counter() - begin
         tell("trace", 1, 1)
         done = count(1)
-        data = signals.build_signals(
+        data = signal_simulation.build_signals(
             scene, paths, spec, rng=noise, on_cycle=lambda: tell("estimate", next(done), paths.num_cycles)
         )
     write_dataset(data.assign_attrs(history=MARK), file)
-    shape = {**size._asdict(), "file_bytes": file.stat().st_size, "mean_components": signals.mean_components(data)}
+    shape = {
+        **size._asdict(),
+        "file_bytes": file.stat().st_size,
+        "mean_components": signal_simulation.mean_components(data),
+    }
     return TraceResult(
         paths, seconds, AT_REST if spec.code == "zero" else spec.code,
         {"files": {"signals": str(file)}, "signals": shape},

@@ -55,7 +55,7 @@ def with_verbosity(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def with_switches(wrapped: Callable[..., Any], command: Callable[..., Any], **switches: Any) -> Callable[..., Any]:
-    """Give a wrapper of a command the command's signature with boolean options, such as `--quiet`, added."""
+    """Give a wrapper of a command the command's signature with options of verbosity, such as `--quiet`, added."""
     own = inspect.signature(command)
     more = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
             for name, kind in switches.items()]  # fmt: skip

@@ -3,8 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.design.objective import Objective
-from rislam_rt.design.problem import DesignProblem
 from rislam_rt.design.single_path import exact_code
 
 LARGE = 100
@@ -15,7 +15,8 @@ _WORTHWHILE = 1e-7
 
 
 def coordinate_descent(objective: Objective, index: Integers, levels: int, max_steps: int) -> tuple[Integers, Floats]:
-    """Improve a code (N M,) until no change of one element lowers the expected CRLB; and the objective by step.
+    """Improve a code (N M,) by coordinate descent until no change of one element lowers the expected CRLB; and the
+    objective by step.
 
     Each step values every change of one element, ranks the elements by what their best change gains, and applies the
     first m of them for the m = 1, 2, 4, ... that turns out best: never worse than the best single change.
@@ -43,7 +44,7 @@ def coordinate_descent(objective: Objective, index: Integers, levels: int, max_s
 
 
 def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """Elements whose best level change lowers the objective, best first, and that change less one for all."""
+    """Elements for coordinate descent whose best change lowers the objective, best first, and that change less one."""
     shift = objective.table[1:] - 1.0
     value = objective.value(gain + (weight[:, None] * objective.matrix) * shift[:, None, None])
     change = np.argmin(value, axis=0)
@@ -53,7 +54,7 @@ def _rank_by_value(objective: Objective, weight: Complexes, gain: Complexes, now
 
 
 def _rank_by_slope(objective: Objective, weight: Complexes, gain: Complexes, now: float) -> tuple[Integers, Integers]:
-    """As `_rank_by_value`, but to first order in the powers."""
+    """Elements for coordinate descent as `_rank_by_value` ranks them, but to first order in the powers."""
     size = 1e-6
     slope = (objective.value(gain * (1.0 + 0.5 * size * np.eye(len(gain)))) - now) / size
     shift = objective.table[1:] - 1.0
@@ -83,7 +84,7 @@ def _first_changes(index: Integers, order: Integers, change: Integers, levels: i
 
 
 def exact_codes(problem: DesignProblem) -> Integers:
-    """Code (N M,) with every panel at the exact optimum of its direct path's gain."""
+    """Start of coordinate descent: code (N M,) with every panel at the exact optimum of its direct path's gain."""
     return np.concatenate([exact_code(target, problem.levels)[0] for target in problem.targets])
 
 

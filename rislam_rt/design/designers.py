@@ -8,10 +8,10 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design.coordinate_descent import coordinate_search, exact_codes
+from rislam_rt.design.design_problem import DesignProblem
+from rislam_rt.design.design_result import Design, DesignConfig, Designer
 from rislam_rt.design.genetic import genetic_search
 from rislam_rt.design.objective import Objective, build_objective
-from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.result import Design, DesignConfig, Designer
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
@@ -35,7 +35,7 @@ _SEARCHES: Mapping[str, _Search] = {
 
 
 def _designer(name: str, search: _Search) -> Designer:
-    """Make a designer of a search: one that builds the objective, times the search and values its code."""
+    """Make a designer by name of a search: one that builds the objective, times the search and values its code."""
 
     def design(problem: DesignProblem, *, rng: np.random.Generator, config: DesignConfig = _DEFAULT) -> Design:
         begin = time.perf_counter()
@@ -51,7 +51,7 @@ def _describe(
     name: str, problem: DesignProblem, objective: Objective, found: Integers | Floats, history: Floats,
     seconds: float, certify: bool,
 ) -> Design:  # fmt: skip
-    """Value the code or phases found, and compare with the direct path's optimum and the relaxation bound."""
+    """Value the code or phases that a designer found: against the direct path's optimum and the relaxation bound."""
     step = 2.0 * np.pi / problem.levels
     discrete = np.issubdtype(found.dtype, np.integer)
     xi = np.asarray(found * step if discrete else found, dtype=np.float64)
@@ -72,7 +72,7 @@ def _describe(
 
 
 def _db(magnitude: Floats) -> Floats:
-    """Decibels 20 log10 (...,) of gain magnitudes, a gain of zero as -400 dB."""
+    """Decibels 20 log10 (...,) of the gain magnitudes by which designers are valued, a gain of zero as -400 dB."""
     return 20.0 * np.log10(np.maximum(magnitude, 1e-20))
 
 
@@ -94,19 +94,20 @@ def designer(method: str) -> Designer:
 
 
 def blind_design(method: str, code: RisCode) -> Design:
-    """Wrap a search code as a `Design` of outcome `NO_PATHS`, while nothing is known of the panel."""
+    """Wrap a search code as a designer's `Design` of outcome `NO_PATHS`, while nothing is known of the panel."""
     infinite = float("inf")
     return Design(method, code, code.xi, infinite, -infinite, 0.0, 0.0, np.array([infinite]), 0.0, Outcome.NO_PATHS)
 
 
 def best_magnitudes(problem: DesignProblem) -> Floats:
-    """Largest gain magnitude (B, P) that each panel path can reach by a code of its own, exact over the levels."""
+    """Largest gain magnitude (B, P) that each panel path of a design can reach by a code of its own, exactly."""
     samples, panel = problem.response.shape[:2]
     return exact_code(problem.response.reshape(samples, panel, -1), problem.levels)[1]
 
 
 def relaxation_bound(objective: Objective, best: Floats) -> float:
-    """Lower bound [m^2] of the expected CRLB over all codes, from the panel paths' own best gains (B, P).
+    """Lower bound [m^2] of the expected CRLB over all codes, against which designers are valued, from the paths' own
+    best gains (B, P).
 
     The information of these gains exceeds that of every code (as matrices), and the trace of the inverse falls with it.
     """

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.design.design_problem import DesignProblem
+from rislam_rt.design.design_result import DesignConfig
 from rislam_rt.design.designers import designer
-from rislam_rt.design.problem import DesignProblem
-from rislam_rt.design.result import DesignConfig
 from rislam_rt.design.single_path import exact_code
 
 
@@ -73,7 +73,7 @@ def gain_curves(
 
 
 def direct_only(problem: DesignProblem) -> DesignProblem:
-    """The same design problem with the direct panel path alone, as Fig. 4(a) optimises it."""
+    """Design problem of a gain curve: the same with the direct panel path alone, as Fig. 4(a) optimises it."""
     return DesignProblem(
         problem.response[:, :1], problem.static_gain[:, :0], problem.gradient[:, :1], problem.prior, problem.scale,
         problem.levels, least_power=problem.least_power,
@@ -81,5 +81,5 @@ def direct_only(problem: DesignProblem) -> DesignProblem:
 
 
 def _db(magnitude: Floats) -> Floats:
-    """Gain in decibels, 20 log10 (...,)."""
+    """Gain in decibels of a gain curve, 20 log10 (...,)."""
     return 20.0 * np.log10(magnitude)

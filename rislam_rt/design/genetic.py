@@ -3,8 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.design.design_result import DesignConfig
 from rislam_rt.design.objective import Objective
-from rislam_rt.design.result import DesignConfig
 
 
 def genetic_search(
@@ -46,7 +46,7 @@ def genetic_search(
 
 
 def _mutations(genes: int, levels: int, probability: float, *, rng: np.random.Generator) -> tuple[Integers, Integers]:
-    """Draw which of a number of genes mutate, each independently with the same probability, and their new levels."""
+    """Draw which of the genetic algorithm's genes mutate, all with one probability, and their new levels."""
     # The gaps between mutated genes are geometric, so that only those are drawn.
     if probability == 0.0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)

@@ -4,7 +4,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.design.problem import DesignProblem, problem_from_arrays
+from rislam_rt.design.design_problem import DesignProblem, problem_from_arrays
 from rislam_rt.design.single_path import exact_code
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import vertex_gradient
@@ -12,13 +12,14 @@ from rislam_rt.model import PathKind, Paths, RadioConfig, RisCode
 
 
 def panel_columns(paths: Paths, cycle: int) -> Integers:
-    """Columns (P,) of the valid paths of a cycle that meet a panel, the direct ones first."""
+    """Columns (P,) of a cycle's true paths that meet a panel, for the genie's design, the direct ones first."""
     over_panel = np.flatnonzero(paths.valid[cycle] & np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS)))
     return over_panel[np.argsort(paths.kind[over_panel] != PathKind.RIS, kind="stable")]
 
 
 def focus_codes(paths: Paths, levels: int) -> RisCode:
-    """Codes (K, N, M) that focus every panel on its direct path, one a cycle, from true paths; level 0 where hidden.
+    """Codes (K, N, M) of a genie that focus every panel on its direct path, one a cycle, from true paths; level 0 where
+    hidden.
 
     Raises
     ------
@@ -40,7 +41,7 @@ def problem_from_paths(
     paths: Paths, tx: Floats, rx: Floats, radio: RadioConfig, levels: int, *, cycle: int = 0,
     prior: Floats | None = None, least_snr: float = 0.0,
 ) -> DesignProblem:  # fmt: skip
-    """Design problem on the true paths of one cycle: landmark paths only (no LOS, no VT).
+    """Design problem of the genie, on the true paths of one cycle: landmark paths only (no LOS, no VT).
 
     `tx`, `rx` (3,) [m] are the agent's ends at that cycle.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.design.problem import DesignProblem
+from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.information import Outcome
 
 
@@ -30,7 +30,7 @@ class Objective:
     """`UNOBSERVABLE` if no code makes the information regular: then the objective is `1 / tr J`."""
 
     def gains(self, weight: Complexes) -> Complexes:
-        """Gains (..., B P) of the panel paths at all samples under element weights (..., N M)."""
+        """Gains (..., B P) of panel paths, for the objective, at all samples under element weights (..., N M)."""
         return weight @ self.matrix
 
     def value(self, gain: Complexes) -> Floats:
@@ -54,7 +54,8 @@ class Objective:
         return self.value(self.gains(self.table[index]))
 
     def _inverse_trace(self, information: Floats) -> Floats:
-        """Trace (...,) of the inverse of 2 x 2 information matrices (..., 3); 1 / trace of them where unobservable."""
+        """Objective from information matrices (..., 3): the trace (...,) of the inverse; 1 / trace of them where
+        unobservable."""
         xx, xy, yy = information[..., 0], information[..., 1], information[..., 2]
         trace = xx + yy
         if self.outcome is Outcome.UNOBSERVABLE:
@@ -95,7 +96,7 @@ def build_objective(problem: DesignProblem) -> Objective:
 
 
 def detected_power(power: Floats, least: float) -> Floats:
-    """Path powers (...,) times their approximate detection probability, `1 / (1 + (least / power)^4)`."""
+    """Path powers (...,) in the objective times about the detection probability, `1 / (1 + (least / power)^4)`."""
     if least == 0.0:
         return power
     ratio = (power / least) ** 2

@@ -11,7 +11,8 @@ from rislam_rt.arrays import Complexes, Floats, Integers
 
 
 def exact_code(response: Complexes, levels: int) -> tuple[Integers, Floats]:
-    """Phase levels (..., N) that maximise the gain of element responses (..., N) exactly, and its magnitude (...,).
+    """Code for a single path: phase levels (..., N) that maximise the gain of element responses (..., N) exactly, and
+    its magnitude (...,).
 
     O(N log N), vectorised over the batch.
     """

@@ -9,7 +9,7 @@ from rislam_rt.evaluate.confidence_intervals import (
     rms_over_runs,
     share_interval,
 )
-from rislam_rt.evaluate.errors import align, normalised_squares, position_errors, rmse, root_mean_square
+from rislam_rt.evaluate.estimation_errors import align, normalised_squares, position_errors, rmse, root_mean_square
 from rislam_rt.evaluate.plane_matching import (
     NEAR_ANGLE,
     NEAR_WALL,

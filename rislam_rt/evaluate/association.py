@@ -25,8 +25,8 @@ class AssociationScore(NamedTuple):
 
 
 def association_score(label: Integers, truth: Integers) -> AssociationScore:
-    """Score the labels (T,) that a filter gave measurements against their true identities (T,), in the order of time;
-    -1 is none.
+    """Score of data association: the labels (T,) that a filter gave measurements against their true identities (T,), in
+    the order of time; -1 is none.
 
     Labels are numbers of the agent's own. Each is first given the identity with which it agrees most often, one to one
     (the assignment that gets the most measurements right), so a split or merged track costs what it loses.
@@ -52,7 +52,7 @@ def association_fractions(labels: Integers, identities: Integers, counts: Intege
 
 
 def label_switches(label: Integers, truth: Integers) -> int:
-    """Number of times that a true identity's label differs from its last one; -1 does not count."""
+    """Score of association: number of times that a true identity's label changes; -1 does not count."""
     switches = 0
     both = (np.asarray(label) != NONE) & (np.asarray(truth) != NONE)
     for identity in np.unique(np.asarray(truth)[both]):

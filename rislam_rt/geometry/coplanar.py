@@ -48,7 +48,7 @@ def tracer_gap(bounds: Floats) -> float:
 
 
 def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floats, gap: float) -> CoplanarStack:
-    """Find the pairs of a room's W walls that overlap in one plane.
+    """Find the coplanar pairs of a room's W walls that overlap.
 
     Two walls lie on each other when their normals (W, 3) agree within `COPLANAR_ANGLE`, all corners of the smaller are
     within `gap` [m] of the larger's plane, and they overlap by more than `gap`. The smaller lies on the larger; of two
@@ -76,7 +76,8 @@ def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floa
 
 
 def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
-    """Whether triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by more than `depth` [m] anywhere.
+    """Whether coplanar triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by more than `depth` [m]
+    anywhere.
 
     Two triangles are apart if their shadows on a normal to one of their six edges are (separating axes).
     """
@@ -90,7 +91,7 @@ def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
 
 
 def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
-    """Whether any pair of two-dimensional triangles (A, 3, 2) and (B, 3, 2) overlaps by more than `depth` [m]."""
+    """Whether any pair of coplanar triangles (A, 3, 2) and (B, 3, 2) overlaps by more than `depth` [m]."""
     boxed = np.minimum(a.max(axis=1)[:, None], b.max(axis=1)) - np.maximum(a.min(axis=1)[:, None], b.min(axis=1))
     i, j = np.nonzero((boxed > depth).all(axis=-1))
     pair_a, pair_b = a[i], b[j]
@@ -106,7 +107,7 @@ def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:
 
 
 def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) -> list[tuple[int, int]]:
-    """Pairs of walls of nearly one normal, one corner (W, 3) near the other's plane, found by sorted normals."""
+    """Pairs of walls that may be coplanar: one normal, one corner (W, 3) near the other's plane, by sorted normals."""
     key = np.abs(normal @ np.array([0.36, 0.48, 0.80]))
     order = np.argsort(key, kind="stable")
     found: list[tuple[int, int]] = []

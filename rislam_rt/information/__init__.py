@@ -16,7 +16,7 @@ from rislam_rt.information.landmark_model import (
     build_landmark_model,
     fewer_rows,
 )
-from rislam_rt.information.position import (
+from rislam_rt.information.position_bound import (
     GradientMode,
     Outcome,
     position_bound,

@@ -7,7 +7,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.information.position import range_information
+from rislam_rt.information.position_bound import range_information
 from rislam_rt.model import RadioConfig, RxArray
 
 
@@ -45,7 +45,7 @@ def cosine_information(snr_per_antenna: Floats, radio: RadioConfig) -> Floats:
 
 @lru_cache(maxsize=64)
 def _aperture(array: RxArray, wavelength: float) -> Floats:
-    """Second moments (2,) [m^2] `sum_l x_l^2` of the array's element positions along both axes; read-only."""
+    """Second moments (2,) [m^2] `sum_l x_l^2` of the array along both axes, from which accuracy follows; read-only."""
     positions = array.positions(wavelength)[:, :2]
     spread = np.sum((positions - positions.mean(axis=0)) ** 2, axis=0)
     spread.flags.writeable = False

@@ -12,7 +12,7 @@ import numpy as np
 from rislam_rt.arrays import Complexes, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.information.position import Outcome
+from rislam_rt.information.position_bound import Outcome
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import autocorrelation
 
@@ -30,7 +30,8 @@ class EquivalentDelayInformation(NamedTuple):
 
 
 def steering(arrival: Floats, radio: RadioConfig, heading: Floats | float = 0.0) -> Complexes:
-    """Antenna vectors (..., P, L) `exp(j 2 pi x_l . a / lambda)` of arrival directions (..., P, 3), room frame."""
+    """Antenna vectors (..., P, L) `exp(j 2 pi x_l . a / lambda)` of directions (..., P, 3), for the information on
+    delays and gains."""
     body = arrival @ rotation_z(np.asarray(heading, dtype=np.float64))
     return np.exp(2j * np.pi / radio.wavelength * body @ radio.array.positions(radio.wavelength).T)
 

@@ -35,7 +35,7 @@ def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
 
 
 def _detected(snr: Floats, threshold: float) -> Floats:
-    """Detection probability at linear SNRs, from a table over 40 dB about the threshold: 0 below that, 1 above."""
+    """Probability that a path is heard at linear SNRs, by a table over 40 dB about the threshold; 0 below, 1 above."""
     decibel = np.linspace(-20.0, 20.0, 401)
     table = detection_probability(threshold * 10.0 ** (decibel / 10.0), threshold)
     with np.errstate(divide="ignore"):

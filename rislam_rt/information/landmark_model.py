@@ -17,7 +17,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.bistatic import cosine_gradient
 from rislam_rt.geometry.planes import mirror_chain, plane_tangents
 from rislam_rt.information.accuracy import cosine_information
-from rislam_rt.information.position import range_information
+from rislam_rt.information.position_bound import range_information
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 Unknown = Literal["known", "planes", "images"]
@@ -85,7 +85,8 @@ class LandmarkModel:
         return len(self.labels)
 
     def prior_std(self, length: float = 10.0, tilt: float = 0.5) -> Floats:
-        """Prior standard deviations (U,) of the unknowns, by coordinate and offset (`length` [m]) or tilt [rad]."""
+        """Prior standard deviations (U,) of the unknown landmarks and walls, by coordinate and offset (`length` [m]) or
+        tilt [rad]."""
         return np.array([tilt if " tilt " in label else length for label in self.labels])
 
     def landmark_error(self, covariance: Floats) -> dict[str, float]:
@@ -227,7 +228,8 @@ def build_landmark_model(
 
 
 def _points_seen(paths: Paths) -> tuple[list[tuple[int, ...]], Integers]:
-    """Fixed points of paths as (landmark, walls that mirror it in turn), and which of them Tx and Rx see (2, P)."""
+    """Fixed points of the landmark model's paths as (landmark, walls that mirror it in turn), and which of them Tx and
+    Rx see (2, P)."""
     keys: dict[tuple[int, ...], int] = {}
     seen = np.full((2, paths.num_paths), -1, dtype=np.int64)
     for path in np.flatnonzero(paths.landmark >= 0):

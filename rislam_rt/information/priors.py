@@ -71,7 +71,7 @@ class MotionPrior:
 
     @property
     def accelerations(self) -> Floats:
-        """Standard deviations (axes,) [m/s^2] of the white-noise acceleration of each axis."""
+        """Prior standard deviations (axes,) [m/s^2] of the white-noise acceleration of each axis."""
         sigma = np.full(self.axes, self.acceleration)
         if self.climb is not None:
             sigma[2] = self.climb
@@ -79,7 +79,7 @@ class MotionPrior:
 
     @property
     def start(self) -> Floats:
-        """Standard deviations (2 axes,) of position and velocity at the start [m, m/s]."""
+        """Prior standard deviations (2 axes,) of position and velocity at the start [m, m/s]."""
         std = np.repeat([self.start_position, self.start_velocity], self.axes)
         if self.climb is not None:
             std[[2, 5]] = 0.0

@@ -39,7 +39,8 @@ def resolved_probability(gap: Floats, snr: Floats, sensor: SensorModel) -> Float
 
 
 def certainty_share(gap: Floats, radio: RadioConfig) -> Floats:
-    """Ratio (..., `PHASES`) of a lone path's amplitude variance to that beside a second path: 1 far from it.
+    """Ratio (..., `PHASES`) of a lone path's amplitude variance to that beside a second path, for resolution: 1 far
+    from it.
 
     From the joint Cramer-Rao bound of two paths, complex amplitudes, delays and both cosines unknown: it
     depends on their gap (..., 3) and relative phase, not on how strong the other is.
@@ -58,7 +59,7 @@ def certainty_share(gap: Floats, radio: RadioConfig) -> Floats:
 
 
 def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
-    """Inner products (..., 8, 8) of the signals of two paths and of their derivatives, all of unit norm."""
+    """Inner products (..., 8, 8) of the signals of two paths to resolve and of their derivatives, all of unit norm."""
     array = radio.array
     nodes, weight = np.polynomial.legendre.leggauss(BAND_NODES)
     rows, cols = ((np.arange(count) - (count - 1) / 2.0) * array.spacing for count in (array.rows, array.cols))
@@ -76,7 +77,8 @@ def _inner_products(gap: Floats, radio: RadioConfig) -> Complexes:
 
 
 def _block(gap: Floats, axes: list[tuple[Any, Any]]) -> Complexes:
-    """Inner products (..., 4, 4) of a path's signal and derivatives with those of another a `gap` (..., 3) away."""
+    """Inner products (..., 4, 4), for resolution, of one path's signal and derivatives with those of another a `gap`
+    (..., 3) away."""
     moments = []
     for axis, (place, weight) in enumerate(axes):
         wave = np.exp(2j * np.pi * np.multiply.outer(gap[..., axis], place)) * weight

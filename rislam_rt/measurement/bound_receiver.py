@@ -22,10 +22,10 @@ from rislam_rt.measurement.components import (
     single,
 )
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.detection_threshold import build_sensor, draw_false_alarms
 from rislam_rt.measurement.joint_bound import joint_errors
 from rislam_rt.measurement.panel_probability import panel_probability
-from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sensor_model import build_sensor, draw_false_alarms
+from rislam_rt.measurement.received_paths import Received
 from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Measurement, PathTruth, RadioConfig, SensorModel
 

@@ -21,7 +21,7 @@ from rislam_rt.measurement.estimation.estimate import estimate_paths
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import fit_amplitudes
 from rislam_rt.measurement.hardware import Correction, image_spectrum
-from rislam_rt.measurement.signal import num_tones
+from rislam_rt.measurement.received_signal import num_tones
 from rislam_rt.model import Body, RadioConfig
 
 FAINTEST = (0.3, 0.1, 0.03, 0.01, 0.003)
@@ -90,7 +90,7 @@ def calibrate(
 
 
 def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> CalibrationReference:
-    """Inputs of calibration that follow from the body's drawing and the settings of radio and receiver."""
+    """What is known before calibration, from the body's drawing and the settings of radio and receiver."""
     span = body.tx_offset - body.rx_offset
     length = float(np.linalg.norm(span))
     sounding = build_sounding(num_tones(radio, config), radio)
@@ -100,7 +100,7 @@ def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Calibratio
 
 
 def _chains(mean: Complexes, direct: Complexes) -> Complexes:
-    """Complex gains (L,) of the receive chains, of mean one, from the direct path in the mean samples (L, M)."""
+    """Complex gains (L,) of the receive chains by calibration, of mean one, from the direct path in samples (L, M)."""
     chains = np.sum(mean * direct.conj(), axis=1)
     return np.asarray(chains / np.mean(chains))
 
@@ -121,7 +121,8 @@ def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:
-    """Array matrix (L, L) of coupling and chain gains: regularised least squares from ideal to received (T, L, M)."""
+    """Array matrix (L, L) of coupling and chain gains by calibration: regularised least squares from ideal to received
+    (T, L, M)."""
     # The prior is the diagonal of `matrix`, of deviation `stray` for every entry; `spread` is the variance of a tone's
     # misfit.
     prior = spread / stray**2
@@ -131,7 +132,8 @@ def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread:
 
 
 def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
-    """Leakage residue (L, M), the constant part of unexplained samples (T, L, M), and the variance of the rest."""
+    """Leakage residue (L, M) by calibration, constant part of unexplained samples (T, L, M), and the rest's
+    variance."""
     mean = rest.mean(axis=0)
     spread = float(np.mean(np.abs(rest - mean) ** 2)) * len(rest) / max(len(rest) - 1, 1)
     power = float(np.mean(np.abs(mean) ** 2))
@@ -139,7 +141,8 @@ def _constant_residue(rest: Complexes) -> tuple[Complexes, float]:
 
 
 def _image(rest: Complexes, heard: Complexes) -> Complexes:
-    """Complex amplitude (L,) of the mixers' image of the band, from unexplained and received samples (T, L, M)."""
+    """Complex amplitude (L,) of the mixers' image of the band by calibration, from unexplained and received samples (T,
+    L, M)."""
     # At rest an image is the same as a chain's gain.
     rest, other = (part - part.mean(axis=0) for part in (rest, image_spectrum(heard)))
     return np.asarray(np.einsum("tlm,tlm->l", rest, other.conj()) / np.sum(np.abs(other) ** 2, axis=(0, 2)))

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std, measurement_std
-from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import RadioConfig, SensorModel
 
 DISC_STD = 0.5
@@ -65,7 +65,7 @@ def path_std(snr: Floats, radio: RadioConfig) -> tuple[Floats, Floats]:
 
 
 def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
-    """Merge paths of one capture that are closer than a resolution cell into components, from the strongest down."""
+    """Merge paths of one capture closer than a resolution cell into multipath components, from the strongest down."""
     cell = np.ones((len(received.tau), len(received.tau)), dtype=bool)
     for value in in_resolution_cells(
         received, sensor.radio
@@ -75,7 +75,7 @@ def merge(received: Received, sensor: SensorModel) -> NoiselessComponents:
 
 
 def join(received: Received, leader: Integers) -> NoiselessComponents:
-    """Sum the paths of the same leader (N,), a row of `received`, to one component each.
+    """Sum the paths of the same leader (N,), a row of `received`, to one multipath component each.
 
     The joint gain is the sum. Delay and cosines are those at which one path fits the sum best, to first order
     `Re sum_i alpha_i conj(alpha) tau_i / |alpha|^2`, kept between the members' own.
@@ -106,36 +106,36 @@ def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -
 
 
 def select_paths(received: Received, keep: Booleans) -> Received:
-    """Select the received paths that are marked (N,)."""
+    """Select the received paths that are marked (N,), from which components are made."""
     return Received._make(field[keep] for field in received)
 
 
 def in_resolution_cells(received: Received, radio: RadioConfig) -> Floats:
-    """Delays and direction cosines (N, 3) of received paths in resolution cells; 0 along an axis without aperture."""
+    """Delays and direction cosines (N, 3) of received paths in resolution cells, by which they merge to components."""
     array = radio.array
     widths = [count * array.spacing if count > 1 else 0.0 for count in (array.rows, array.cols)]
     return np.column_stack([received.tau * radio.bandwidth, received.direction[:, :2] * widths])
 
 
 def clip_to_unit_disc(cosines: Floats) -> Floats:
-    """Clip direction cosines (..., 2) radially to the unit disc."""
+    """Clip the direction cosines (..., 2) of components radially to the unit disc."""
     length = np.linalg.norm(cosines, axis=-1, keepdims=True)
     return cosines / np.maximum(length, 1.0)
 
 
 def capped_cosine_std(deviation: Floats, radio: RadioConfig) -> Floats:
-    """Standard deviations (N, 2) of direction cosines, at most `DISC_STD`, as along an axis without aperture."""
+    """Standard deviations (N, 2) of a component's cosines, at most `DISC_STD`, as along an axis without aperture."""
     blind = np.array([radio.array.rows, radio.array.cols]) < 2
     return np.where(blind, DISC_STD, np.minimum(deviation, DISC_STD))
 
 
 def blind_axes(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Direction cosines (N, 2) set to zero along axes of the array without aperture, where nothing is measured."""
+    """Direction cosines (N, 2) of components, zero along axes without aperture, where nothing is measured."""
     return cosines * (np.array([radio.array.rows, radio.array.cols]) > 1)
 
 
 def _leaders(strength: Floats, cell: Booleans) -> Integers:
-    """Leaders (N,) of paths: for each the strongest free path of its resolution cell, with which it merges."""
+    """Leaders (N,) of paths that merge to components: for each the strongest free path of its resolution cell."""
     crowded = np.count_nonzero(cell, axis=1) > 1
     leader = np.where(crowded, -1, np.arange(len(strength)))
     rows = crowded.nonzero()[0]

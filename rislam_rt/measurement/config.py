@@ -98,3 +98,18 @@ class ReceiverConfig:
     def num_captures(self) -> int:
         """Number of captures a cycle: one, or with alternation the codes' sum and one difference for each panel."""
         return 1 + self.panels if self.alternation else 1
+
+
+def check_half_turn(levels: int) -> None:
+    """Check that half a turn is among the phase levels of a panel, as a receiver that alternates codes needs it.
+
+    Raises
+    ------
+    ConfigError
+        Their number is odd.
+    """
+    if levels % 2:
+        raise ConfigError(
+            f"ris.levels: {levels} received; alternation needs an even number of phase levels, half a turn among "
+            "them; give one, or receiver.alternation = false, which holds one code for the whole slot"
+        )

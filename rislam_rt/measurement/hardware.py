@@ -15,7 +15,7 @@ import scipy
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.signal import add_noise, convert, num_tones, to_samples, to_tones
+from rislam_rt.measurement.received_signal import add_noise, convert, num_tones, to_samples, to_tones
 from rislam_rt.model import RadioConfig
 
 LARGEST = 1e12
@@ -170,12 +170,13 @@ def correct(samples: Complexes, unit: float, correction: Correction) -> Complexe
 
 
 def draw_gain_variation(config: HardwareConfig, *, rng: np.random.Generator) -> float:
-    """Draw the gain control's gain in one cycle, an amplitude ratio."""
+    """Draw a hardware fault: the gain control's gain in one cycle, an amplitude ratio."""
     return float(10.0 ** (config.agc_std_db * rng.standard_normal() / 20.0)) if config.agc_std_db else 1.0
 
 
 def scaled_to_fit(samples: Complexes, other: Complexes) -> Complexes:
-    """Scale samples (L, M) by the complex factor that fits `other` best; both share direct path and wall returns."""
+    """Scale samples (L, M) of a faulty front end by the complex factor that fits `other` best; both share direct path
+    and wall returns."""
     return np.asarray(samples * (np.vdot(samples, other) / np.vdot(samples, samples)))
 
 
@@ -187,7 +188,8 @@ def image_spectrum(spectrum: Complexes) -> Complexes:
 def _with_phase_noise(
     spectrum: Complexes, config: HardwareConfig, radio: RadioConfig, rng: np.random.Generator
 ) -> Complexes:
-    """Tones (L, M) with the oscillator's phase noise from sample to sample and its phase step from code to code."""
+    """Tones (L, M) with a hardware fault, the oscillator's phase noise from sample to sample and its phase step from
+    code to code."""
     if config.phase_step_deg:
         spectrum = spectrum * np.exp(1j * np.radians(config.phase_step_deg) * rng.standard_normal())
     if not config.phase_noise_deg:
@@ -197,7 +199,8 @@ def _with_phase_noise(
 
 
 def _neighbours(positions: Floats, spacing: float) -> Complexes:
-    """Mutual coupling (L, L) of antennas relative to nearest neighbours': as one over the distance, with its phase."""
+    """Hardware fault of mutual coupling (L, L) of antennas relative to nearest neighbours': as one over the distance,
+    with its phase."""
     distance = np.linalg.norm(positions[:, None] - positions, axis=-1)
     apart = np.where(distance > 0.0, distance, np.inf)
     phase = np.exp(-2j * np.pi * (np.where(distance > 0.0, distance, spacing) - spacing))
@@ -236,7 +239,8 @@ def _distortion(config: HardwareConfig, radio: RadioConfig, left: float | None) 
 
 
 def _clipped(level: float) -> float:
-    """Power of clipping errors of a Gaussian signal clipped above `level` deviations, relative to its own; 0: none."""
+    """Power of clipping errors of a converter (hardware), of a Gaussian signal clipped above `level` deviations,
+    relative to its own."""
     if not level:
         return 0.0
     tail = 0.5 * scipy.special.erfc(level / np.sqrt(2.0))

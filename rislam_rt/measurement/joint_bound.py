@@ -7,8 +7,8 @@ from rislam_rt.measurement.components import ComponentErrors, NoiselessComponent
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
-from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.signal import num_tones
+from rislam_rt.measurement.received_paths import Received
+from rislam_rt.measurement.received_signal import num_tones
 from rislam_rt.model import RadioConfig
 
 LEAST_CERTAINTY = 2.0

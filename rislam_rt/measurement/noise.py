@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.received import receive
+from rislam_rt.measurement.received_paths import receive
 from rislam_rt.model import Paths, RadioConfig
 from rislam_rt.waveform import delay_response, subcarrier_frequencies
 
@@ -17,7 +17,8 @@ REFERENCE_DISTANCE = 3.0
 
 
 def reference_gain(radio: RadioConfig) -> float:
-    """Path gain |alpha| of the sphere of reference, 3 m away: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5 d^2)`."""
+    """Path gain |alpha| of the reference for the SNR, a sphere 3 m away: `lambda sqrt(Gt Gr sigma) / ((4 pi)^1.5
+    d^2)`."""
     rcs = np.pi * REFERENCE_RADIUS**2
     free_space = radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain * rcs)
     return float(free_space / ((4.0 * np.pi) ** 1.5 * REFERENCE_DISTANCE**2))

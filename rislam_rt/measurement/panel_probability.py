@@ -54,7 +54,8 @@ def panel_probability(
 
 
 def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
-    """Amplitude ratios (`SHIFTS`,) at which moving paths leak from capture `of` into capture `into`, by Doppler shift.
+    """Amplitude ratios (`SHIFTS`,) at which moving paths leak from capture `of` into capture `into`, for the panel's
+    probability.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
@@ -66,7 +67,8 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
 def _leak_odds(
     found: ReportedComponents, sources: ReportedComponents, factors: Complexes, radio: RadioConfig
 ) -> Floats:
-    """Odds (N,) of each component for being the leak of another capture's source, against a path of its own."""
+    """Odds (N,) of each component for being the leak of another capture's source, against a path of its own, for the
+    panel's probability."""
     array = radio.array
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     gap = found.points[:, None] - sources.points
@@ -82,5 +84,5 @@ def _leak_odds(
 
 
 def _pick(found: ReportedComponents, rows: Booleans) -> ReportedComponents:
-    """Select multipath components by row."""
+    """Select by row the multipath components whose panel probability is asked."""
     return ReportedComponents._make(field[rows] for field in found)

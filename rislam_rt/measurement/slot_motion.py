@@ -12,7 +12,7 @@ import scipy
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.received_paths import Received
 
 
 @lru_cache(maxsize=64)

@@ -86,7 +86,7 @@ class TrackInfo(NamedTuple):
 
 
 def init_tracks() -> TrackState:
-    """Empty set of tracks, with which tracking begins."""
+    """Empty set of tracks of multipath components, with which tracking begins."""
     none = np.zeros(0, dtype=np.int64)
     return TrackState(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, 0)
 
@@ -94,7 +94,8 @@ def init_tracks() -> TrackState:
 def step_tracks(
     state: TrackState, measurement: Measurement, dt: float, config: TrackingConfig
 ) -> tuple[TrackState, TrackInfo]:
-    """Predict tracks over `dt` [s], assign this cycle's components to them, update, start and end tracks."""
+    """Track multipath components over a cycle: predict tracks over `dt` [s], assign components to them, update, start
+    and end tracks."""
     seen = np.column_stack([SPEED_OF_LIGHT * measurement.tau, measurement.cosines])
     noise = config.std_scale**2 * np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std]) ** 2
     loudness = np.log(np.maximum(measurement.amplitude, 1e-300))
@@ -130,7 +131,7 @@ def step_tracks(
 
 
 def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState:
-    """Kalman prediction of tracks over `dt` [s] by discrete white-noise acceleration."""
+    """Kalman prediction of tracks of multipath components over `dt` [s] by discrete white-noise acceleration."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     shape = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
     strength = np.array([config.length_acceleration, config.cosine_acceleration, config.cosine_acceleration]) ** 2
@@ -141,7 +142,7 @@ def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState
 def _assign(
     state: TrackState, seen: Floats, noise: Floats, loudness: Floats, config: TrackingConfig
 ) -> tuple[Integers, Integers]:
-    """Optimal assignment of tracks to components within the gate: rows of tracks, rows of components."""
+    """Optimal assignment of tracks to multipath components within the gate: rows of tracks, rows of components."""
     innovation = seen - state.mean[:, None, :, 0]
     spread = state.covariance[:, None, :, 0, 0] + noise
     distance = np.sum(innovation**2 / spread, axis=-1)
@@ -156,14 +157,14 @@ def _assign(
 
 
 def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Kalman update of tracks by their components, (N, 3) independent pairs of value and rate."""
+    """Kalman update of tracks of multipath components by their components, (N, 3) pairs of value and rate."""
     gain = covariance[..., :, 0] / (covariance[..., 0, 0] + noise)[..., None]
     mean = mean + gain * (seen - mean[..., 0])[..., None]
     return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]
 
 
 def _start(seen: Floats, noise: Floats, config: TrackingConfig) -> tuple[Floats, Floats]:
-    """Mean and covariance of new tracks of one component each: its value, and a rate about 0."""
+    """Mean and covariance of new tracks of multipath components, one component each: its value, a rate about 0."""
     mean = np.stack([seen, np.zeros_like(seen)], axis=-1)
     covariance = np.zeros((*seen.shape, 2, 2))
     covariance[..., 0, 0] = noise

@@ -4,7 +4,7 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Complexes, Floats, Integers
-from rislam_rt.measurement.received import Received
+from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import RadioConfig
 
 TOLERANCE = 0.3

@@ -47,7 +47,8 @@ def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats
 
 
 def unmirrored(cosines: Floats, radio: RadioConfig) -> Floats:
-    """Direction cosines (N, 2), those outside the unit disc moved into it by an array's period (grating lobe)."""
+    """Direction cosines (N, 2) whose variance is inflated, those outside the unit disc moved into it by an array's
+    period (grating lobe)."""
     period = 1.0 / radio.array.spacing
     outside = np.linalg.norm(cosines, axis=-1, keepdims=True) > 1.0
     return np.where(outside, cosines - period * np.round(cosines / period), cosines)

@@ -9,15 +9,15 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement.components import ReportedComponents, capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.detection_threshold import detection_threshold
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
 from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding
 from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import panel_probability
-from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sensor_model import detection_threshold
-from rislam_rt.measurement.signal import num_tones, tones
+from rislam_rt.measurement.received_paths import Received
+from rislam_rt.measurement.received_signal import num_tones, tones
 from rislam_rt.measurement.slot_motion import codes_in_turn, split_by_code
 from rislam_rt.measurement.true_identity import identify
 from rislam_rt.measurement.variance_inflation import crowding, mirror_variance, peak_bias, unmirrored
@@ -59,7 +59,8 @@ def capture(
     received: Received, radio: RadioConfig, config: ReceiverConfig, front_end: FrontEnd | None = None,
     leakage: complex = 0.0, *, rng: np.random.Generator,
 ) -> list[Capture]:  # fmt: skip
-    """Simulate the received samples of a cycle: one capture, or with alternation the sum and differences of codes.
+    """Simulate what the waveform receiver samples in a cycle: one capture, or with alternation the sum and differences
+    of codes.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.
@@ -121,7 +122,8 @@ def measure_waveform(
 
 
 def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig, config: ReceiverConfig) -> Integers:
-    """Column (N,) of the true path that each estimated component most likely is, of its capture's; -1 for none."""
+    """Column (N,) of the true path of its capture that each component of the waveform receiver likely is; -1 for
+    none."""
     path = np.full(len(found.tau), -1)
     for number, heard in enumerate(split_by_code(received, config)):
         mine = found.capture == number
@@ -130,7 +132,8 @@ def true_paths(found: DetectedComponents, received: Received, radio: RadioConfig
 
 
 def to_measurement(found: DetectedComponents, radio: RadioConfig, config: ReceiverConfig) -> Measurement:
-    """Measurement of the agent from estimated components, with the probability that each came over the panel."""
+    """Measurement that the waveform receiver reports of estimated components, with the probability that each came over
+    the panel."""
     told: tuple[Any, ...] = ()
     if config.alternation:
         points, deviation = (
@@ -145,7 +148,7 @@ def to_measurement(found: DetectedComponents, radio: RadioConfig, config: Receiv
 
 
 def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Floats:
-    """Parameters (Q, 3) of the previous cycle's components of the same capture, where the estimator's search begins."""
+    """Parameters (Q, 3) of the last cycle's components, of one capture, where the waveform receiver's search begins."""
     if previous is None:
         return NOTHING
     mine = np.ones(len(previous), dtype=bool)
@@ -156,7 +159,7 @@ def _known(one: Capture, radio: RadioConfig, previous: Measurement | None) -> Fl
 
 
 def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Floats) -> DetectedComponents:
-    """Estimate the components of one capture, their standard deviations inflated for what the bound leaves out."""
+    """Components that the waveform receiver estimates in one capture, with what the bound leaves out in their stds."""
     window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
@@ -183,14 +186,14 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
 def _searched(
     count: int, window: tuple[float, float], radio: RadioConfig, config: ReceiverConfig
 ) -> tuple[Sounding, MatchedFilterGrid]:
-    """Sounding of `count` tones, and the matched filter's grid over a window of delays in resolution cells."""
+    """Sounding of `count` tones for the waveform receiver, and its grid over a window of delays in resolution cells."""
     sounding = build_sounding(count, radio, element_exact=config.element_exact)
     return sounding, build_grid(sounding, window)
 
 
 def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
-    """Components after merging estimated paths that cannot be resolved: parameters (N, 3), gains (N,), their standard
-    deviations (N, 3), (N,)."""
+    """Components of the waveform receiver after merging estimated paths that cannot be resolved: parameters (N, 3),
+    gains (N,), their standard deviations (N, 3), (N,)."""
     # Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
     parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
     label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
@@ -211,7 +214,7 @@ def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats
 
 
 def _groups(parameters: Floats, doubtful: Booleans, radio: RadioConfig) -> Integers:
-    """Number (P,) of each estimated path's component: unresolved ones join their nearest neighbour within a cell."""
+    """Component (P,) that each path of the waveform receiver joins: unresolved ones their nearest neighbour's."""
     count = len(parameters)
     label = np.arange(count)
     if count < 2:

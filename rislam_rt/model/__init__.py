@@ -18,7 +18,7 @@ from rislam_rt.model.ris import (
     join_sheets,
 )
 from rislam_rt.model.scene import Material, Occluder, Reflector, Scatterer, Scene
-from rislam_rt.model.sensor import SensorModel, detection_probability, merged_pull
+from rislam_rt.model.sensor_model import SensorModel, detection_probability, merged_pull
 from rislam_rt.model.trajectory import Body, Trajectory
 
 __all__ = [

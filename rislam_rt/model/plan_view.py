@@ -59,15 +59,15 @@ def plan_svg(plan: PlanView) -> str:
 
 
 def outline(meshes: Iterable[tuple[Floats, Integers]]) -> Floats:
-    """Edges (E, 2, 3) [m] to draw of meshes (vertices and faces) in a plan: open ones, and those between faces that are
-    not in one plane; none if they are more than `MOST_LINES`."""
+    """Edges (E, 2, 3) [m] of meshes (vertices and faces) to draw in a plan view: open ones, and those between faces
+    that are not in one plane; none if they are more than `MOST_LINES`."""
     found = [_open_edges(vertices, faces) for vertices, faces in meshes]
     edges = np.concatenate(found) if found else np.zeros((0, 2, 3))
     return edges if len(edges) <= MOST_LINES else np.zeros((0, 2, 3))
 
 
 def _open_edges(vertices: Floats, faces: Integers) -> Floats:
-    """Edges (E, 2, 3) of a mesh that one face alone has, or that lie between faces which are not in one plane."""
+    """Edges (E, 2, 3) of a mesh to draw in a plan view: of one face alone, or between faces not in one plane."""
     points, same = np.unique(np.round(vertices, 6), axis=0, return_inverse=True)
     corners = same.reshape(-1)[faces]
     ends = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)

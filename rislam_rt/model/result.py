@@ -96,7 +96,7 @@ class SchemeResult:
             freeze(self, "smoothed", np.float64, (cycles, 3))
 
     def named(self, panel: int) -> Booleans:
-        """Whether (K, I) each of a scheme's landmarks was identified as a RIS panel (probability above one half)."""
+        """Whether (K, I) each landmark of a scheme's result was identified as a RIS panel (above one half)."""
         return (self.ris_probability > 0.5) & (panel == (0 if self.panel is None else self.panel))
 
     def __repr__(self) -> str:
@@ -138,6 +138,6 @@ class SlamResult:
         return html_with(repr(self), self.scene.plan(("true way", self.scene.agent.position), *ways))
 
     def _rmse(self, scheme: SchemeResult) -> float:
-        """Root mean square of a scheme's horizontal position error [m] over all cycles."""
+        """Root mean square of the horizontal position error [m] of a scheme in the result, over all cycles."""
         error = (scheme.position - self.scene.agent.position)[:, :2]
         return float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) if len(error) else 0.0

@@ -245,7 +245,7 @@ class Scene:
 
 
 def _freeze_mesh(mesh: Any, place: str) -> None:
-    """Check and freeze `vertices` and `faces` of a reflector's or occluder's mesh."""
+    """Check and freeze `vertices` and `faces` of the mesh of a scene's reflector or occluder."""
     freeze(mesh, "vertices", np.float64, (None, 3))
     freeze(mesh, "faces", np.int64, (None, 3))
     if len(mesh.faces) == 0:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rislam_rt.pipeline.run import run_slam
+    from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
     from rislam_rt.pipeline.specification.radio import build_radio
-    from rislam_rt.pipeline.specification.read import load_spec
-    from rislam_rt.pipeline.specification.spec import PipelineSpec
+    from rislam_rt.pipeline.specification.read_pipeline import load_spec
 
 __all__ = ["PipelineSpec", "build_radio", "load_spec", "run_slam"]
 
 _HOME = {
-    "build_radio": "specification.radio", "load_spec": "specification.read", "run_slam": "run",
-    "PipelineSpec": "specification.spec",
+    "build_radio": "specification.radio", "load_spec": "specification.read_pipeline", "run_slam": "run",
+    "PipelineSpec": "specification.pipeline_spec",
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
-from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
+from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
 
 
@@ -68,7 +68,7 @@ def tell_start(
     motion: Trajectory, compass: float, start: StartSection, told: AssumedSection, settings: Settings,
     *, rng: np.random.Generator,
 ) -> StartPrior:  # fmt: skip
-    """Start prior of the agent: the true first pose plus one draw of the prior's errors.
+    """Start prior that the agent is told (the assumed model): the true first pose plus one draw of the prior's errors.
 
     A known height is exact; a known heading is the first compass reading `compass` [rad].
     """
@@ -128,7 +128,8 @@ def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
 
 
 def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:
-    """Measurement that the estimator gets: the receiver's, with errors of array calibration and of reported stds."""
+    """Measurement that the estimator is told (the assumed model): the receiver's, with errors of array calibration and
+    of reported stds."""
     if told.array_scale == 1.0 and told.array_bias == 0.0 and told.std_scale == 1.0:
         return measurement
     cosines = told.array_scale * measurement.cosines + told.array_bias
@@ -141,7 +142,7 @@ def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurem
 
 
 def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
-    """True trajectory with the Tx and Rx offsets of a body tilted by `tilt_deg`, of which the agent is not told."""
+    """True trajectory with the offsets of a body tilted by `tilt_deg`, of which the assumed model knows nothing."""
     if told.tilt_deg == 0.0:
         return motion
     tilt, body = _rotations(np.radians(told.tilt_deg), np.zeros(())), motion.body
@@ -151,7 +152,7 @@ def tilted_motion(motion: Trajectory, told: AssumedSection) -> Trajectory:
 def perceived_paths(
     paths: Paths, motion: Trajectory, told: AssumedSection, *, rng: np.random.Generator, since: float | None = None
 ) -> Paths:
-    """True paths with arrival directions and delays as a tilted, swaying array with a clock offset measures them.
+    """True paths as a tilted, swaying array with a clock offset hears them, of which the assumed model knows nothing.
 
     The agent is told neither. Arrival directions are turned so that a level body frame gives what the tilted array
     measures; the clock drifts from the time `since` [s] on, the motion's first if it is not given.
@@ -169,7 +170,8 @@ def perceived_paths(
 
 
 def _rotations(pitch: Floats, roll: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3) of a body with its front raised by `pitch` (about y) after a roll about x [rad]."""
+    """Rotation matrices (..., 3, 3) of a body whose tilt the assumed model lacks: front raised by `pitch` (about y)
+    after a roll about x [rad]."""
     pitch, roll = np.broadcast_arrays(pitch, roll)
     one, zero = np.ones_like(pitch), np.zeros_like(pitch)
     cp, sp, cr, sr = np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
@@ -179,5 +181,5 @@ def _rotations(pitch: Floats, roll: Floats) -> Floats:
 
 
 def _amplitude(decibel: float) -> float:
-    """Amplitude ratio of decibels."""
+    """Amplitude ratio of decibels, for errors that the assumed model does not know."""
     return float(10.0 ** (decibel / 20.0))

@@ -12,7 +12,7 @@ from rislam_rt.pipeline.assumed_model import AssumedModel
 from rislam_rt.pipeline.cycle import CodePolicy, GroundTruth
 from rislam_rt.pipeline.own_methods import is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
-from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings
 
 
 def build_designer(

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import DataSheet, RisCode
-from rislam_rt.pipeline.specification.spec import ControlSection
+from rislam_rt.pipeline.specification.pipeline_spec import ControlSection
 from rislam_rt.ris import flip_bits, zero_code
 
 

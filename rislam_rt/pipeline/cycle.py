@@ -17,7 +17,7 @@ from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, S
 from rislam_rt.pipeline.assumed_model import AssumedModel, tell_measurement
 from rislam_rt.pipeline.control_link import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
-from rislam_rt.pipeline.specification.spec import PipelineSpec, Settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings
 from rislam_rt.ris import PanelErrors, rephase
 
 
@@ -53,7 +53,7 @@ class GroundTruth(NamedTuple):
     """Diffuse and diffracted paths, received with the others; None if there are none."""
 
     def at(self, cycle: int) -> Paths:
-        """True paths of one cycle alone."""
+        """True paths of one cycle of the protocol alone."""
         return self.paths.of_cycle(cycle - self.first)
 
 
@@ -191,5 +191,5 @@ def run_cycle(
 
 
 def usual_step(time: Floats) -> float:
-    """Median time [s] between cycles at `time` (K,), as a recording's cycles are not quite even; 0 for one cycle."""
+    """Median time [s] between the protocol's cycles at `time` (K,), as a recording's vary; 0 for one cycle."""
     return float(np.median(np.diff(time))) if len(time) > 1 else 0.0

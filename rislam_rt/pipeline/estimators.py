@@ -12,7 +12,7 @@ from rislam_rt.errors import ConfigError, expect
 from rislam_rt.information.landmark_model import Unknown
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.pipeline.own_methods import load_own, own_method_errors
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
 

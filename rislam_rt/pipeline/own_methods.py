@@ -144,7 +144,7 @@ class OwnChannel:
 
 @cache
 def _offered() -> dict[str, Any]:
-    """Entry points of installed packages in `GROUPS`, by name."""
+    """A user's own methods that installed packages offer: entry points in `GROUPS`, by name."""
     return {entry.name: entry for group in GROUPS for entry in entry_points(group=group)}
 
 
@@ -213,7 +213,7 @@ def _all_of(file: Path) -> set[Path]:
 
 
 def _imported(file: Path) -> Iterator[Path]:
-    """Files of the same folder or package that a Python file imports, `__init__.py` of packages included."""
+    """Files of the same folder or package that a user's own method imports, `__init__.py` of packages included."""
     root = _root(file)
     try:
         tree = ast.parse(file.read_bytes())
@@ -231,7 +231,7 @@ def _imported(file: Path) -> Iterator[Path]:
 
 
 def _places(folder: Path, names: list[str]) -> Iterator[Path]:
-    """Existing Python files of a dotted module name, and of every package that it names on the way."""
+    """Existing Python files of a dotted module name in a user's own method, and of every package on the way."""
     place = folder
     for name in filter(None, names):
         place = place / name
@@ -241,7 +241,7 @@ def _places(folder: Path, names: list[str]) -> Iterator[Path]:
 
 
 def _root(file: Path) -> Path:
-    """Folder that contains the outermost package that a Python file belongs to; the file's folder if it is in none."""
+    """Folder of the outermost package that the file of a user's own method is in; else the file's folder."""
     folder = file.parent
     while (folder / "__init__.py").is_file() and folder != folder.parent:
         folder = folder.parent

@@ -9,24 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.backend import prepare_backend
-from rislam_rt.channel.protocol import Channel
 from rislam_rt.errors import ConfigError, RislamError, expect
-from rislam_rt.measurement.received import check_half_turn
-from rislam_rt.model import Body, Paths, RadioConfig, Scene, SchemeResult, SlamResult
+from rislam_rt.measurement.config import check_half_turn
+from rislam_rt.model import Body, Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.assumed_model import tilted_motion
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
-from rislam_rt.pipeline.own_methods import OwnChannel
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.room.true_motion import draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
@@ -62,7 +60,7 @@ class RunSetup(NamedTuple):
 
 
 def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> tuple[Scene, Body, Seeds]:
-    """Return a run's scene with its overrides and drawn true motion, the Tx and Rx offsets of a level agent, the seeds.
+    """Scene of a run with its overrides and drawn true motion, the Tx and Rx offsets of a level agent, the seeds.
 
     Raises
     ------
@@ -203,38 +201,13 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     check_control(scene.ris.spec, spec.control, spec.panel.bit_flip)
 
 
-def prepare_channel(kind: str) -> None:
-    """Load the ray tracer's backend if a run's channel needs it, so that a machine that lacks it is found out early.
-
-    Raises
-    ------
-    SetupError
-        The machine lacks something that the tracer needs.
-    """
-    if kind == "traced":
-        prepare_backend()
-
-
-def build_channel(kind: str, scene: Scene, radio: RadioConfig, depth: int) -> Channel:
-    """Build the channel of that name: ray tracer, image sources or a user's own; the tracer is imported on demand."""
-    if kind == "traced":
-        from rislam_rt.channel.traced import TracedChannel
-
-        return TracedChannel(scene, radio, depth)
-    if kind != "image_source":
-        return OwnChannel(kind, scene, radio, depth)
-    from rislam_rt.channel.image_source import ImageSourceChannel
-
-    return ImageSourceChannel(scene, radio, depth)
-
-
 def cut_scene(scene: Scene, cycles: int | None) -> Scene:
-    """Scene with the first `cycles` of its trajectory alone; unchanged if None."""
+    """Scene of a run with the first `cycles` of its trajectory alone; unchanged if None."""
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
 def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings, one line each, where a RIS panel is so large that the band resolves its elements' delays.
+    """Warnings of a run, one line each, where a RIS panel is so large that the band resolves its elements' delays.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.
@@ -247,7 +220,7 @@ def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
 
 
 def library_versions() -> dict[str, str]:
-    """Versions of this package, of Python and of the libraries that a run's numbers depend on, by name."""
+    """Versions of this package, of Python and of the libraries that the numbers of a run depend on, by name."""
     from rislam_rt import __version__
 
     found = {"rislam-rt": __version__, "python": platform.python_version()}
@@ -260,6 +233,6 @@ def library_versions() -> dict[str, str]:
 
 
 def _seed_of(rng: np.random.Generator) -> int | None:
-    """The integer seed that a run's generator was made from; None if it was not made from one."""
+    """The integer seed of a run, from which its generator was made; None if it was not made from one."""
     entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
     return entropy if isinstance(entropy, int) else None

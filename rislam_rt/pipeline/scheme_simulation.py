@@ -20,7 +20,7 @@ from rislam_rt.pipeline.recordings.inputs import RecordedInputs, given_of
 from rislam_rt.pipeline.room.front_end import prepare_front_end
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, child
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.progress import Tell
 from rislam_rt.ris import draw_panel
 from rislam_rt.storage.netcdf import padded
@@ -60,11 +60,12 @@ class SchemeSimulation:
 
     @property
     def foresight(self) -> int:
-        """Number of cycles after a slice whose paths it needs: the genie designs for the cycle of the code's use."""
+        """Number of cycles after a slice whose paths the scheme's simulation needs: the genie designs for the cycle of
+        the code's use."""
         return self.context.spec.control.delay_cycles if self.scheme.on_truth else 0
 
     def lead(self, paths: Paths, first: int, last: int, tell: Tell, extras: Paths | None = None) -> SchemeResult:
-        """Simulate the cycles from `first` to `last` (not included), and return their result.
+        """Simulate the scheme's cycles from `first` to `last` (not included), and return their result.
 
         True `paths` and diffuse paths `extras` begin at `first` and may go on beyond `last`.
         """
@@ -98,13 +99,13 @@ class SchemeSimulation:
 
 
 def without_panel(paths: Paths) -> Paths:
-    """Paths of the same room without the RIS panel: paths over it are kept as columns, but never valid."""
+    """Paths to simulate a scheme without the RIS panel: paths over it are kept as columns, but never valid."""
     panel = np.isin(paths.kind, (PathKind.RIS, PathKind.VRIS))
     return replace(paths, valid=paths.valid & ~panel, gain=np.where(panel, 0.0, paths.gain), ris=None)
 
 
 def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, given: RecordedInputs) -> SchemeResult:
-    """Stack the records of a scheme's cycles at `time` (K,) [s] as one result, landmarks in columns by number."""
+    """Stack the records of a scheme's simulated cycles at `time` (K,) [s] as one result, landmarks by number."""
     estimates = [cycle.estimate for cycle in cycles]
     maps = [estimate.map for estimate in estimates]
     ident = np.unique(np.concatenate([m.ident for m in maps]))
@@ -138,13 +139,13 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
 
 
 def _codes(codes: Sequence[RisCode | None]) -> Integers:
-    """Phase levels (K, N, M) of one code a cycle; (K, 0, 0) without a RIS panel."""
+    """Phase levels (K, N, M) of one code a simulated cycle; (K, 0, 0) without a RIS panel."""
     if any(code is None for code in codes):
         return np.zeros((len(codes), 0, 0), dtype=np.int64)
     return np.array([code.index for code in codes if code is not None], dtype=np.int64)
 
 
 def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:
-    """Filter diagnostics of all cycles, (K,) each: the fields of `infos` that are scalar numbers, by name."""
+    """Filter diagnostics of all simulated cycles, (K,) each: the fields of `infos` that are scalar numbers, by name."""
     names = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
     return {name: np.array([float(getattr(info, name)) for info in infos]) for name in names}

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.pipeline.own_methods import is_own, load_own
-from rislam_rt.spelling import did_you_mean, nearest
 
 
 class Scheme(NamedTuple):

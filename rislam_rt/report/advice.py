@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from rislam_rt.adviser.advice import Advice
-from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink
-from rislam_rt.adviser.cost import cost_words
 from rislam_rt.adviser.coverage import Coverage
+from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.remedies import detection_label
+from rislam_rt.adviser.tracing_cost import cost_words
 from rislam_rt.model import Scene
 from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import save_figure, styled
@@ -55,7 +55,7 @@ def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Pa
 
 
 def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
-    """Draw one panel's coverage map over the room's plan, with the line where the SNR meets the threshold."""
+    """Draw one panel's coverage map over the room's plan as advice, with a line where the SNR meets the threshold."""
     from matplotlib import colormaps
 
     colours = colormaps["viridis"].with_extremes(bad=UNSEEN)
@@ -86,6 +86,6 @@ def _cell(link: LandmarkLink, at: int) -> str:
 
 
 def _why(link: LandmarkLink) -> str:
-    """The most frequent reason why a landmark is not detected; empty if it is."""
+    """Advice on a landmark that is not detected: the most frequent reason; empty if it is."""
     said = [reason for reason in link.reason if reason]
     return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)

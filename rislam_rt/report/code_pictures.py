@@ -18,7 +18,7 @@ MAX_LABELLED = 10
 
 
 def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
-    """Figure of the phase codes applied at `number` cycles of a run, a row for each scheme; None without a panel."""
+    """Picture of the phase codes applied at `number` cycles of a run, a row for each scheme; None without a panel."""
     schemes = [scheme for scheme in result.schemes.values() if scheme.applied.shape[1]]
     if not schemes:
         return None
@@ -40,7 +40,8 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
 
 
 def draw_codes(designs: Mapping[str, Design], path: Path, sheet: DataSheet | None = None) -> Path:
-    """Draw the phase codes that several methods designed, with the gain of their target path; return the file's path.
+    """Draw a picture of the phase codes that several methods designed, with the gain of their target path; return the
+    file's path.
 
     `sheet` is the data sheet, needed for several panels.
     """
@@ -79,7 +80,7 @@ def _colours(levels: int) -> ListedColormap:
 
 
 def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.object_]]", levels: int) -> None:
-    """Add a colour bar of the phase shifts."""
+    """Add a colour bar of the phase shifts to a picture of codes."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -91,7 +92,7 @@ def _colour_bar(figure: Figure, axes: "np.ndarray[tuple[int, ...], np.dtype[np.o
 
 
 def _side_by_side(parts: Sequence[Integers]) -> Floats:
-    """Join the phase codes of several panels in one array with NaN between them, and below the lower ones."""
+    """Join the phase codes of several panels in one array for a picture, NaN between and below them."""
     rows, cols = max(len(part) for part in parts), sum(part.shape[1] for part in parts) + len(parts) - 1
     whole, first = np.full((rows, cols), np.nan), 0
     for part in parts:

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
 """Schemes in words; others are called by their names."""
@@ -40,7 +40,7 @@ def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
-    """Headline of a run: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random codes, ...`"""
+    """Headline of a run's conclusions: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random ...`"""
     parts = [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in schemes.items()]
     text = f"The agent is off by {', '.join(parts)} (RMSE)"
     lost = [_words(name) for name, scores in schemes.items() if scores["diverged"]]
@@ -48,7 +48,7 @@ def _headline(schemes: Mapping[str, Any]) -> str:
 
 
 def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> str:
-    """Results of one scheme in words: RMSE and bound, panel, scatterers and walls mapped."""
+    """Conclusion on one scheme in words: RMSE and bound, panel, scatterers and walls mapped."""
     over = scores["over_bound"]
     bound = f"{_centimetres(scores['bound_m'])} would be possible" if scores["bound_m"] else "no bound"
     parts = [f"{_centimetres(scores['rmse_m'])}, " + ("at the bound" if over and over <= AT_BOUND else bound)]
@@ -65,7 +65,8 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
 
 
 def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
-    """Time [s] from which on a scheme's map has the RIS panel identified until the run's end; None if not then."""
+    """Conclusion when the panel was found: time [s] from which on a scheme's map has it identified to the end; None if
+    not then."""
     if panel >= len(result.scene.panels):
         return None
     column = landmark_track(result.scene, scheme).column[:, len(result.scene.scatterers) + panel]
@@ -82,7 +83,7 @@ def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> 
 
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
-    """One line for each landmark that is missing in a scheme's last map, with the reason."""
+    """Conclusions on landmarks that are missing in a scheme's last map, one line each, with the reason."""
     spec = PipelineSpec.model_validate(dict(result.config))
     settings = build_settings(spec, len(result.scene.panels) if scheme.levels else 0)
     threshold = build_sensor(settings.radio, settings.receiver).threshold
@@ -114,10 +115,10 @@ def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
 
 
 def _words(name: str) -> str:
-    """Name of a scheme in words."""
+    """Name of a scheme in words, for conclusions."""
     return CODES.get(name, name)
 
 
 def _centimetres(metres: float) -> str:
-    """Length in centimetres, or in metres from one on, with two digits."""
+    """Length for conclusions, in centimetres, or in metres from one on, with two digits."""
     return f"{100.0 * metres:.2g} cm" if metres < 1.0 else f"{metres:.2g} m"

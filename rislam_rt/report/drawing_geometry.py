@@ -28,7 +28,8 @@ def section(triangles: Floats, height: float) -> Floats:
 
 
 def plane_trace(normal: Floats, offset: float, height: float, bounds: Floats) -> Floats | None:
-    """Line segment (2, 2) [m] in which an estimated wall's plane cuts the horizontal plane at `height` inside a box.
+    """Line segment (2, 2) [m] to draw where an estimated wall's plane cuts the horizontal plane at `height` inside a
+    box.
 
     None if it misses the box, or is nearer to horizontal than to vertical.
     """

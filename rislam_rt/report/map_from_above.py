@@ -13,7 +13,7 @@ from rislam_rt.evaluate import match_planes
 from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
-from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
+from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
 from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
 from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 
@@ -71,13 +71,14 @@ def draw_plan(axis: Axes, scene: Scene) -> None:
 
 
 def wall_places(scene: Scene) -> list[tuple[str, Floats]]:
-    """Names of a scene's reflectors and the centroid (3,) [m] of the largest wall of each, at most `MOST_NAMES`."""
+    """Where the map from above names walls: names of a scene's reflectors and the centroid (3,) [m] of the largest wall
+    of each."""
     named = [(reflector.name, largest_middle(reflector.triangles)) for reflector in scene.reflectors]
     return named[:MOST_NAMES]
 
 
 def largest_middle(triangles: Floats) -> Floats:
-    """Centroid (3,) [m] of the largest of triangles (T, 3, 3) together with those that share its plane."""
+    """Where the map from above names a wall: centroid (3,) [m] of the largest triangle's plane, of (T, 3, 3)."""
     across = triangle_cross(triangles)
     area = np.linalg.norm(across, axis=1)
     normal = across[np.argmax(area)] / max(float(area.max()), 1e-300)
@@ -87,7 +88,7 @@ def largest_middle(triangles: Floats) -> Floats:
 
 
 def name_walls(axis: Axes, scene: Scene) -> None:
-    """Write the names of upright walls beside them in a plan; floors and ceilings have none."""
+    """Write the names of upright walls beside them in a map from above; floors and ceilings have none."""
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
     for (name, point), reflector in zip(wall_places(scene), scene.reflectors, strict=False):
         extent = np.ptp(reflector.vertices, axis=0)
@@ -101,7 +102,7 @@ def name_walls(axis: Axes, scene: Scene) -> None:
 
 
 def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
-    """Draw a true landmark in the plan, its name and height beside it."""
+    """Draw a true landmark in the map from above, its name and height beside it."""
     axis.plot(point[0], point[1], marker, ms=13, mfc="none", mec=TRUTH, mew=1.6, zorder=5)
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
     axis.annotate(f"{name}\nz = {point[2]:.1f} m", (point[0], point[1]), (12, 0), textcoords="offset points",
@@ -139,7 +140,7 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
 
 
 def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
-    """Draw a close-up of the trajectory's end, with the estimator's 2 sigma ellipse of the last position."""
+    """Draw a close-up of the trajectory's end beside the map, with the 2 sigma ellipse of the last position."""
     truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
     colour = scheme_colour(scheme.scheme)
     low, high = scene.bounds[:, :2]
@@ -165,7 +166,7 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) 
 
 
 def _legend() -> list[Line2D]:
-    """Legend entries of the map."""
+    """Legend entries of the map from above."""
     grey = "#555555"
     return [
         Line2D([], [], color=WALL, lw=3.0, label="true wall"),

@@ -10,7 +10,7 @@ import numpy as np
 
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import judge_run
 from rislam_rt.report.map_from_above import draw_above

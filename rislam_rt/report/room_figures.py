@@ -108,7 +108,7 @@ def _draw_class(axis: Any, scene: Scene, paths: Paths, gain: Floats, cycle: int,
 
 
 def path_points(scene: Scene, paths: Paths, cycle: int, path: int) -> Floats:
-    """Points (V + 2, 3) [m] of one path in a cycle, for drawing: Tx, interaction points, Rx."""
+    """Points (V + 2, 3) [m] of one path in a cycle, for drawing it in a room: Tx, interaction points, Rx."""
     count = int(paths.num_vertices[path])
     inner = paths.vertices[cycle, path, :count]
     return np.concatenate([scene.agent.tx[cycle][None], inner, scene.agent.rx[cycle][None]])

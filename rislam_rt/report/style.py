@@ -50,7 +50,7 @@ def styled() -> Iterator[None]:
 
 
 def close_up(axis: Any, middle: Floats, half: float) -> None:
-    """Make an axis a close-up of a map: a framed square about a point (2,), `half` [m] to each side, without ticks."""
+    """Style of a map's close-up: a framed square about a point (2,), `half` [m] to each side, without ticks."""
     axis.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half), aspect="equal")
     axis.set(xticks=[], yticks=[])
     for spine in axis.spines.values():
@@ -63,21 +63,21 @@ def scheme_colour(name: str) -> str:
 
 
 def _save(figure: Figure, target: Any, **how: Any) -> None:
-    """Save a figure without warnings about characters that the fonts lack, which are drawn as boxes."""
+    """Save a figure in our style without warnings about characters that the fonts lack, which are drawn as boxes."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         figure.savefig(target, **how)
 
 
 def to_png(figure: Figure) -> bytes:
-    """Encode a figure as PNG."""
+    """Encode a figure in our style as PNG."""
     buffer = io.BytesIO()
     _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
     return buffer.getvalue()
 
 
 def picture_kind(path: Path) -> str:
-    """Format of a picture file by its suffix: `png`, `svg` or `pdf`.
+    """Format of a figure's file by its suffix: `png`, `svg` or `pdf`.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def picture_kind(path: Path) -> str:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure to a PNG, SVG or PDF file by the file's suffix, whole or not at all.
+    """Write a figure in our style to a PNG, SVG or PDF file by the file's suffix, whole or not at all.
 
     Raises
     ------

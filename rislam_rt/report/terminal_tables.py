@@ -28,7 +28,7 @@ def print_summary(summary: Mapping[str, Any]) -> None:
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of the table of a run's scores: label, then one cell for each scheme."""
+    """Rows of the terminal table of a run's scores: label, then one cell for each scheme."""
     schemes = list(summary["schemes"].values())
     first = schemes[0]
     rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
@@ -53,7 +53,7 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
 
 
 def _said(outcomes: Mapping[str, int]) -> str:
-    """Table cell: in how many cycles the estimator itself reported divergence."""
+    """Cell of a terminal table: in how many cycles the estimator itself reported divergence."""
     cycles = outcomes.get("diverged", 0)
     return f"in {cycles} of {sum(outcomes.values())} cycles" if cycles else "never"
 
@@ -125,7 +125,7 @@ def _print_faults(report: "PathReport", of: str, at: str) -> None:
 
 
 def _nearest(limits: "Mapping[str, Any]") -> str:
-    """Table cell: the largest ratio of a path's error to its limit."""
+    """Cell of a terminal table: the largest ratio of a path's error to its limit."""
     return f"{limits['nearest']['share']:.1%}" if limits else "-"
 
 
@@ -209,17 +209,17 @@ def _show(title: str, table: Table) -> None:
 
 
 def _metres(value: float | None) -> str:
-    """Table cell: an error in centimetres, or in metres from one on; `not found` if None."""
+    """Cell of a terminal table: an error in centimetres, or in metres from one on; `not found` if None."""
     if value is None:
         return "not found"
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
 
 
 def _wall(score: Mapping[str, Any]) -> str:
-    """Table cell: distance and angle error of a wall."""
+    """Cell of a terminal table: distance and angle error of a wall."""
     return "not found" if score["rmse_m"] is None else f"{_metres(score['rmse_m'])}, {score['angle_deg']:.1f}°"
 
 
 def _point(point: "Floats") -> str:
-    """Table cell: coordinates of a point."""
+    """Cell of a terminal table: coordinates of a point."""
     return "(" + ", ".join(f"{x:.2f}" for x in point) + ")"

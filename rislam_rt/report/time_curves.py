@@ -97,7 +97,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
 
 
 def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
-    """Gain (K,) [dB] of the strongest of some paths in each cycle; NaN where there is none."""
+    """Gain curve (K,) [dB] over time of the strongest of some paths in each cycle; NaN where there is none."""
     gain = np.abs(scheme.gain[:, columns]).max(axis=1, initial=0.0)
     with np.errstate(divide="ignore"):
         level = 20.0 * np.log10(gain)

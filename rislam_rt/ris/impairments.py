@@ -98,6 +98,6 @@ def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) ->
 
 
 def _check_probability(name: str, value: float) -> None:
-    """Raise `ConfigError` unless a value lies in [0, 1]."""
+    """Raise `ConfigError` unless the probability of an impairment lies in [0, 1]."""
     if not 0.0 <= value <= 1.0:
         raise ConfigError(f"{name}: {value} received; give a probability from 0 to 1")

@@ -20,7 +20,8 @@ class Block(NamedTuple):
 
 
 def panel_gain(tx: Complexes, rx: Complexes, code: RisCode, weight: Complexes | float = 1.0) -> Complexes:
-    """Gain (...,) of panel paths under a code (..., N, M), from the element responses (..., N, M) of their two legs.
+    """Gain (...,) of panel paths under a new code (..., N, M), from the element responses (..., N, M) of their two
+    legs.
 
     `weight` (..., N, M): the elements' true factor relative to the commanded one (`PanelErrors.weight`).
     """
@@ -58,7 +59,7 @@ def rephase(paths: Paths, code: RisCode, weight: Complexes | float = 1.0) -> Pat
 
 
 def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
-    """Sort panel paths into blocks of Tx legs that all join the same Rx legs."""
+    """Sort panel paths to rephase into blocks of Tx legs that all join the same Rx legs."""
     # With `depth` bounces for both legs together, most pairs of legs are no path; these blocks hold none of them.
     path_of = {(int(tx_leg[p]), int(rx_leg[p])): int(p) for p in np.flatnonzero(tx_leg >= 0)}
     partners: dict[int, list[int]] = {}
@@ -72,6 +73,6 @@ def _blocks(tx_leg: Integers, rx_leg: Integers) -> Iterator[Block]:
 
 
 def _span(legs: Integers) -> Integers | slice:
-    """Leg numbers (I,) as a slice if they are consecutive, which numpy reads without a copy."""
+    """Numbers (I,) of legs to rephase as a slice if they are consecutive, which numpy reads without a copy."""
     first, last = int(legs[0]), int(legs[-1])
     return slice(first, last + 1) if last - first + 1 == len(legs) else legs

@@ -20,7 +20,7 @@ def element_pattern(spec: RisSpec, cos_theta: Floats) -> Floats:
 
 
 def element_gain_area(spec: RisSpec, wavelength: float) -> float:
-    """Gain times area of a panel's element, G dx dy [m^2].
+    """Gain times area of a panel's element in its response, G dx dy [m^2].
 
     `tang`: 8 dx dy. `energy`: 4 pi (dx dy)^2 / lambda^2, what a perfectly conducting cell of that area re-radiates.
     """
@@ -85,7 +85,7 @@ def zero_code(spec: DataSheet) -> RisCode:
 
 
 def _leg_share(spec: RisSpec, wavelength: float) -> float:
-    """Square root of the factor `sqrt(4 pi G dx dy) A / lambda` that joins two legs."""
+    """Factor of a panel's response that is each leg's: square root of `sqrt(4 pi G dx dy) A / lambda`."""
     join = np.sqrt(4.0 * np.pi * element_gain_area(spec, wavelength)) * spec.amplitude / wavelength
     return float(np.sqrt(join))
 

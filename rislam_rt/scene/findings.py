@@ -40,7 +40,7 @@ class Fault(SceneError):
         self.faults: list[Fault] = [self]
 
     def at(self, file: str, field: str) -> Finding:
-        """Make this fault an error of the scene check, at the file and field that the caller names."""
+        """Make this fault a finding of the scene check: an error at the file and field that the caller names."""
         return Finding("error", file, f"{field}.{self.key}" if self.key else field, self.message, self.mend)
 
 
@@ -54,7 +54,7 @@ class Faults(Fault):
 
 
 def panel_key(number: int, panels: int) -> str:
-    """Key of a RIS panel in the scene file: `ris` of one, `ris[number]` of several."""
+    """Key of a RIS panel in the scene file, as findings name it: `ris` of one, `ris[number]` of several."""
     return "ris" if panels == 1 else f"ris[{number}]"
 
 

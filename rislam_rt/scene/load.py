@@ -14,10 +14,10 @@ from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel
 from rislam_rt.scene.check import find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
-from rislam_rt.scene.mesh_files import MeshFiles
-from rislam_rt.scene.motion import build_motion
+from rislam_rt.scene.mesh_placement import MeshFiles
+from rislam_rt.scene.motion.agent_motion import build_motion
 from rislam_rt.scene.schema import MAX_SCENE_BYTES, MaterialSection, RisSection, ScattererSection, SceneSpec, read_spec
-from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.shipped import find_room
 from rislam_rt.toml import parse_toml
 
@@ -52,7 +52,8 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> list[Finding]:
-    """Find everything wrong (errors), suspicious (warnings) or worth knowing (notes) about a scene, or a scene folder.
+    """Load a scene to check it: find everything wrong (errors), suspicious (warnings) or worth knowing (notes) about it
+    or its folder.
 
     A bad scene is an answer, not an exception. Materials are held against the carrier of a radio that is given;
     warnings about the panel depend on the radio too, the default one if none is given. Where there are errors, of the
@@ -69,7 +70,7 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
 
 
 def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
-    """Check a scene that has been read: its errors, or if it has none its warnings and notes."""
+    """Check a scene that has been loaded: its errors, or if it has none its warnings and notes."""
     errors = find_errors(scene, file)
     if radio is not None:
         errors += material_errors(scene, file, radio)
@@ -77,7 +78,7 @@ def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Find
 
 
 def _plain_table(file: Path) -> dict[str, Any]:
-    """Content of a scene file as TOML gives it, not validated; empty if it cannot be read."""
+    """Content of a scene file to load as TOML gives it, not validated; empty if it cannot be read."""
     try:
         return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
     except (OSError, ValueError):
@@ -85,7 +86,7 @@ def _plain_table(file: Path) -> dict[str, Any]:
 
 
 def read_draft(path: str | Path) -> SceneDraft:
-    """Read a scene folder, collecting what is wrong with it instead of raising."""
+    """Load a scene folder, collecting what is wrong with it instead of raising."""
     file = scene_file(path)
     try:
         spec, content = read_spec(file)
@@ -95,13 +96,13 @@ def read_draft(path: str | Path) -> SceneDraft:
 
 
 def scene_file(path: str | Path) -> Path:
-    """Path of the scene file that a scene folder, a scene file or the name of a built-in room stands for."""
+    """Path of the scene file to load, for which a scene folder, a scene file or the name of a built-in room stands."""
     path = find_room(path)
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
-    """Build a scene from the validated content of its file and its meshes, and collect what is wrong with them."""
+    """Load a scene from the validated content of its file and its meshes, and collect what is wrong with them."""
     mesh_files = MeshFiles(file.parent, spec.limits, spec.meshes)
     findings: list[Finding] = []
 
@@ -142,7 +143,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
 
 
 def _material(section: MaterialSection) -> Material:
-    """Material of a reflector from its section of the scene file."""
+    """Material of a reflector, loaded from its section of the scene file."""
     given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
     return Material(
         section.reflection, section.itu, permittivity=section.permittivity,
@@ -152,8 +153,8 @@ def _material(section: MaterialSection) -> Material:
 
 
 def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:
-    """Scatterer from its section of the scene file: a sphere has the cross-section pi r^2, as in the paper, unless the
-    file gives another one.
+    """Scatterer, loaded from its section of the scene file: a sphere has the cross-section pi r^2, as in the paper,
+    unless the file gives another one.
 
     A cylinder's nominal one, pi r h / 2, is the mean of its backscattering over all directions.
     """
@@ -174,7 +175,7 @@ def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:
 
 
 def build_panel(section: RisSection) -> RisPanel:
-    """RIS panel from its section of the scene file.
+    """RIS panel, loaded from its section of the scene file.
 
     Raises
     ------
@@ -196,7 +197,7 @@ def build_panel(section: RisSection) -> RisPanel:
 
 
 def _digest(content: bytes, contents: dict[str, bytes]) -> str:
-    """SHA-256 over the scene file and every file it names, each with its name and length before it."""
+    """SHA-256 of a loaded scene: over the scene file and every file it names, name and length before each."""
     digest = hashlib.sha256()
     for name, data in [("", content), *sorted(contents.items())]:
         digest.update(f"{name}\0{len(data)}\0".encode())

@@ -167,7 +167,7 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:
-    """Join all nodes of trimesh's scene (or one and those below it) into one mesh, transforms applied."""
+    """Join all nodes of trimesh's scene (or one and those below it) into one mesh as it is read, transforms applied."""
     graph = loaded.graph
     nodes = list(graph.nodes_geometry)
     if node is not None:
@@ -197,7 +197,7 @@ def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
 
 
 def sound_mesh(mesh: Mesh, max_faces: int, reach: float) -> Mesh:
-    """Mesh without unused vertices (they would widen the room), after a check of its faces and coordinates.
+    """Mesh as read without unused vertices (they would widen the room), after a check of its faces and coordinates.
 
     Raises
     ------

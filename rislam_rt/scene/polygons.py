@@ -74,7 +74,7 @@ def simplify_loop(loop: list[int], points: Floats, kept: Booleans, tolerance: fl
 
 
 def _simplify_chain(chain: list[int], points: Floats, tolerance: float) -> list[int]:
-    """Simplify an open chain of corners within a tolerance by Douglas and Peucker's algorithm; its ends stay."""
+    """Simplify an open chain of a polygon's corners within a tolerance by Douglas and Peucker; its ends stay."""
     keep, stack = {0, len(chain) - 1}, [(0, len(chain) - 1)]
     while stack:
         low, high = stack.pop()
@@ -90,7 +90,7 @@ def _simplify_chain(chain: list[int], points: Floats, tolerance: float) -> list[
 
 
 def _off_segment(points: Floats, start: Floats, end: Floats) -> Floats:
-    """Distance (n,) of points (n, 3) from a segment."""
+    """Distance (n,) of a polygon's corners (n, 3) from a segment."""
     along = end - start
     square = float(along @ along)
     fraction = np.clip((points - start) @ along / square, 0.0, 1.0) if square else np.zeros(len(points))
@@ -146,7 +146,7 @@ def _opens_to(ring: list[int], i: int, points: Floats, target: Floats) -> bool:
 
 
 def _crosses_any(start: Floats, end: Floats, heads: Floats, tails: Floats) -> bool:
-    """Whether a segment crosses any of several others, other than at its ends."""
+    """Whether a polygon's segment crosses any of several others, other than at its ends."""
     a, b = _turn(heads, tails, start), _turn(heads, tails, end)
     c, d = _turn(start, end, heads), _turn(start, end, tails)
     small = 1e-12 * float(np.abs(heads).max(initial=1.0)) ** 2
@@ -155,7 +155,7 @@ def _crosses_any(start: Floats, end: Floats, heads: Floats, tails: Floats) -> bo
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Twice the signed area of triangles (a, b, c) in a plane, positive if they run counter-clockwise."""
+    """Twice the signed area of triangles (a, b, c) of polygons in a plane, positive if they run counter-clockwise."""
     return np.asarray((b - a)[..., 0] * (c - a)[..., 1] - (b - a)[..., 1] * (c - a)[..., 0])
 
 

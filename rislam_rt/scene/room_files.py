@@ -12,9 +12,6 @@ from rislam_rt.toml import toml_bytes
 PAPER_MATERIAL = {"reflection": 0.85}
 """Material of the paper's walls, as a table of the scene file."""
 
-BASELINE = {"tx_offset_m": [-0.04388, -0.02397, 0.0], "rx_offset_m": [0.04388, 0.02397, 0.0]}
-"""Offsets [m] of Tx and Rx in the scene file: 0.1 m apart, turned 0.5 rad, parallel to no edge and no diagonal."""
-
 CYCLES = {"cycles": 600, "cycle_s": 0.1}
 """Number of cycles and their length in the scene file."""
 
@@ -30,20 +27,20 @@ class RoomFiles:
 
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Table of a scene file for a reflector with a PLY mesh of its own."""
+    """Table of a new room's scene file for a reflector with a PLY mesh of its own."""
     return {"name": name, "mesh": mesh_file(name), "material": material or PAPER_MATERIAL}
 
 
 def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
 ) -> dict[str, Any]:
-    """Table of a scene file for a RIS panel like the paper's, anywhere."""
+    """Table of a new room's scene file for a RIS panel like the paper's, anywhere."""
     lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [0.015, 0.015]}
     return lie | {"levels": 4, "element": "tang", "host": host}
 
 
 def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:
-    """Files of a room's scene folder: relative name -> content. `origin` says where the room comes from."""
+    """Files of a new room's scene folder: relative name -> content. `origin` says where the room comes from."""
     files = {mesh_file(name): ply_bytes(*mesh) for name, mesh in room.meshes.items()}
     readme = f"# {room.table['name']}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
     return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}

@@ -6,10 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.input_messages import expected_input
+from rislam_rt.input_messages import did_you_mean, expected_input, nearest
 from rislam_rt.scene.findings import Fault, Faults, one_line
 from rislam_rt.shipped import shipped_rooms
-from rislam_rt.spelling import did_you_mean, nearest
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -343,6 +342,6 @@ def _known_keys() -> list[str]:
 
 
 def _short(text: str, length: int) -> str:
-    """Text of a message on one line, cut to a length."""
+    """Text of a message on the scene file's schema on one line, cut to a length."""
     text = one_line(text)
     return text if len(text) <= length else text[: length - 3] + "..."

@@ -1,11 +1,17 @@
-"""Meshes of simple shapes, solids and surfaces. Corners that two faces share are the same numbers in both."""
+"""Meshes of simple shapes: quadrilaterals, boxes, and closed spheres and cylinders, whose mean shadow is the true one.
+
+Corners that two faces share are the same numbers in both.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.geometry.angles import unit
+from rislam_rt.geometry.planes import plane_tangents
+from rislam_rt.geometry.triangles import triangle_areas
+from rislam_rt.scene.meshes import Mesh, as_mesh
 
 
 def quad(corners: Floats | Sequence[Floats] | Sequence[Sequence[float]]) -> Mesh:
@@ -27,7 +33,7 @@ def hexahedron(corners: Floats) -> dict[str, Mesh]:
 
 
 def box_corners(low: Sequence[float], high: Sequence[float]) -> Floats:
-    """Corners (2, 2, 2, 3) [m] of an axis-aligned box, indexed by x, y and z side."""
+    """Corners (2, 2, 2, 3) [m] of the shape of an axis-aligned box, indexed by x, y and z side."""
     x, y, z = (np.array([a, b], dtype=np.float64) for a, b in zip(low, high, strict=True))
     return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1)
 
@@ -40,7 +46,67 @@ def block(low: Sequence[float], high: Sequence[float], without: Sequence[str] = 
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Join several meshes into one, their vertices and faces in order."""
+    """Join the meshes of several shapes into one, their vertices and faces in order."""
     starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+CYLINDER_SIDES = 32
+"""Number of flat sides of a cylinder's mesh."""
+
+
+def solid_mesh(center: Floats, radius: float, height: float | None, axis: Floats) -> Mesh:
+    """Closed mesh of a scatterer's solid: a cylinder if it has a height, else a sphere."""
+    return sphere_mesh(center, radius) if height is None else cylinder_mesh(center, radius, height, axis)
+
+
+def sphere_mesh(center: Floats, radius: float) -> Mesh:
+    """Mesh of a sphere, 320 triangles with the true sphere's surface.
+
+    A convex body's shadow has, in the mean over all directions, a fourth of its surface (Cauchy): so the mean shadow
+    is the true one, pi r^2. Its outline is off the true one by up to 2 % of the radius.
+    """
+    triangles = _icosahedron()
+    for _ in range(2):
+        triangles = unit(_quartered(triangles))
+    surface = triangle_areas(triangles).sum()
+    return as_mesh(center + radius * np.sqrt(4.0 * np.pi / surface) * triangles)
+
+
+def cylinder_mesh(center: Floats, radius: float, height: float, axis: Floats) -> Mesh:
+    """Closed prism about a unit vector `axis` for a cylinder; its girth is the true one, as Cauchy asks."""
+    across, aside = plane_tangents(axis)
+    # turned by a fraction of a side, so that no edge lies along the room's axes
+    angle = 2.0 * np.pi * (np.arange(CYLINDER_SIDES) + 0.37) / CYLINDER_SIDES
+    corner = radius * (np.pi / CYLINDER_SIDES) / np.sin(np.pi / CYLINDER_SIDES)
+    ring = corner * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * aside)
+    half = 0.5 * height * axis
+    vertices = np.concatenate([ring - half, ring + half, [-half, half]]) + center
+    low, high = np.arange(CYLINDER_SIDES), np.arange(CYLINDER_SIDES) + CYLINDER_SIDES
+    next_low, next_high = np.roll(low, -1), np.roll(high, -1)
+    bottom, top = np.full((2, CYLINDER_SIDES), 2 * CYLINDER_SIDES) + np.array([[0], [1]])
+    faces = [(low, next_low, next_high), (low, next_high, high), (bottom, next_low, low), (top, high, next_high)]
+    return Mesh(vertices, np.concatenate([np.stack(corners, axis=-1) for corners in faces]))
+
+
+def _icosahedron() -> Floats:
+    """Triangles (20, 3, 3) of an icosahedron, corners on the unit sphere, outwards: a sphere's mesh to refine."""
+    golden = (1.0 + np.sqrt(5.0)) / 2.0
+    signs = np.array([[a, b * golden] for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
+    corners = np.concatenate([np.roll(np.insert(signs, 0, 0.0, axis=1), turn, axis=1) for turn in range(3)])
+    near = np.linalg.norm(corners[:, None] - corners, axis=-1)
+    joined = np.isclose(near, 2.0)
+    i, j, k = (index.ravel() for index in np.indices((12, 12, 12)))
+    faces = (i < j) & (j < k) & joined[i, j] & joined[j, k] & joined[i, k]
+    triangles = unit(corners[np.stack([i, j, k], axis=-1)[faces]])
+    inward = np.einsum("fi,fi->f", np.cross(triangles[:, 0], triangles[:, 1]), triangles[:, 2]) < 0.0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return triangles
+
+
+def _quartered(triangles: Floats) -> Floats:
+    """Triangles (4 T, 3, 3) of a sphere's mesh: each of (T, 3, 3) cut into four."""
+    a, b, c = triangles.swapaxes(0, 1)
+    ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+    return np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])

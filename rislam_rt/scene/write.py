@@ -12,10 +12,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.solids import solid_mesh
+from rislam_rt.scene.scene_folder import safe_name
+from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.toml import toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
@@ -36,7 +36,7 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) ->
 
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
-    """Files of a scene folder by name: `scene.toml`, a PLY mesh a reflector, the path unless straight."""
+    """Files of a scene folder to write, by name: `scene.toml`, a PLY mesh a reflector, the path unless straight."""
     files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
     for scatterer in scene.scatterers:
         if scatterer.shade is not None and not _has_own_shadow(scatterer):
@@ -83,7 +83,8 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
-    """Content of a TUM file of poses, lines `timestamp x y z qx qy qz qw`; the quaternion is the heading about z."""
+    """Content of the path file written with a scene (TUM), lines `timestamp x y z qx qy qz qw`; the quaternion is the
+    heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
         row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
@@ -104,7 +105,7 @@ def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
 
 
 def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
-    """Move a temporary folder to its place by one rename, or its files one by one into a folder that exists."""
+    """Write a scene's folder to its place by one rename of a temporary one, or file by file into one that exists."""
     if not folder.exists():
         staged.chmod(0o755)
         staged.rename(folder)
@@ -115,7 +116,7 @@ def _publish(staged: Path, folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
-    """Table of `scene.toml` for a scene, with the table of its agent."""
+    """Table of `scene.toml` as it is written for a scene, with the table of its agent."""
     table: dict[str, Any] = {"name": scene.name}
     table["reflector"] = [
         {"name": r.name, "mesh": mesh_file(r.name), "material": _material_table(r.material)} for r in scene.reflectors
@@ -129,7 +130,7 @@ def _scene_table(scene: Scene, agent: dict[str, Any]) -> dict[str, Any]:
 
 
 def _panel_table(panel: RisPanel) -> dict[str, Any]:
-    """Table of `scene.toml` for a RIS panel."""
+    """Table of `scene.toml` as it is written for a RIS panel."""
     spec, table = panel.spec, {"name": panel.name, "center": panel.center.tolist()}
     table |= {"normal": spec.normal.tolist(), "up": spec.up.tolist()}
     table |= {"rows": spec.rows, "cols": spec.cols, "spacing_m": spec.spacing.tolist()}
@@ -138,7 +139,7 @@ def _panel_table(panel: RisPanel) -> dict[str, Any]:
 
 
 def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
-    """Table of `scene.toml` for a scatterer: a cross-section where it does not follow from shape and law."""
+    """Table of `scene.toml` as written for a scatterer: a cross-section where shape and law do not give it."""
     radius, table = scatterer.radius, {"name": scatterer.name, "position": scatterer.position.tolist()}
     table |= {"radius": radius} if radius is not None else {}
     if scatterer.height is not None:
@@ -155,7 +156,7 @@ def _scatterer_table(scatterer: Scatterer) -> dict[str, Any]:
 
 
 def _has_own_shadow(scatterer: Scatterer) -> bool:
-    """Whether a scatterer's occluder is the mesh of its own solid, written as `shadow = true`."""
+    """Whether a scatterer's occluder, as the scene is written, is the mesh of its own solid: `shadow = true`."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
@@ -164,12 +165,12 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
 
 
 def mesh_file(name: str) -> str:
-    """Relative path in a scene folder of the PLY file of a reflector's or occluder's mesh."""
+    """Relative path in a scene folder of the PLY file to which a reflector's or occluder's mesh is written."""
     return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:
-    """Table of `scene.toml` for a material."""
+    """Table of `scene.toml` as it is written for a material."""
     thick = {"thickness_m": material.thickness}
     if material.reflection is not None:
         own: dict[str, Any] = {"reflection": material.reflection}
@@ -183,7 +184,7 @@ def _material_table(material: Material) -> dict[str, Any]:
 
 
 def _agent_table(agent: Trajectory) -> dict[str, Any]:
-    """Table of `scene.toml` for the agent: a straight motion by its velocity, any other by its path file."""
+    """Table of `scene.toml` as written for the agent: a straight motion by velocity, any other by path file."""
     offsets = {"tx_offset_m": agent.body.tx_offset.tolist(), "rx_offset_m": agent.body.rx_offset.tolist()}
     cycles, velocity = len(agent), agent.velocity[0]
     heading = float(np.arctan2(velocity[1], velocity[0])) if velocity[:2].any() else 0.0

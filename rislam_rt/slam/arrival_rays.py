@@ -8,7 +8,8 @@ from rislam_rt.slam.predicted_returns import Poses
 
 
 def scatterer_positions(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
-    """Positions (..., 3) [m] of point scatterers that explain lengths and cosines (..., 3), and distances (...,) to Rx.
+    """Positions (..., 3) [m] on arrival rays of the scatterers that explain lengths and cosines (..., 3), and distances
+    (...,) to Rx.
 
     A point on the ray `u` from the Rx lies as far out as the two legs have length for: `|r u - b| = l - r` with `b`
     from Rx to Tx.
@@ -20,7 +21,8 @@ def scatterer_positions(seen: Floats, poses: Poses) -> tuple[Floats, Floats]:
 
 
 def rays(seen: Floats, heading: Floats | float) -> Floats:
-    """Unit vectors (..., 3) in room axes towards the arrivals of lengths and cosines (..., 3), taken as from above."""
+    """Arrival rays: unit vectors (..., 3) in room axes towards the arrivals of lengths and cosines (..., 3), taken as
+    from above."""
     flat = seen[..., 1:] / np.maximum(1.0, np.linalg.norm(seen[..., 1:], axis=-1))[..., None]
     up = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))
     return np.concatenate([flat, up[..., None]], axis=-1) @ rotation_z(np.asarray(heading)).T

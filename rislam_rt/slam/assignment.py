@@ -67,7 +67,7 @@ def pair_costs(
 
 
 def log_rayleigh(surplus: Floats) -> Floats:
-    """Log density (...,) of a log amplitude that lies `surplus` (...,) above its mean, of a Rayleigh variable."""
+    """Log density (...,) for assignment of a log amplitude `surplus` (...,) above its mean, of a Rayleigh variable."""
     twice = 2.0 * surplus - np.euler_gamma
     return np.asarray(np.log(2.0) + twice - np.exp(np.minimum(twice, 50.0)))
 
@@ -75,8 +75,7 @@ def log_rayleigh(surplus: Floats) -> Floats:
 def within_reach(
     seen: Floats, variance: Floats, candidates: Candidates, observations: Observations, gate: float
 ) -> tuple[Integers, Integers]:
-    """Pairs (P,), (P,) of candidates and observations that may be in the gate: each axis and the amplitude are, and the
-    sides agree.
+    """Pairs (P,), (P,) that assignment looks at: each axis and the amplitude may be in the gate, and the sides agree.
 
     Candidates are taken at `seen` (C, 3), with at most `variance` (C, 3) along each axis: no Mahalanobis distance is
     less than that along one axis alone.
@@ -93,8 +92,8 @@ def within_reach(
 
 
 def squared_distance(gap: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Squared Mahalanobis lengths (...,) of gaps (..., 3), and log determinants of their covariances (..., 3, 3), in
-    closed form."""
+    """Squared Mahalanobis lengths (...,) of gaps (..., 3) for assignment, and log determinants of their covariances
+    (..., 3, 3), in closed form."""
     x, y, z = gap[..., 0], gap[..., 1], gap[..., 2]
     a, b, c = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 0, 2]
     d, e, f = covariance[..., 1, 1], covariance[..., 1, 2], covariance[..., 2, 2]

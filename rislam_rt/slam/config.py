@@ -6,8 +6,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
+from rislam_rt.slam.input_checks import check_inside, check_named, check_not_negative
 from rislam_rt.slam.nested_config import NestedConfig
-from rislam_rt.slam.setting_checks import check_inside, check_named, check_not_negative
 
 FILTERS = ("window", "nested")
 """Names that `slam.filter` takes: filters with the same inputs and outputs."""
@@ -62,5 +62,5 @@ class SlamConfig:
 
     @property
     def axes(self) -> Floats:
-        """Ones (3,) for the position's axes that are estimated, zero for a known height."""
+        """Ones (3,) for the position's axes that the SLAM filter is configured to estimate, zero for a known height."""
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])

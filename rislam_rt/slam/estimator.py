@@ -17,7 +17,7 @@ def init(
     start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> Any:  # fmt: skip
-    """State of the SLAM filter before the first cycle: the start prior of the agent, and an empty map."""
+    """State of the SLAM estimator before the first cycle: the start prior of the agent, and an empty map."""
     if config.filter == "window":
         return window.init(start, body, ris, sensor, config, rng=rng)
     return nested.init(start, body, ris, sensor, config, rng=rng)
@@ -27,18 +27,19 @@ def step(
     state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: SlamConfig,
     *, rng: np.random.Generator,
 ) -> tuple[Any, StepInfo]:  # fmt: skip
-    """Advance the SLAM filter by a measurement: `dt` [s] since the last, `heading` [rad], `code` held to be applied."""
+    """Advance the SLAM estimator by a measurement: `dt` [s] since the last, `heading` [rad], `code` held applied."""
     advance = window.step if isinstance(state, window.WindowState) else nested.step
     return advance(state, measurement, code, dt, heading, config, rng=rng)
 
 
 def predict(state: Any, dt: float, config: SlamConfig) -> SlamEstimate:
-    """Estimate of pose and map predicted `dt` [s] ahead without noise, to where the next cycle finds the agent."""
+    """Estimate by the SLAM estimator of pose and map predicted `dt` [s] ahead without noise, where the next cycle finds
+    the agent."""
     return window.predict(_front(state), dt, config)
 
 
 def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random.Generator) -> Any:
-    """State of the SLAM filter that begins another run, or another agent's, on an earlier run's map and identities.
+    """State of the SLAM estimator that begins another run, or another agent's, on an earlier run's map and identities.
 
     The map keeps the covariance that it had; its frame is the earlier run's, and so must be the start's.
     """
@@ -47,7 +48,7 @@ def revisit(state: Any, start: StartPrior, config: SlamConfig, *, rng: np.random
 
 
 def smoothed(state: Any) -> Floats | None:
-    """Smoothed positions (K, 3) [m] of the agent in all cycles, with hindsight; None of a filter without smoothing."""
+    """Smoothed positions (K, 3) [m] by the SLAM estimator in all cycles; None of a filter without smoothing."""
     return window.smoothed(state) if isinstance(state, window.WindowState) else None
 
 
@@ -57,5 +58,6 @@ def estimate(state: Any, config: SlamConfig) -> SlamEstimate:
 
 
 def _front(state: Any) -> window.WindowState:
-    """Window state from which pose and map are read: the window filter's own, or the nested filter's Gaussian view."""
+    """Window state from which the SLAM estimator reads pose and map: the window filter's own, or the nested filter's
+    Gaussian view."""
     return state if isinstance(state, window.WindowState) else state.front

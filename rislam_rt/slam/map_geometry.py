@@ -11,8 +11,8 @@ belief does not know how the wall stands."""
 
 
 def wall_planes(mean: Floats, covariance: Floats, anchor: Floats, rows: Integers) -> tuple[Floats, Floats, Floats]:
-    """Estimated planes of walls: normals (W, 3) away from the agent, offsets (W,) [m], deviations (W, 2) of angle [rad]
-    and offset [m]."""
+    """Planes of the estimated map's walls: normals (W, 3) away from the agent, offsets (W,) [m], deviations (W, 2) of
+    angle [rad] and offset [m]."""
     span = mean[rows] - anchor[rows]
     length = np.sqrt(np.vecdot(span, span))
     normal = span / length[:, None]

@@ -65,73 +65,76 @@ class ModelConstants(NamedTuple):
 
     @property
     def stay(self) -> float:
-        """Probability that the motion mode of a step is that of the step before."""
+        """Model constant: probability that the motion mode of a step is that of the step before."""
         return 1.0 - self.rare
 
     @property
     def dead(self) -> float:
-        """Probability of existence below which a feature is removed from the map."""
+        """Model constant: probability of existence below which a feature is removed from the map."""
         return self.rare
 
     @property
     def log_lost(self) -> float:
-        """Log probability that the agent is lost in this very cycle: two rare events at once."""
+        """Model constant: log prior probability that the agent is lost in a cycle, two rare events at once."""
         return 2.0 * self.log_rare
 
     @property
     def max_log_ratio(self) -> float:
-        """Largest change of log odds by one observation, which may always be a rare event of another kind."""
+        """Model constant: largest change of log odds by one observation, which may be a rare event of another kind."""
         return -self.log_rare
 
     @property
     def log_born(self) -> float:
-        """Log odds above which a hypothesis is held for true."""
+        """Model constant: log odds above which a hypothesis is held for true."""
         return float(np.log(self.born / (1.0 - self.born)))
 
     @property
     def log_rare(self) -> float:
-        """Log probability of an unannounced manoeuvre, a thing behind a wall, two walls neither of which is heard."""
+        """Model constant: log probability of an unannounced manoeuvre, a thing behind a wall, two walls neither of
+        which is heard."""
         return float(np.log(self.rare))
 
     @property
     def dip(self) -> float:
-        """Sine of the depth below the horizon from which a return still arrives, for every wall on its way: each
-        leans, and turns the ray by twice that."""
+        """Model constant: sine of the depth below the horizon from which a return still arrives, for every wall on its
+        way: each leans, and turns the ray by twice that."""
         return 2.0 * self.lean
 
     @property
     def sway(self) -> float:
-        """Largest standard deviation [rad] of the body's attitude: of more, level returns would not be looked for."""
+        """Model constant: largest standard deviation [rad] of the body's attitude; of more, level returns would not be
+        looked for."""
         return self.dip
 
     @property
     def weaker(self) -> float:
-        """Weight of the weaker of two unresolved paths, a wall's loss apart, in their component; and its deviation."""
+        """Model constant: weight of the weaker of two unresolved paths, a wall's loss apart, in their component; and
+        its deviation."""
         return float(1.0 / (1.0 + np.exp(-self.wall_ratio)))
 
     @property
     def steady(self) -> float:
-        """Prior probability that nothing blocks a leg that was not looked for before."""
+        """Model constant: prior probability that nothing blocks a leg that was not looked for before."""
         return self.cleared / (self.cleared + self.rare)
 
     @property
     def crowd(self) -> float:
-        """Prior mean square of a residual in reported standard deviations: as much as still fits."""
+        """Model constant: prior mean square of a residual in reported standard deviations, as much as still fits."""
         return self.fit**2
 
     @property
     def against(self) -> float:
-        """Median squared residual (3 dof, half are below 2.4) above which measurements contradict a feature."""
+        """Model constant: median squared residual (3 dof, half are below 2.4) that contradicts a feature."""
         return self.fit**2
 
     @property
     def log_volume(self) -> float:
-        """Logarithm of the volume [m^3] in which features are looked for."""
+        """Model constant: logarithm of the volume [m^3] in which features are looked for."""
         return float(np.log(4.0 / 3.0 * np.pi * self.size**3))
 
     @property
     def log_upright(self) -> float:
-        """Prior log odds that a surface is upright or level."""
+        """Model constant: prior log odds that a surface is upright or level."""
         return float(np.log(self.upright / (1.0 - self.upright)))
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.setting_checks import check_counts, check_inside, check_named
+from rislam_rt.slam.input_checks import check_counts, check_inside, check_named
 
 WEIGHTINGS = ("crlb", "power", "paper")
 """Names of `nested.weighting`: amplitudes weigh by each component's bound, an exponent or the paper's common factor."""

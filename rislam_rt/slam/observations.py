@@ -38,12 +38,12 @@ class Observations(NamedTuple):
 
     @property
     def sides(self) -> Integers:
-        """Side (M,) of each component, `UNTOLD` where the receiver does not tell."""
+        """Side (M,) of each observed component, `UNTOLD` where the receiver does not tell."""
         return np.full(len(self.ratio), UNTOLD) if self.side is None else self.side
 
     @property
     def odds(self) -> Floats:
-        """Log odds (M,) that a component ran over the panel, 0 where the receiver does not tell."""
+        """Log odds (M,) that an observed component ran over the panel, 0 where the receiver does not tell."""
         return np.zeros(len(self.ratio)) if self.panel_odds is None else self.panel_odds
 
     def take(self, rows: Integers) -> "Observations":
@@ -80,7 +80,8 @@ def stranger_density(observations: Observations, sensor: SensorModel, new_densit
 
 
 def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[Integers | None, Floats | None]:
-    """Side (M,) of components from the probability (M,) of having run over a panel, and its log odds; None without it.
+    """Side (M,) of observed components from the probability (M,) of having run over a panel, and its log odds; None
+    without it.
 
     What may be either is left open. `panel` (M,): which of several panels that is.
     """
@@ -95,11 +96,11 @@ def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[
 
 
 def free_space(radio: RadioConfig) -> float:
-    """Log amplitude of a path of 1 m in free space."""
+    """Log amplitude of an observed path of 1 m in free space."""
     return float(np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi)))
 
 
 def is_los(observations: Observations, body: Body) -> Booleans:
-    """Whether each component (M,) is the direct path: no longer than the baseline from Tx to Rx of the agent's body."""
+    """Whether each observed component (M,) is the direct path: no longer than the body's baseline from Tx to Rx."""
     baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
     return observations.seen[:, 0] < baseline + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)

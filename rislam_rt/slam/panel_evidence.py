@@ -22,7 +22,8 @@ BEYOND = 8.0
 
 
 def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
-    """Log density (Rice) of the amplitude of a path of mean `mean` in complex noise of `std` in each real dimension."""
+    """Log density (Rice), as panel evidence, of the amplitude of a path of mean `mean` in complex noise of `std` in
+    each real dimension."""
     variance = std**2
     product = amplitude * mean / variance
     bessel = np.log(scipy.special.i0e(product))
@@ -30,7 +31,8 @@ def log_rice(amplitude: Floats, mean: Floats, std: Floats) -> Floats:
 
 
 def log_missed(mean: Floats, std: Floats, threshold: float) -> Floats:
-    """Log probability that a path of mean amplitude `mean` is not reported: below `threshold`, occluded or merged.
+    """Log probability, as panel evidence, that a path of mean amplitude `mean` is not reported: below `threshold`,
+    occluded or merged.
 
     Below it is one minus Marcum's Q, a noncentral chi-square of two degrees of freedom.
     """
@@ -68,7 +70,8 @@ def log_scatterer_missed(
 
 
 def strength_moments(log_grid: Floats) -> tuple[Floats, Floats]:
-    """Mean and standard deviation (P,) of scatterers' log strengths from grids (P, G) of log likelihoods."""
+    """Mean and standard deviation (P,) of scatterers' log strengths from grids (P, G) of log likelihoods, beside the
+    panel evidence."""
     weight = np.exp(log_grid - np.logaddexp.reduce(log_grid, axis=1, keepdims=True))
     mean = weight @ STRENGTHS
     step = STRENGTHS[1] - STRENGTHS[0]
@@ -114,7 +117,8 @@ def panel_probabilities(log_ris: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def _probabilities(odds: bytes, panels: int) -> Floats:
-    """Probabilities (P, Q) of `panel_probabilities`, read-only and cached: asked for several times in a cycle."""
+    """Probabilities (P, Q) by the panel evidence, as `panel_probabilities`, read-only and cached: asked for several
+    times in a cycle."""
     table = np.frombuffer(odds).reshape(-1, panels)
     before, after = _log_ways(table), _log_ways(table[::-1])[::-1]
     total = np.logaddexp.reduce(before[-1, ::-1])
@@ -145,7 +149,8 @@ def panel_rows(probability: Floats) -> tuple[int, ...]:
 
 
 def _log_ways(table: Floats) -> Floats:
-    """Log weights (P + 1, 2^Q) of giving a set of panels (as bits) different ones of the first 0 to P landmarks."""
+    """Log weights (P + 1, 2^Q) of giving a set of panels (as bits) different ones of the first 0 to P landmarks, for
+    the evidence of all."""
     points, panels = table.shape
     ways = np.full((points + 1, 2**panels), -np.inf)
     ways[:, 0] = 0.0
@@ -156,5 +161,6 @@ def _log_ways(table: Floats) -> Floats:
 
 
 def _spread(std: Floats, mean: Floats) -> Floats:
-    """Standard deviation (P, N) of amplitudes about predicted means (P, N), from noise (P,) and model."""
+    """Standard deviation (P, N) of amplitudes about their predicted means (P, N), as panel evidence, from noise (P,)
+    and model."""
     return np.asarray(np.hypot(std[:, None], CONSTANTS.law * mean))

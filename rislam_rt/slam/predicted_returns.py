@@ -63,19 +63,21 @@ class Poses(NamedTuple):
 
 
 def poses_of(position: Floats, heading: Floats, body: Body) -> Poses:
-    """Tx and Rx of agents at positions (..., 3) [m], with headings [rad] that broadcast against the leading axes."""
+    """Tx and Rx for predicted returns, of agents at positions (..., 3) [m], with headings [rad] that broadcast against
+    the leading axes."""
     return Poses(*body.ends(position, heading), np.asarray(heading))
 
 
 def reflect(point: Floats, wall: Floats, anchor: Floats) -> Floats:
-    """Mirror images (..., 3) of points in walls, which are given as the images (..., 3) of their anchors (..., 3)."""
+    """Mirror images (..., 3) of points in walls, to predict returns; walls are given as images (..., 3) of their
+    anchors (..., 3)."""
     span = wall - anchor
     depth = np.vecdot(span, point - 0.5 * (wall + anchor)) / np.vecdot(span, span)
     return point - 2.0 * depth[..., None] * span
 
 
 def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of the mirror images of points (..., 3) with respect to the walls (..., 3)."""
+    """Derivatives (..., 3, 3) of mirror images of points (..., 3) by the walls (..., 3), for predicted returns."""
     span = wall - anchor
     scaled = span / np.vecdot(span, span)[..., None]
     depth = np.vecdot(scaled, point - 0.5 * (wall + anchor))[..., None]
@@ -84,13 +86,15 @@ def by_wall(point: Floats, wall: Floats, anchor: Floats) -> Floats:
 
 
 def bounced(legs: Integers, column: int) -> tuple[Integers, Integers]:
-    """Rows of the legs (G, 3) that bounce off a wall in column 1 or 2, and the feature rows of those walls."""
+    """Rows of the predicted returns' legs (G, 3) that bounce off a wall in column 1 or 2, and the feature rows of those
+    walls."""
     rows = (legs[:, column] != NONE).nonzero()[0]
     return rows, legs[rows, column]
 
 
 def leg_images(returns: Returns, features: Floats, anchor: Floats, tx: Floats) -> Floats:
-    """Mirror images (..., G, 3) [m] of the legs' points in their walls, from features (..., F, 3) and Tx (..., 3)."""
+    """Mirror images (..., G, 3) [m] of the points of predicted returns' legs in their walls, from features (..., F, 3)
+    and Tx (..., 3)."""
     legs = returns.legs
     moving, base = legs[:, 0] == TX, features.take(legs[:, 0], axis=-2)
     if moving.any():  # only then do images differ from pose to pose
@@ -211,8 +215,8 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
 
 
 def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats]:
-    """Mirror images (..., G, 3) of the legs' points, and derivatives (..., G, 3, 9) by the point, the wall next to it
-    and the other wall."""
+    """Mirror images (..., G, 3) of the points of predicted returns' legs, and derivatives (..., G, 3, 9) by the point,
+    the wall next to it and the other wall."""
     moving, image = legs[:, 0] == TX, features.take(legs[:, 0], axis=-2)
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx, image)
@@ -236,7 +240,7 @@ def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) 
 
 
 def compact(returns: Returns, rows: Integers) -> Returns:
-    """Some of the returns, by row, with only the legs that they need."""
+    """Some of the predicted returns, by row, with only the legs that they need."""
     tx, rx = returns.tx[rows], returns.rx[rows]
     used = np.zeros(len(returns.legs), dtype=np.bool_)
     used[tx] = used[rx] = True

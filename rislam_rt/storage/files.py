@@ -26,7 +26,7 @@ RECORDING = (b"RRF", b"rislam_rt")
 
 
 def is_own(path: Path) -> bool:
-    """Whether a path may be written to: there is no file, an empty one, or one that this program made (`MARK`)."""
+    """Whether a file may be written to a path: there is none, an empty one, or one that this program made (`MARK`)."""
     if not path.is_file() or path.stat().st_size == 0 or is_device(path):
         return True
     try:
@@ -104,7 +104,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
 
 
 def led_to(path: Path) -> Path:
-    """Path that writing to `path` creates or replaces: links are resolved, so that they stay.
+    """Path that writing a file to `path` creates or replaces: links are resolved, so that they stay.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def led_to(path: Path) -> Path:
 
 
 def is_device(path: Path) -> bool:
-    """Whether a path is a device, a pipe or a standard stream, which must not be replaced by a file."""
+    """Whether a file's path is a device, a pipe or a standard stream, which must not be replaced by a file."""
     return path.exists() and not path.is_dir() and (not path.is_file() or path.parent == Path("/dev"))
 
 
@@ -132,7 +132,8 @@ def remove_temporaries(folders: Iterable[Path]) -> None:
 
 
 def has_marker(folder: Path, marker: str, ignored: str, what: str, option: str = "") -> bool:
-    """Whether a folder holds the file `marker`; if not, it must be empty (but for `ignored`), or not there.
+    """Whether a folder of output files holds the file `marker`; if not, it must be empty (but for `ignored`), or not
+    there.
 
     Raises
     ------
@@ -151,7 +152,7 @@ def has_marker(folder: Path, marker: str, ignored: str, what: str, option: str =
 
 
 def make_folders(folder: Path) -> list[Path]:
-    """Create a folder and those above it; return those that did not exist, the outermost first.
+    """Create a folder for files and those above it; return those that did not exist, the outermost first.
 
     Raises
     ------
@@ -167,7 +168,7 @@ def make_folders(folder: Path) -> list[Path]:
 
 
 def check_writable(folder: Path) -> None:
-    """Check that a folder, which may not exist yet, can be written to, before results for it are computed.
+    """Check that files can be written to a folder, which may not exist yet, before results for it are computed.
 
     Raises
     ------
@@ -185,7 +186,7 @@ def check_writable(folder: Path) -> None:
 
 
 def remove_empty(folders: Iterable[Path]) -> None:
-    """Remove those of the folders (outermost first) that are empty."""
+    """Remove those of the folders of files (outermost first) that are empty."""
     for folder in reversed(list(folders)):
         with suppress(OSError):
             folder.rmdir()

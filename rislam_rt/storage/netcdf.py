@@ -34,7 +34,8 @@ def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str
 
 
 def padded(rows: Sequence[Any], fill: Any, dtype: Any = None) -> Any:
-    """Stack arrays (M_k, ...) of K cycles in one (K, max M, ...), filled up; type of the first unless given."""
+    """Stack arrays (M_k, ...) of K cycles in one (K, max M, ...) for a NetCDF variable, filled up; type of the first
+    unless given."""
     longest = max((len(row) for row in rows), default=0)
     table = np.full((len(rows), longest, *rows[0].shape[1:]), fill, dtype=dtype or rows[0].dtype)
     for cycle, row in enumerate(rows):

@@ -33,7 +33,8 @@ class Claim(NamedTuple):
 
 
 def read_results(folder: Path) -> dict[str, Mapping[str, Any]]:
-    """Read the result files of the studies that are in a folder, by the name of the study.
+    """Read the result files of the studies against which the paper's claims are held, in a folder, by the name of the
+    study.
 
     Raises
     ------
@@ -153,7 +154,7 @@ def _with_snr(case: str, entries: Sequence[Mapping[str, Any]]) -> list[Claim]:
 
 
 def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
-    """Check the claims that the RMSE of agent and panel fall with the panel's size, by Fig. 4(c)."""
+    """Claims that the RMSE of agent and panel fall with the panel's size, by Fig. 4(c)."""
     where = "Fig. 4(c)"
     what = {"agent": "agent's error falls with the panel's size", "panel": "panel's error falls with the panel's size"}
     own = [] if content is None else [fall for fall in content["falls"] if fall["scheme"] == OURS]
@@ -177,7 +178,7 @@ def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
 
 
 def _by_snr(gains: Sequence[Mapping[str, Any]]) -> list[tuple[float, list[Mapping[str, Any]]]]:
-    """Gains over the benchmarks, grouped by SNR [dB]."""
+    """Gains over the benchmarks that the paper claims, grouped by SNR [dB]."""
     known = [gain for gain in gains if gain["over"] in RIVALS and gain["gain"] is not None]
     return [(snr, [g for g in known if g["snr_db"] == snr]) for snr in dict.fromkeys(g["snr_db"] for g in known)]
 

@@ -11,9 +11,9 @@ from rislam_rt.design import DesignProblem, GainCurves, direct_only, gain_curves
 from rislam_rt.design.gain_curves import GainInterval
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.channels import build_channel
+from rislam_rt.pipeline.specification.pipeline_spec import build_design
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import build_design
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.studies.spec import Fig4aSpec
 
@@ -97,7 +97,8 @@ def run_fig4a(scene: Scene, spec: Fig4aSpec, *, rng: np.random.Generator, progre
 
 
 def walk_to_panel(scene: Scene, places: int, closest: float) -> Trajectory:
-    """Places on a straight, level line from the trajectory's start towards the RIS panel, to `closest` [m] from it."""
+    """Places for Fig. 4(a) on a straight, level line from the trajectory's start towards the RIS panel, to `closest`
+    [m] from it."""
     start = scene.agent.position[0]
     way = np.append(lone_panel(scene).center[:2] - start[:2], 0.0)
     reach = float(np.linalg.norm(way))

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_design, build_receiver, build_settings
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.read import build_spec, read_table
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_design, build_receiver, build_settings
+from rislam_rt.pipeline.specification.read_pipeline import build_spec, read_table
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.spec import ClaimsSpec, CompareSpec, Fig4aSpec
 from rislam_rt.studies.swept import SWEPT, SweptSpec, check_swept

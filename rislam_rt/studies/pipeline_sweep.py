@@ -12,12 +12,13 @@ from pydantic import BaseModel, Field
 from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.evaluate import bootstrap, rms_over_runs
 from rislam_rt.model import Scene
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.own_methods import own_digests
-from rislam_rt.pipeline.run import check_run, library_versions, prepare_channel, run_slam
+from rislam_rt.pipeline.run import check_run, library_versions, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.specification.read import Table, build_spec, make_way, read_table
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.specification.section import Positive, Section
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.storage.files import json_file, write_all
@@ -67,7 +68,7 @@ class SchemeScore(NamedTuple):
         return float(rms_over_runs(np.array(self.rmse))) if self.rmse else None
 
     def as_dict(self) -> dict[str, Any]:
-        """Scores as plain data, one level deep but for the list of RMSEs."""
+        """Scores of a scheme in a pipeline's sweep as plain data, one level deep but for the list of RMSEs."""
         low, high = self.interval or (None, None)
         counts = {"runs": len(self.rmse), "diverged": self.diverged, "failed": self.failed, "missing": self.missing}
         scores = {"rmse_m": self.overall, "low_m": low, "high_m": high, **counts, "each_m": list(self.rmse)}
@@ -136,7 +137,7 @@ def slam_sweep(
 
 
 def typed_axis(axis: Axis) -> Axis:
-    """Axis with its values in the type of the pipeline's setting: whole numbers become real, or values lists."""
+    """Axis of a pipeline's sweep with values in the type of the setting: whole numbers become real, or lists."""
     model: Any = PipelineSpec
     *parents, leaf = axis.key.split(".")
     for part in parents:
@@ -196,7 +197,8 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
 
 
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """Function that checks a cell's settings, and returns the scene's hash and versions that its result depends on."""
+    """Function that checks the settings of a pipeline sweep's cell, and returns the scene's hash and versions that its
+    result depends on."""
     load = cache(load_scene)
     versions = library_versions()
 
@@ -220,7 +222,7 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
 
 
 def _kinds(annotation: Any) -> list[type]:
-    """All plain types in a type annotation, such as those of a union."""
+    """All plain types in the annotation of a swept setting, such as those of a union."""
     parts = get_args(annotation)
     if not parts:
         return [annotation] if isinstance(annotation, type) else []
@@ -228,7 +230,7 @@ def _kinds(annotation: Any) -> list[type]:
 
 
 def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
-    """Entries of a run's scores that are times, or all others."""
+    """Entries of a swept run's scores that are times, or all others."""
     kept: dict[str, Any] = {}
     for name, value in summary.items():
         clock = name.endswith("seconds") or name == "over_budget"
@@ -241,7 +243,7 @@ def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
 
 
 def _interval(rmse: Sequence[float]) -> tuple[float, float] | None:
-    """Bootstrap interval of the RMSE over repetitions."""
+    """Bootstrap interval of a pipeline sweep's RMSE over repetitions."""
     if len(rmse) < 2:
         return None
     found = bootstrap(np.array(rmse), rng=np.random.default_rng(0), statistic=rms_over_runs)

@@ -6,9 +6,9 @@ from pydantic import Field, model_validator
 
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.run import library_versions
+from rislam_rt.pipeline.specification.pipeline_spec import DesignerSection
 from rislam_rt.pipeline.specification.radio import RadioSection
 from rislam_rt.pipeline.specification.section import Count, Name, Positive, Section
-from rislam_rt.pipeline.specification.spec import DesignerSection
 
 Depth = Annotated[int, Field(ge=0, le=4)]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]

@@ -81,7 +81,7 @@ def find_function(name: str) -> Any:
 
 
 def one_line(error: BaseException) -> str:
-    """Type and first line of an exception, as the message of a failed cell."""
+    """Type and first line of an exception, as the message of a sweep's failed cell."""
     text = str(error).strip().splitlines()
     kind = "" if isinstance(error, RislamError) else f"{type(error).__name__}: "
     return (kind + (text[0] if text else "")).rstrip(": ")[:500]

@@ -26,7 +26,8 @@ class SweepCost(NamedTuple):
 
 
 def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], width: int) -> SweepCost:
-    """Estimate the time of the cells left, run `width` at a time, each from the mean of done cells of similar settings.
+    """Estimate the time of a sweep's cells left, run `width` at a time, each from the mean of done cells of similar
+    settings.
 
     The most similar cells share the most values along the axes: if the number of particles is an axis, cells with the
     same number count rather than others.
@@ -47,7 +48,7 @@ def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], widt
 
 
 def _similar(point: Mapping[str, Any], known: Sequence[Mapping[str, Any]]) -> float:
-    """Mean time [s] of the known cells that share the most values along the axes with a point."""
+    """Mean time [s] of the known cells most alike to a point along the axes, to estimate the sweep's cost."""
     shared = [sum(other["point"].get(key) == value for key, value in point.items()) for other in known]
     most = max(shared)
     seconds = [float(other["seconds"]) for other, number in zip(known, shared, strict=True) if number == most]
@@ -196,7 +197,7 @@ class _SweepState:
         self.known: tuple[float, SweepCost] | None = None
 
     def take(self, ident: str, outcome: CellOutcome) -> None:
-        """Store the outcome of a cell that has ended, and report progress."""
+        """Store the outcome of a sweep's cell that has ended, and report progress."""
         cell = self.rows[ident].cell
         self.rows[ident] = row = store.write_cell(self.folder, cell, self.sweep.function, outcome)
         store.append_timing(self.folder, cell, outcome)
@@ -222,7 +223,8 @@ class _SweepState:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Write the table of all cells and draw the figures of the results so far, unless the old ones are kept."""
+        """Write the table of all cells as a sweep runs, and draw the figures of the results so far, unless the old ones
+        are kept."""
         if self.keep:
             return
         begin = monotonic()

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from rislam_rt.errors import RislamError
 from rislam_rt.storage import files
+from rislam_rt.storage.checksums import flatten, read_sealed, seal
 from rislam_rt.storage.lock import LOCK_FILE, hold
-from rislam_rt.storage.seal import flatten, read_sealed, seal
 from rislam_rt.sweeps.cell_work import CellOutcome
 from rislam_rt.sweeps.sweep import Cell, Sweep
 
@@ -42,12 +42,12 @@ class Row(NamedTuple):
 
     @property
     def failed(self) -> bool:
-        """Whether the cell ran and failed."""
+        """Whether the stored cell ran and failed."""
         return self.state not in (MISSING, DONE)
 
 
 def check_folder(folder: Path) -> None:
-    """Check that a folder is a sweep's, empty or not there, so that no other files are replaced.
+    """Check that a folder is a stored sweep's, empty or not there, so that no other files are replaced.
 
     Raises
     ------
@@ -62,7 +62,8 @@ def check_folder(folder: Path) -> None:
 
 @contextmanager
 def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None]:
-    """Create a sweep's folder, lock it within this context, remove temporary files and write `sweep.json`.
+    """Create the folder that stores a sweep, lock it within this context, remove temporary files and write
+    `sweep.json`.
 
     With `keep` the `sweep.json` that is there stays.
 
@@ -111,7 +112,7 @@ def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) ->
 
 
 def read_row(folder: Path, cell: Cell) -> Row:
-    """Read state and result of a cell from its file; a file that was changed or is another cell's counts as missing."""
+    """Read state and result of a cell from its stored file; a changed file, or another cell's, counts as missing."""
     file = _file(folder, cell)
     try:
         found = read_sealed(file)
@@ -123,7 +124,7 @@ def read_row(folder: Path, cell: Cell) -> Row:
 
 
 def rows_by_point(rows: Sequence[Row]) -> list[list[Row]]:
-    """Rows of a sweep in groups with the same values along the axes, groups and rows in their order."""
+    """Stored rows of a sweep in groups with the same values along the axes, groups and rows in their order."""
     groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(repr(row.cell.point), []).append(row)
@@ -153,7 +154,7 @@ def read_timings(folder: Path) -> list[dict[str, Any]]:
 
 
 def write_table(folder: Path, rows: Sequence[Row]) -> None:
-    """Write the table of all cells as CSV and JSON, in their order; nested names are dotted, lists are left out.
+    """Write the stored table of all cells as CSV and JSON, in their order; nested names are dotted, lists are left out.
 
     Raises
     ------
@@ -171,7 +172,7 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
 
 
 def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
-    """Encode rows as CSV with the columns of the first row; lists are joined by semicolons."""
+    """Encode the rows of a sweep's table as CSV with the columns of the first row; lists are joined by semicolons."""
     rows = ([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()] for entry in entries)
     return files.csv_file(entries[0] if entries else (), rows)
 

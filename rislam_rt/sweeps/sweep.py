@@ -62,12 +62,12 @@ def parse_axis(text: str) -> Axis:
 
 
 def _plain(value: Any) -> bool:
-    """Whether a value is text, a finite number or a boolean."""
+    """Whether a value of a sweep's axis is text, a finite number or a boolean."""
     return isinstance(value, Scalar) and not (isinstance(value, float) and not math.isfinite(value))
 
 
 def _kind(value: Value) -> str:
-    """Type of an axis value in words."""
+    """Type of a sweep's axis value in words."""
     if isinstance(value, bool):
         return "booleans"
     if isinstance(value, list):
@@ -157,7 +157,8 @@ def build_cells(sweep: Sweep) -> list[Cell]:
 
 
 def _digest(content: Any) -> bytes:
-    """SHA-256 of plain data, encoded as JSON with sorted keys and shortest numbers that read back the same."""
+    """SHA-256 of a sweep's settings as plain data, encoded as JSON with sorted keys and shortest numbers that read back
+    the same."""
     try:
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError) as error:

@@ -53,5 +53,5 @@ def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
 
 
 def delay_response(tau: Floats, frequencies: Floats) -> Complexes:
-    """Phase factors `exp(-j 2 pi f tau)` (..., M) of tones at frequencies (M,) [Hz] after delays (...,) [s]."""
+    """Phase factors `exp(-j 2 pi f tau)` (..., M) of the pulse's tones (M,) [Hz] after delays (...,) [s]."""
     return phasor(-2.0 * np.pi * np.asarray(tau)[..., None] * frequencies)

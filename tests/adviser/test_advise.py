@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import advise
-from rislam_rt.adviser.budget import LandmarkLink, Survey, link_budget, survey
-from rislam_rt.adviser.codes import aimed_paths, paths_under_codes
-from rislam_rt.adviser.cost import COUNTED, cost_words, trace_cost
 from rislam_rt.adviser.coverage import panel_coverage
-from rislam_rt.adviser.detection import forecast_detection
+from rislam_rt.adviser.detection_forecast import forecast_detection
+from rislam_rt.adviser.forecast_codes import aimed_paths, paths_under_codes
+from rislam_rt.adviser.link_budget import LandmarkLink, Survey, link_budget, survey
 from rislam_rt.adviser.remedies import HEARD, detection_label, enough_elements, lack_db, remedies, weak_places
+from rislam_rt.adviser.tracing_cost import COUNTED, cost_words, trace_cost
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
 from rislam_rt.model import Occluder, PathKind, RisPanel, Scene
 from rislam_rt.model.ris import join_panels
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.specification.spec import Settings, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings, build_settings
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

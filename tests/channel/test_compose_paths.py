@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import GeometryError
 from rislam_rt.model import PathKind, RadioConfig, RisCode

@@ -11,7 +11,7 @@ from rislam_rt.channel.occluders import build_occluders
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import Occluder, PathKind, RadioConfig, Scatterer
-from rislam_rt.scene.solids import cylinder_mesh, sphere_mesh
+from rislam_rt.scene.shapes import cylinder_mesh, sphere_mesh
 
 RADIO = RadioConfig()
 CENTER = np.array([2.0, 1.0, 1.0])

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
+from rislam_rt.storage.checksums import seal
 from rislam_rt.storage.files import is_own
-from rislam_rt.storage.seal import seal
 
 SHORT = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"

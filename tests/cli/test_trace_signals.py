@@ -11,8 +11,8 @@ import xarray as xr
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import load_signals
 from rislam_rt.model import PathKind
-from rislam_rt.pipeline.dataset import dataset_to_paths
-from rislam_rt.pipeline.signals import coded_paths, load_signals_spec, signals_size
+from rislam_rt.pipeline.run_datasets import dataset_to_paths
+from rislam_rt.pipeline.signal_simulation import coded_paths, load_signals_spec, signals_size
 from rislam_rt.scene import load_scene
 from rislam_rt.storage.netcdf import read_dataset
 
@@ -134,7 +134,7 @@ def test_a_full_disk_is_told_before_the_work(run, tmp_path, monkeypatch):
     from collections import namedtuple
 
     usage = namedtuple("usage", "total used free")
-    monkeypatch.setattr("rislam_rt.pipeline.signals.shutil.disk_usage", lambda _: usage(10, 10, 0))
+    monkeypatch.setattr("rislam_rt.pipeline.signal_simulation.shutil.disk_usage", lambda _: usage(10, 10, 0))
     code, _, err = run("trace", SCENE, *FEW)
     assert code == 4
     assert "GB free" in err

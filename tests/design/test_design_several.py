@@ -8,8 +8,8 @@ import pytest
 
 from rislam_rt.design import design_code, designer, exact_code, problem_from_belief
 from rislam_rt.design.beam_sweep import search_code
+from rislam_rt.design.design_problem import problem_from_arrays
 from rislam_rt.design.objective import build_objective
-from rislam_rt.design.problem import problem_from_arrays
 from rislam_rt.model import PanelCandidate, RisCode, RisSpecs
 from rislam_rt.ris import leg_response, panel_gain
 

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import rislam_rt
-from rislam_rt.pipeline.specification.settings import list_settings
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
+from rislam_rt.pipeline.specification.settings_list import list_settings
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,7 +8,7 @@ from scipy.special import ive
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import ReceiverConfig, detection_probability, measure, path_std
-from rislam_rt.measurement.received import check_half_turn
+from rislam_rt.measurement.config import check_half_turn
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()

@@ -7,10 +7,10 @@ import scipy
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.information import delay_gain_information, measurement_std, steering
 from rislam_rt.measurement import ReceiverConfig, measure
+from rislam_rt.measurement.detection_threshold import _half_perimeter, detection_threshold, expected_false_alarms
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
-from rislam_rt.measurement.received import receive
-from rislam_rt.measurement.sensor_model import _half_perimeter, detection_threshold, expected_false_alarms
+from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.true_identity import identify
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 

@@ -18,8 +18,8 @@ from rislam_rt.measurement import (
     to_samples,
 )
 from rislam_rt.measurement.hardware import SentSignal, _clipped, digitise, image_spectrum, scaled_to_fit
-from rislam_rt.measurement.received import direct_gain
-from rislam_rt.measurement.signal import convert, to_tones
+from rislam_rt.measurement.received_paths import direct_gain
+from rislam_rt.measurement.received_signal import convert, to_tones
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup

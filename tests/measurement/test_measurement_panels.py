@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement import ReceiverConfig, load_signals, measure, signals_dataset
 from rislam_rt.measurement.config import ORDERS
-from rislam_rt.measurement.received import receive
+from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.slot_motion import code_signs, codes_in_turn, slot_mean, split_by_code
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 

@@ -16,7 +16,7 @@ from rislam_rt.measurement.estimation.refine import (
     residual_fit,
     subset_fit,
 )
-from rislam_rt.measurement.signal import add_noise
+from rislam_rt.measurement.received_signal import add_noise
 from rislam_rt.model import RadioConfig
 
 PLANE = build_sounding(128, RadioConfig())

@@ -6,8 +6,16 @@ import pytest
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement import ReceiverConfig, build_sensor
 from rislam_rt.measurement.estimation.path_signals import build_sounding, correlate_waves, wave_signals
-from rislam_rt.measurement.received import receive
-from rislam_rt.measurement.signal import add_noise, convert, num_tones, pulse_samples, to_samples, to_tones, tones
+from rislam_rt.measurement.received_paths import receive
+from rislam_rt.measurement.received_signal import (
+    add_noise,
+    convert,
+    num_tones,
+    pulse_samples,
+    to_samples,
+    to_tones,
+    tones,
+)
 from rislam_rt.model import PathKind, Paths, RadioConfig, RxArray
 
 RADIO = RadioConfig()

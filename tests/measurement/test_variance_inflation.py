@@ -6,7 +6,7 @@ import pytest
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.estimation.path_signals import build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import accuracy, fit_amplitudes, refine
-from rislam_rt.measurement.signal import add_noise
+from rislam_rt.measurement.received_signal import add_noise
 from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 

@@ -15,7 +15,7 @@ from rislam_rt.pipeline import assumed_model, load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
-from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"

@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.design import panel_columns, problem_from_paths
-from rislam_rt.information.position import position_bound, position_information
+from rislam_rt.information.position_bound import position_bound, position_information
 from rislam_rt.model import PathKind, RisCode, empty_map, pose_estimate
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.assumed_model import tell_belief
@@ -15,7 +15,7 @@ from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.cycle import GroundTruth
 from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.ris import rephase
 from rislam_rt.shipped import find_pipeline
 

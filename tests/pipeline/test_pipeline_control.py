@@ -6,7 +6,7 @@ import pytest
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.pipeline.control_link import check_control, message_seconds, open_link, quantise, send_code
-from rislam_rt.pipeline.specification.spec import ControlSection
+from rislam_rt.pipeline.specification.pipeline_spec import ControlSection
 
 PANEL = RisSpec(2, 3, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), 4)
 

@@ -7,7 +7,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RisCode, RisSpec
 from rislam_rt.pipeline.control_link import check_control, open_link, send_code
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.specification.spec import ControlSection
+from rislam_rt.pipeline.specification.pipeline_spec import ControlSection
 from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run, read_run
 

@@ -8,10 +8,10 @@ import pytest
 import rislam_rt
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.dataset import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
-from rislam_rt.pipeline.design_at import design_at, design_table
+from rislam_rt.pipeline.design_at_position import design_at, design_table
 from rislam_rt.pipeline.long.slices import join_schemes, subsampled_scheme
 from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
+from rislam_rt.pipeline.run_datasets import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
 from rislam_rt.pipeline.scores.summary import landmark_scores, landmark_track
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import panel_found_at

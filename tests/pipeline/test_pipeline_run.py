@@ -52,7 +52,7 @@ def test_what_schemes_hear_under_the_same_codes_is_found_once(run_short, monkeyp
 def test_gains_are_those_of_the_applied_code(room, short_result):
     from rislam_rt.channel.image_source import ImageSourceChannel
     from rislam_rt.model import RisCode
-    from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+    from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
     radio = build_settings(PipelineSpec.model_validate(short_result.config)).radio
     channel = ImageSourceChannel(replace(room, agent=room.agent[:8]), radio, 2)

@@ -11,7 +11,7 @@ from rislam_rt.measurement import ReceiverConfig, build_sensor, measure
 from rislam_rt.model import Body, PathKind, Paths, RadioConfig, SensorModel
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.specification.spec import Settings, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings, build_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.observations import observations_of, stranger_density
 from rislam_rt.slam.schemes.bp_slam.filter import assumed_odds

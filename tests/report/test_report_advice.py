@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.advice import Advice
-from rislam_rt.adviser.budget import NOTHING_DB, LandmarkLink
-from rislam_rt.adviser.cost import TraceCost
 from rislam_rt.adviser.coverage import Coverage
+from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink
+from rislam_rt.adviser.tracing_cost import TraceCost
 from rislam_rt.report.advice import draw_coverage, print_advice
 from rislam_rt.scene import load_scene
 

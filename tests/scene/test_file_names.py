@@ -9,9 +9,9 @@ import pytest
 from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.scene import load_scene, write_scene
-from rislam_rt.scene.file_names import safe_name
 from rislam_rt.scene.meshes import MeshReader
-from rislam_rt.slam.step_checks import check_step
+from rislam_rt.scene.scene_folder import safe_name
+from rislam_rt.slam.input_checks import check_step
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 SQUARE = "v 0 0 0\nv 6 0 0\nv 6 6 0\nv 0 6 0\nf 1 2 3\nf 1 3 4\n"

@@ -14,8 +14,7 @@ from rislam_rt.model import Occluder, RadioConfig, RisPanel, Scatterer, Scene
 from rislam_rt.scene import check_scene, load_scene, write_scene
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions, winding
 from rislam_rt.scene.meshes import Mesh, ply_bytes
-from rislam_rt.scene.shapes import block
-from rislam_rt.scene.solids import cylinder_mesh, sphere_mesh
+from rislam_rt.scene.shapes import block, cylinder_mesh, sphere_mesh
 
 CENTER = np.array([2.0, 1.0, 1.0])
 TILTED = np.array([2.0, -1.0, 2.0]) / 3.0

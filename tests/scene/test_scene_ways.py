@@ -11,10 +11,10 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion import along_heading, at_cycles
-from rislam_rt.scene.random_walk import draw_walk
-from rislam_rt.scene.recorded_poses import RecordedPoses, parse_csv
-from rislam_rt.scene.waypoints import round_corners
+from rislam_rt.scene.motion.agent_motion import along_heading, at_cycles
+from rislam_rt.scene.motion.random_walk import draw_walk
+from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv
+from rislam_rt.scene.motion.waypoints import round_corners
 
 EPOCH = 1_700_000_000.0
 CSV = "stamp_ns,px_mm,py_mm,pz_mm,yaw_deg,note\n"

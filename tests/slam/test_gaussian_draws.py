@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats.qmc import Halton
 
-from rislam_rt.slam.gaussian_draws import PRIMES, even_draws, radical_inverse
+from rislam_rt.slam.sampling import PRIMES, even_draws, radical_inverse
 
 
 def test_the_sequence_is_scipys_to_the_bit():

@@ -8,9 +8,9 @@ import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Measurement, RisSpec, RisSpecs
+from rislam_rt.slam.input_checks import check_sides
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, side_of
 from rislam_rt.slam.panel_evidence import panel_probabilities
-from rislam_rt.slam.step_checks import check_sides
 
 SHEET = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
 SHEETS = RisSpecs((SHEET, SHEET))

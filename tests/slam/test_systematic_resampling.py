@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.slam.systematic_resampling import ancestors_at, systematic_ancestors
+from rislam_rt.slam.sampling import ancestors_at, systematic_ancestors
 
 
 def test_particles_are_drawn_as_often_as_their_weights_say() -> None:

@@ -21,7 +21,7 @@ from rislam_rt.report.style import to_png
 from rislam_rt.scene import load_scene
 from rislam_rt.storage.files import MARK
 from rislam_rt.studies import CompareSpec, Fig4aSpec, load_any
-from rislam_rt.studies.compare import run_comparison
+from rislam_rt.studies.channel_validation import run_comparison
 from rislam_rt.studies.fig4a import longer_side, run_fig4a, sphere_gain, walk_to_panel
 
 ROOT = Path(__file__).parents[2]
@@ -204,7 +204,7 @@ def test_compare_writes_the_page_of_its_functions(run, tmp_path):
 
 
 def test_an_unexplained_path_is_exit_1_and_still_written(run, tmp_path, monkeypatch):
-    import rislam_rt.studies.compare as module
+    import rislam_rt.studies.channel_validation as module
     from rislam_rt.channel.compare import OneSidedPath, Validation
 
     def broken(*arguments, **options):

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.room_files import BASELINE, CYCLES
+from rislam_rt.scene.motion.suggested_motion import BASELINE
+from rislam_rt.scene.room_files import CYCLES
 from rislam_rt.scene.write import TRAJECTORY_FILE, tum_bytes
 
 SPEED = 0.1

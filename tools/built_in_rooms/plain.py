@@ -2,7 +2,8 @@
 
 from built_in_rooms.parts import box_walls, sphere
 from built_in_rooms.paths import curved_agent
-from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, reflector
+from rislam_rt.scene.motion.suggested_motion import BASELINE
+from rislam_rt.scene.room_files import CYCLES, RoomFiles, panel, reflector
 
 DOWN, NORTH = [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]
 

@@ -10,7 +10,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.channel.compare.comparison_report import PathReport
 from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.facets import WallFacets, build_facets
+from rislam_rt.channel.image_source.wall_facets import WallFacets, build_facets
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
@@ -84,7 +84,8 @@ _ROUNDS = 20
 def random_poses(
     scene: Scene, count: int, *, rng: np.random.Generator, clearance: float = 0.1, baseline: float = 0.1
 ) -> Trajectory:
-    """Draw `count` random poses inside the room, the midpoint at least `clearance` [m] from every surface.
+    """Draw `count` random poses for a comparison inside the room, the midpoint at least `clearance` [m] from every
+    surface.
 
     Inside means reachable from the scene's start by a chain of free straight lines between poses, so that the
     insides of closed objects are left out and rooms of any shape are covered. The baseline [m] has one random
@@ -110,7 +111,7 @@ def random_poses(
 
 
 def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) -> Trajectory:
-    """Trajectory of positions (K, 3) [m] at rest, one a second, with random headings and a random baseline."""
+    """Trajectory to compare channels on: positions (K, 3) [m] at rest, one a second, random headings and baseline."""
     count = len(position)
     elevation = rng.uniform(np.radians(15.0), np.radians(60.0)) * rng.choice([-1.0, 1.0])
     offset = 0.5 * baseline * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
@@ -121,7 +122,7 @@ def _as_trajectory(position: Floats, baseline: float, rng: np.random.Generator) 
 
 
 def _reachable(facets: WallFacets, start: Floats, points: Floats) -> Booleans:
-    """Which points (N, 3) [m] are reachable from the start by straight lines that nothing blocks, over other points."""
+    """Which points (N, 3) [m] random poses can have: reachable from the start by straight lines that nothing blocks."""
     reached = np.zeros(len(points), dtype=np.bool_)
     walls = facets.possible_blockers(np.concatenate([start[None], points]))
     stations = [start]

@@ -89,7 +89,7 @@ class PathReport:
 
     @property
     def matched(self) -> int:
-        """Number of compared paths that both channels have, counted per cycle."""
+        """Number of paths that both channels of a comparison have, counted per cycle."""
         return len(self.kind)
 
     @property
@@ -137,7 +137,7 @@ class PathReport:
 
     @property
     def explanation_limits(self) -> dict[str, float]:
-        """Largest length or distance [m] on which an explanation of a missing path rests, by reason."""
+        """Largest length or distance [m] on which an explanation of a missing path rests, by reason, for the report."""
         return {r: max(path.size for path in self.one_sided if path.reason == r) for r in self.explained}
 
     def as_dict(self) -> dict[str, Any]:

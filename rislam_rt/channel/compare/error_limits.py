@@ -161,7 +161,7 @@ class RoomPrecision:
 def coherent_scale(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, precision: RoomPrecision
 ) -> Floats:
-    """Coherent scale (M,) of gains, to which their errors are related: the sum of the magnitudes of all contributions.
+    """Scale (M,) of gains for the limits of their errors: the sum of the magnitudes of all contributions.
 
     Of a panel path, over its elements: a null is the difference of large numbers, and its own size says nothing about
     their error. Of a cylinder, its broadside. Of all others the gain itself. Where walls are slabs give `paths` with
@@ -188,7 +188,7 @@ def coherent_scale(
 
 
 def with_perfect_mirrors(scene: Scene) -> Scene | None:
-    """The scene with perfect mirrors in place of slabs, for the coherent scale of gains; None without slabs."""
+    """The scene with perfect mirrors in place of slabs, for the scale of gains in error limits; None without slabs."""
     if not any(reflector.material.is_slab for reflector in scene.reflectors):
         return None
     mirror = Material(reflection=1.0)
@@ -198,14 +198,14 @@ def with_perfect_mirrors(scene: Scene) -> Scene | None:
 
 
 def _polyline(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory) -> Floats:
-    """Points (M, V + 2, 3) [m] of paths from Tx over the interaction points to Rx, the Rx repeated at the end."""
+    """Corners (M, V + 2, 3) [m] of compared paths, Tx to Rx (repeated), whose rounding sets the limits of errors."""
     tx, rx = trajectory.tx[cycle][:, None], trajectory.rx[cycle][:, None]
     there = np.arange(paths.vertices.shape[2]) < paths.num_vertices[path][:, None]
     return np.concatenate([tx, np.where(there[..., None], paths.vertices[cycle, path], rx), rx], axis=1)
 
 
 def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory, names: tuple[str, ...]) -> PathLegs:
-    """Lengths, segments and walls of the legs of paths (cycle[i], path[i]); walls as numbers among `names`."""
+    """Lengths, segments and walls of the legs of compared paths (cycle[i], path[i]), for their error limits."""
     segment = np.linalg.norm(np.diff(_polyline(paths, cycle, path, trajectory), axis=1), axis=-1)
     row, on_tx = np.arange(len(path)), (paths.tx_walls[path] >= 0).sum(axis=1)
     joined, last = paths.landmark[path] >= 0, paths.num_vertices[path]
@@ -225,26 +225,28 @@ def _shape(paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 def _landmark_directions(
     paths: Paths, cycle: Integers, path: Integers, trajectory: Trajectory
 ) -> tuple[Floats, Floats]:
-    """Unit vectors (M, 3) from the landmark of each path towards the point before it and the point after it."""
+    """Unit vectors (M, 3) from each compared path's landmark to the points beside it, for the gain's error limit."""
     points, row = _polyline(paths, cycle, path, trajectory), np.arange(len(path))
     at = (paths.tx_walls[path] >= 0).sum(axis=1) + 1
     return unit(points[row, at - 1] - points[row, at]), unit(points[row, at + 1] - points[row, at])
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """Ratio a / b, 0 where a is 0."""
+    """Ratio of an error to its limit, 0 where the error is 0."""
     return np.where(a > 0.0, a / np.where(b > 0.0, b, np.finfo(np.float64).tiny), 0.0)
 
 
 def _bend(segments: Floats, beside: Floats) -> Floats:
-    """Error (M,) [m] of a polyline's length when its corners move by `beside` (M,) [m] across its segments (M, V)."""
+    """Error limit (M,) [m] of a compared path's length when corners move by `beside` (M,) [m] across segments (M,
+    V)."""
     # A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     across = np.where(segments > 0.0, beside[:, None], 0.0)
     return np.minimum(_ratio(2.0 * across**2, segments), 2.0 * across).sum(axis=1)
 
 
 def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """Largest distance (W,) [m] of corners from each wall's plane, and altitude (W,) [m] of its largest triangle."""
+    """Error limits of walls: largest distance (W,) [m] of corners from the plane, altitude (W,) [m] of the largest
+    triangle."""
     corners, owner = walls.triangles, walls.wall_of_triangle
     height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
     flatness = np.zeros(len(walls))

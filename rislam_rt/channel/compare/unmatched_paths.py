@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.image_source.facets import WallFacets, build_facets
+from rislam_rt.channel.image_source.wall_facets import WallFacets, build_facets
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
@@ -100,7 +100,7 @@ class DifferenceExplainer:
         return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
-        """Identity of a path in words, Rx walls after the bar."""
+        """Identity of an unmatched path in words, Rx walls after the bar."""
         kind, landmark, tx, rx = identity
         text = " ".join([PathKind(kind).name, *tx, *([landmark] if landmark else [])])
         return f"{text} | {' '.join(rx)}" if rx else text
@@ -133,7 +133,7 @@ class DifferenceExplainer:
         return Explanation("", f"all its conditions hold, shortest segment {1e3 * shortest:.4f} mm")
 
     def _legs(self, identity: Identity, cycle: int) -> list[UnfoldedLeg]:
-        """Legs of a path constructed on the walls' unbounded planes, each from its device to the far end."""
+        """Legs of an unmatched path, on the walls' unbounded planes, each from its device to the far end."""
         _, landmark, tx_names, rx_names = identity
         tx_walls, rx_walls = ([self.names.index(n) for n in names] for names in (tx_names, rx_names))
         tx, rx = self.trajectory.tx[cycle], self.trajectory.rx[cycle]
@@ -144,7 +144,7 @@ class DifferenceExplainer:
         return [self._unfolded(tx_walls, tx, point, panel), self._unfolded(rx_walls[::-1], rx, point, panel)]
 
     def _unfolded(self, walls: list[int], device: Floats, far: Floats, panel: int = -1) -> UnfoldedLeg:
-        """Construct a leg on the walls' unbounded planes by mirroring the far end."""
+        """Construct a leg of an unmatched path on the walls' unbounded planes by mirroring the far end."""
         facets, images = self.facets, [far]
         for wall in walls[::-1]:
             images.append(mirror(images[-1], facets.normal[wall], facets.offset[wall]))
@@ -160,7 +160,7 @@ class DifferenceExplainer:
         return UnfoldedLeg(drawn, np.array(walls, dtype=np.int64), float(clearance), shift, panel)
 
     def _shifts(self, points: Floats, images: Floats, walls: list[int]) -> Floats:
-        """Largest lateral errors (d + 1,) [m] of the tracer's float32 ray along the segments of a leg."""
+        """Lateral errors (d + 1,) [m] of a float32 ray along a leg, for which the tracer may lack an unmatched path."""
         # The image method sends a ray from the last point found, moved off its surface by `RAY_OFFSET` of (1 m + its
         # largest coordinate), to the image, moved alike. In between, the ray is off by at most the weighted mean of
         # what its ends are off. An image adds the rounding of its own coordinates and the tilt of the planes it came
@@ -180,7 +180,7 @@ class DifferenceExplainer:
         return shift
 
     def _conditions(self, leg: UnfoldedLeg) -> list[ExistenceCondition]:
-        """All conditions for a leg to exist, with margins from the geometry."""
+        """All conditions for a leg of an unmatched path to exist, with margins from the geometry."""
         reach = float(leg.shift.max())
         found = [
             ExistenceCondition(
@@ -200,7 +200,7 @@ class DifferenceExplainer:
         return found
 
     def _on_wall(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions that bounce `number` of a leg lies on its wall's triangles and on no wall that covers them."""
+        """Conditions of an unmatched path: bounce `number` of a leg is on its wall, and on none that covers it."""
         wall, bounce = int(leg.walls[number]), leg.points[number + 1]
         found = []
         for surface, sign in ((wall, 1.0), *((int(upper), -1.0) for upper in self.facets.over[wall])):
@@ -211,7 +211,7 @@ class DifferenceExplainer:
         return found
 
     def _free(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions that no wall or occluder stands across segment `number` of a leg."""
+        """Conditions of an unmatched path: no wall or occluder stands across segment `number` of a leg."""
         # Walls that the segment bounces on, and those in one plane with them, do not stand in its way, nor does the
         # host wall before its own panel. A wall that is solid where a segment ends within float32 of it is too close to
         # tell.
@@ -239,7 +239,7 @@ class DifferenceExplainer:
         return found + self._unoccluded(leg, number)
 
     def _unoccluded(self, leg: UnfoldedLeg, number: int) -> list[ExistenceCondition]:
-        """Conditions that no occluder stands across segment `number` of a leg; the far end's own does not hide it."""
+        """Conditions of an unmatched path: no occluder, the far end's own apart, across segment `number`."""
         occluders, found = self.facets.occluders, []
         for shade, landmark in enumerate(occluders.landmark):
             last = number == len(leg.walls) and landmark != ALONE
@@ -251,8 +251,8 @@ class DifferenceExplainer:
         return found
 
     def _inside(self, point: Floats, ray: Floats, wall: int) -> float:
-        """Distance [m] of a `ray` (3,) through a point (3,) of a wall's plane from the wall's outline, negative
-        outside."""
+        """Distance [m] of an unmatched path's `ray` (3,) through a point (3,) of a wall from the wall's outline,
+        negative outside."""
         # It is measured across the ray, as are a ray's errors.
         inside = bool(self.facets.contains(point[None], np.array([wall]))[0])
         along = unit(ray)
@@ -263,7 +263,7 @@ class DifferenceExplainer:
 
 
 def _tilts(walls: Walls, center: Floats) -> Floats:
-    """Largest turn (W,) [rad] of the normal of each wall's largest triangle by float32 rounding of its corners."""
+    """Largest turn (W,) [rad] of each wall's normal by float32 rounding of corners, which may cost a channel a path."""
     largest, altitude = walls.largest_triangles()
     extent = np.abs(walls.triangles[largest] - center).max(axis=(1, 2), initial=0.0)
     return 2.0 * FLOAT32_ROUNDING * extent / np.maximum(altitude, np.finfo(np.float64).tiny)

@@ -41,7 +41,8 @@ class LegEnds(NamedTuple):
 
 
 def radiated(pattern: str, polarization: str, direction: Floats, heading: Floats) -> Floats:
-    """Field (N, 2) along theta_hat and phi_hat that an antenna turned by `heading` (N,) radiates along rays (N, 3)."""
+    """Field (N, 2) along theta_hat and phi_hat that an antenna turned by `heading` (N,) radiates along rays (N, 3), by
+    its pattern."""
     level = amplitude(pattern, direction, heading)
     nothing = np.zeros_like(level)
     return np.stack([level, nothing] if polarization == "V" else [nothing, level], axis=-1)

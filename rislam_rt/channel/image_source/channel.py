@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source.antennas import LegEnds
-from rislam_rt.channel.image_source.candidates import SEARCHES, SequenceSearch, build_search
-from rislam_rt.channel.image_source.facets import WallFacets, build_facets
 from rislam_rt.channel.image_source.fresnel import Coatings, build_coatings
-from rislam_rt.channel.image_source.images import find_legs
-from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.image_source.leg_candidates import SEARCHES, SequenceSearch, build_search
+from rislam_rt.channel.image_source.mirror_images import find_legs
+from rislam_rt.channel.image_source.wall_facets import WallFacets, build_facets
 from rislam_rt.channel.path_composition import compose_paths
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
@@ -84,11 +84,12 @@ class ImageSourceChannel:
         )
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths with their gains under another panel code, without a new search."""
+        """The image-source paths with their gains under another panel code, without a new search."""
         return rephase(paths, code)
 
     def _landmark_legs(self, device: Floats, number: int, terminals: LegEnds | None) -> SpecularLegs:
-        """Specular legs from device positions (K, 3) [m] to one landmark; those to a panel arrive at its front."""
+        """Specular legs of the image-source channel from device positions (K, 3) [m] to one landmark; those to a panel
+        arrive at its front."""
         panel, point = self.scene.panel_number(number), self.scene.landmark_positions[[number]]
         host, front, landmark = -1, None, number
         if panel >= 0:

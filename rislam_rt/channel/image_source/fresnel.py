@@ -66,7 +66,7 @@ def slab_coefficients(
 
 
 def polarisation_basis(direction: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors theta_hat and phi_hat (..., 3) of directions (..., 3); along the pole, those of azimuth 0."""
+    """Polarisation basis theta_hat and phi_hat (..., 3) of directions (..., 3); along the pole, those of azimuth 0."""
     x, y, z = np.moveaxis(direction, -1, 0)
     across = np.hypot(x, y)
     at_pole = across < 1e-12
@@ -96,7 +96,7 @@ class Coatings:
     """(W,) constant TM coefficient (in the plane of incidence), NaN where it follows from the angle."""
 
     def coefficient(self, walls: Integers, normals: Floats, direction: Floats) -> Complexes:
-        """Reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
+        """Fresnel reflection coefficients (N,) of rays that leave along `direction` (N, 3) and meet `walls` (N, d).
 
         With slabs on the way, both ends are vertically polarised and the coefficient is the vertical part of what
         arrives of a vertical unit field. `normals` (N, d, 3) are those of the walls. Seen from the far end theta_hat is
@@ -110,7 +110,7 @@ class Coatings:
         return np.asarray(constant * np.prod(self.specular[walls], axis=1))
 
     def carried(self, field: Complexes, walls: Integers, normals: Floats, incident: Floats) -> tuple[Complexes, Floats]:
-        """Field vectors (N, 3) after specular reflection on `walls` (N, d), scattering loss left out, and the last
+        """Polarised fields (N, 3) after specular reflection on `walls` (N, d), scattering loss left out, and the last
         rays' directions (N, 3)."""
         for wall, normal in zip(walls.T, normals.swapaxes(0, 1), strict=True):
             reflected = mirror_direction(incident, normal)
@@ -138,7 +138,7 @@ class Coatings:
 
 
 def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
-    """Look up the reflection properties of the walls' materials at the carrier [Hz].
+    """Look up the materials of the walls for Fresnel reflection at the carrier [Hz].
 
     Raises
     ------
@@ -157,7 +157,7 @@ def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
 
 
 def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
-    """Unit vectors across the plane of incidence, and in it across the incident and the reflected ray."""
+    """Unit vectors for Fresnel reflection: across the plane of incidence, and in it across either ray."""
     across = np.cross(incident, normal)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     level: Booleans = length < 1e-12  # normal incidence: any direction in the wall serves, TE and TM agree there
@@ -168,6 +168,7 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
-    """Reflected part `coefficient (onto . field) out` of a field (N, 3): its part along `onto`, turned to `out`."""
+    """Reflected part `coefficient (onto . field) out` of a polarised field (N, 3): the part along `onto`, now along
+    `out`."""
     result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
     return result

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rislam_rt.channel.legs import SpecularLegs
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.path_composition import compose_paths
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
-from rislam_rt.channel.traced.sequences import CandidateIndices, in_blocks, wall_sides
 from rislam_rt.channel.traced.tracer_startup import start_tracer
+from rislam_rt.channel.traced.wall_sequences import CandidateIndices, in_blocks, wall_sides
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Antennas, Paths, RadioConfig, RisCode, Scene, Trajectory
@@ -84,11 +84,11 @@ class TracedChannel:
         return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
-        """The same paths with their gains under another panel code, without tracing again."""
+        """The traced paths with their gains under another panel code, without tracing again."""
         return rephase(paths, code)
 
     def _trace(self, queries: Sequence[LegQuery]) -> tuple[list[SpecularLegs], bool]:
-        """Trace the specular legs of several queries; also whether all possible wall sequences were tried."""
+        """Trace the legs of several queries for the traced channel; also whether all wall sequences were tried."""
         # Queries that leave the same occluder out are solved together, block by block.
         legs: dict[int, SpecularLegs] = {}
         complete = True
@@ -103,7 +103,7 @@ class TracedChannel:
         return [legs[number] for number in range(len(queries))], complete
 
     def _solve(self, batch: QueryBatch, candidates: CandidateIndices, spared: int) -> FoundLegs:
-        """Legs that the tracer confirms among candidates, with their geometry and field coefficients."""
+        """Legs of the traced channel: what the tracer confirms of candidates, with geometry and coefficients."""
         from rislam_rt.channel.traced.fields import leg_coefficients
         from rislam_rt.channel.traced.visibility import visible_rows
 

@@ -92,32 +92,32 @@ def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Con
 
 
 def _ball(points: Floats) -> PositionBall:
-    """Bounding ball of some points (N, 3) [m] about the middle of their bounds."""
+    """Bounding ball of some points (N, 3) [m], from which cones start, about the middle of their bounds."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     x, y, z = middle.tolist()
     return PositionBall((x, y, z), float(np.linalg.norm(points - middle, axis=-1).max()))
 
 
 def _columns(walls: Integers) -> list[Any]:
-    """Convert wall sequences (N, d) to index arrays of the tracer's backend, one a column."""
+    """Convert wall sequences (N, d), to be tested by cones, to index arrays of the tracer's backend, one a column."""
     columns = [as_indices(wall) for wall in walls.T]
     dr.eval(columns)
     return columns
 
 
 def _wall_ball(tracer_scene: "TracerScene", wall: Any) -> tuple[Any, Any]:
-    """Centres and radii [m] of the bounding balls of walls (N,)."""
+    """Centres and radii [m] of the bounding balls of walls (N,), over which cones open."""
     half = dr.gather(mi.Vector3f, tracer_scene.wall_boxes.half, wall)
     return dr.gather(mi.Point3f, tracer_scene.wall_boxes.center, wall), dr.norm(half)
 
 
 def _mirrored(point: Any, normal: Any, offset: Any) -> Any:
-    """Mirror points in planes, on the tracer's backend."""
+    """Mirror points in planes, to unfold a cone, on the tracer's backend."""
     return point - 2.0 * (dr.dot(normal, point) - offset) * normal
 
 
 def _meets(target: Any, axis: Any, size: Any, source: Any, half: Any) -> Any:
-    """Whether rays from a ball about 0 of radius `source` through one at `axis` of radius `half` can meet a third."""
+    """Whether the cone from a ball about 0 of radius `source` over one at `axis` of radius `half` meets a third."""
     # A ray through both runs, at t times the way to the second, within `source (t - 1) + half t` of `t axis`. So the
     # ball of radius `size` at `target` is met only if `|target - t axis| <= a + b t` for some t >= 1, with a = size -
     # source and b = source + half: a quadratic inequality, its discriminant written without a difference of large

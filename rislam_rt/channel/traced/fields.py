@@ -19,8 +19,8 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.traced.leg_query import LegEndpoints
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
 from rislam_rt.channel.traced.radio_materials import ConstantReflection
-from rislam_rt.channel.traced.sequences import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene
+from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 
@@ -57,8 +57,8 @@ def leg_coefficients(
 
 
 def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -> Complexes:
-    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of a reflection between the (theta, phi) bases of rays (N, 3)
-    before and after."""
+    """Jones matrices (N, 2, 2), or (1, 2, 2) for all, of the field's reflection between the (theta, phi) bases of rays
+    (N, 3) before and after."""
     # A wall of constant R is given in those bases; a slab across the plane of incidence and in it, and turned here.
     if isinstance(material, ConstantReflection):
         return incidence_jones(material, np.ones(1))
@@ -73,8 +73,8 @@ def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -
 
 
 def incidence_jones(material: Any, cosine: Floats) -> Complexes:
-    """Jones matrices (N, 2, 2) of reflection by a radio material at cosines (N,) of incidence, in the basis across and
-    in the plane of incidence.
+    """Jones matrices (N, 2, 2) of a field's reflection by a radio material at cosines (N,) of incidence, in the basis
+    across and in the plane of incidence.
 
     The first component of a field is along a unit vector s across the plane, the second along `k x s`, k being the
     ray's direction. Sionna's material is evaluated with the wall's normal along x and the rays level, where its own
@@ -96,7 +96,8 @@ def incidence_jones(material: Any, cosine: Floats) -> Complexes:
 
 
 def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors theta_hat and phi_hat (N, 3) of directions (N, 3), of azimuth 0 along the vertical."""
+    """Basis of a traced field: unit vectors theta_hat and phi_hat (N, 3) of directions (N, 3), of azimuth 0 along the
+    vertical."""
     cosine, azimuth = direction[:, 2], _azimuth(direction)
     c, s = np.cos(azimuth), np.sin(azimuth)
     sine = np.hypot(direction[:, 0], direction[:, 1])
@@ -104,7 +105,7 @@ def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
 
 
 def _azimuth(direction: Floats) -> Floats:
-    """Azimuth (N,) [rad] of directions (N, 3), 0 along the vertical."""
+    """Azimuth (N,) [rad] of directions (N, 3), for the basis of a traced field; 0 along the vertical."""
     x, y = direction[:, 0], direction[:, 1]
     return np.where(np.hypot(x, y) > POLE, np.arctan2(y, x), 0.0)
 

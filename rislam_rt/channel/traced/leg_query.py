@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
-from rislam_rt.channel.legs import SpecularLegs
+from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.float32_limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
-from rislam_rt.channel.traced.sequences import CandidateIndices, join_indices, point_sides, possible_sequences
+from rislam_rt.channel.traced.wall_sequences import CandidateIndices, join_indices, point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 
@@ -106,7 +106,7 @@ class QueryBatch(NamedTuple):
             first_sequence += len(sequences)
 
     def ends(self, rows: CandidateIndices) -> LegEndpoints:
-        """Positions and antennas at the two ends of each candidate in `rows`."""
+        """Positions and antennas at the two ends of each leg queried in `rows`."""
         sizes = [len(query.device) for query in self.queries]
         far = np.concatenate([query.far for query in self.queries])
         heading = np.concatenate([query.heading for query in self.queries])
@@ -148,7 +148,7 @@ def build_batch(queries: Sequence[LegQuery], tracer_scene: "TracerScene", sides:
 
 
 def join_found(parts: list[FoundLegs]) -> FoundLegs:
-    """Concatenate the legs found in several parts."""
+    """Join the answers to leg queries: the legs found in several parts."""
     geometries = zip(*(part.geometry for part in parts), strict=True)
     return FoundLegs(
         join_indices([part.rows for part in parts]),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.sequences import NO_WALL
+from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction, signed_distance
@@ -28,7 +28,8 @@ class PathGeometry(NamedTuple):
 
 
 def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Floats) -> PathGeometry:
-    """Geometry of legs from devices to far ends (N, 3) [m] over wall sequences (N, D), in float64 on the planes.
+    """Geometry of traced legs from devices to far ends (N, 3) [m] over wall sequences (N, D), refined in float64 on the
+    planes.
 
     The far end is mirrored in the walls from its own end on; the straight line from the device to the last image meets
     the first wall, the one from there to the image before meets the second, and so on.
@@ -54,7 +55,7 @@ def refined_geometry(walls: Walls, sequences: Integers, device: Floats, far: Flo
 
 
 def segment_directions(walls: Walls, sequences: Integers, at_device: Floats) -> Floats:
-    """Unit vectors (N, D + 1, 3) of travel along each segment of legs that begin along (N, 3), the last repeated."""
+    """Unit vectors (N, D + 1, 3) along each segment of traced legs that begin along (N, 3), the last repeated."""
     travel = [at_device]
     for wall in sequences.T:
         travel.append(
@@ -73,6 +74,7 @@ def traced_geometry(sequences: Integers, device: Floats, far: Floats, vertices: 
 
 
 def polyline(sequences: Integers, device: Floats, far: Floats, vertices: Floats) -> Floats:
-    """Vertices (N, D + 2, 3) [m] of legs: device, bounce points and far end, which repeats where bounces are fewer."""
+    """Vertices (N, D + 2, 3) [m] of traced legs: device, bounce points and far end, repeated where bounces are
+    fewer."""
     inner = np.where((sequences != NO_WALL)[..., None], vertices, far[:, None])
     return np.concatenate([device[:, None], inner, far[:, None]], axis=1)

@@ -15,7 +15,8 @@ from rislam_rt.model import Material
 
 
 def kept_components(reflection: mi.Float, incident: mi.Vector3f, reflected: mi.Vector3f) -> mi.Matrix4f:
-    """Jones matrix, in Sionna's bases, of a reflection that keeps the field's theta and phi parts and scales both by R.
+    """Jones matrix, in Sionna's bases, of a radio material that keeps the field's theta and phi parts and scales both
+    by R.
 
     Sionna's basis is theta_hat, except within 1e-3 rad of the vertical, where it is a fixed direction in both rays: R
     times the identity there would mirror the field and multiply a matched signal by `-cos(2 phi)`.
@@ -70,7 +71,7 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         return dr.full(mi.Float, 1.0, dr.width(si.wi))
 
     def traverse(self, callback: mi.TraversalCallback) -> None:
-        """Register R of the material with Mitsuba's differentiable parameters."""
+        """Register the constant R of a radio material with Mitsuba's differentiable parameters."""
         callback.put("reflection", self._reflection, mi.ParamFlags.Differentiable)
 
     def _jones(self, si: mi.SurfaceInteraction3f, wo: mi.Vector3f) -> mi.Matrix4f:
@@ -93,7 +94,7 @@ class RoughConstantReflection(rt.RadioMaterial):  # type: ignore[misc]
         self._reflection = reflection
 
     def _event_probabilities(self, r_te: Any, r_tm: Any, t_te: Any, t_tm: Any, enabled_interactions: Any) -> Any:
-        """Event probabilities of a scattering wall of constant R, which lets nothing pass; the rest is Sionna's."""
+        """Event probabilities of a rough radio material of constant R, which lets nothing pass."""
         r, t = mi.Complex2f(self._reflection), mi.Complex2f(0.0)  # type: ignore[operator]
         return super()._event_probabilities(r, r, t, t, enabled_interactions)
 

@@ -30,7 +30,7 @@ class SelfTest:
 
     @property
     def ok(self) -> bool:
-        """Whether all paths were found with their gains (to float32 precision: 1e-3 dB leaves a factor of 30)."""
+        """Whether the self-test found all paths with their gains (float32 precision: 1e-3 dB leaves a factor of 30)."""
         return self.num_paths == self.expected_paths and max(self.los_error_db, self.wall_error_db) < 1e-3
 
 

@@ -11,7 +11,7 @@ import sionna.rt as rt
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.traced.radio_materials import specular_material
-from rislam_rt.channel.traced.sequences import NO_WALL
+from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
@@ -79,17 +79,17 @@ class TracerScene:
         return np.where(known, self.wall_of_primitive[index], NO_WALL)
 
     def is_stacked(self, wall: Integers) -> Booleans:
-        """Whether each of walls (...,) overlaps another wall in its plane."""
+        """Whether each of the tracer scene's walls (...,) overlaps another wall in its plane."""
         sharing = np.bincount(self.walls.plane, minlength=len(self.walls)) > 1
         return (wall != NO_WALL) & sharing[self.walls.plane[wall]] if len(self.walls) else wall != NO_WALL
 
     def share_plane(self, a: Integers, b: Integers) -> Booleans:
-        """Whether walls `a` and `b` (...,) are in one plane by lying on each other."""
+        """Whether walls `a` and `b` (...,) of the tracer's scene are in one plane by lying on each other."""
         return (a != NO_WALL) & (b != NO_WALL) & (self.walls.plane[a] == self.walls.plane[b])
 
     def on_top(self, wall: Integers, points: Floats) -> Booleans:
-        """Whether overlapping walls (N, D) are what reflects at points (N, D, 3) [m]: solid there and not covered; true
-        for all other walls."""
+        """Whether overlapping walls (N, D) of the tracer's scene are what reflects at points (N, D, 3) [m]: solid there
+        and not covered; true for all other walls."""
         top = np.ones(wall.shape, dtype=np.bool_)
         for number in np.unique(wall[self.is_stacked(wall)]):
             here = wall == number
@@ -99,7 +99,7 @@ class TracerScene:
         return top
 
     def _has(self, wall: int, points: Floats) -> Booleans:
-        """Which points (N, 3) of its plane are on a wall, within the uncertainty of float32 vertices."""
+        """Which points (N, 3) of its plane are on a wall of the tracer's scene, as far as float32 vertices tell."""
         return inside_any(points, self.walls.triangles[self.walls.wall_of_triangle == wall], SURFACE_TOLERANCE)
 
 
@@ -169,7 +169,7 @@ def _numbered(
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
-    """Planes and bounding boxes of the walls about `origin`, for the tracer."""
+    """Planes and bounding boxes of the walls in the tracer's scene, about `origin`."""
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
@@ -182,17 +182,17 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
 
 
 def as_points(points: Floats) -> mi.Point3f:
-    """Convert positions (N, 3) [m] to float32 points of the tracer's backend."""
+    """Convert positions (N, 3) [m] for the tracer's scene to float32 points of its backend."""
     return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
 
 
 def as_indices(values: Integers) -> mi.UInt:
-    """Convert numbers (N,) to unsigned integers of the tracer's backend."""
+    """Convert numbers (N,) for the tracer's scene to unsigned integers of its backend."""
     return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
 
 
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:
-    """Mitsuba mesh of separate triangles (T, 3, 3) [m], in their order."""
+    """Mitsuba mesh for the tracer's scene, of separate triangles (T, 3, 3) [m], in their order."""
     mesh = mi.Mesh(
         name, vertex_count=3 * len(triangles), face_count=len(triangles), has_vertex_normals=False,
         has_vertex_texcoords=False,

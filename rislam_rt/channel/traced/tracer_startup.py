@@ -1,9 +1,9 @@
-"""Start the tracer once, on the backend that `rislam_rt.backend` chose."""
+"""Start the tracer once, on the backend that `rislam_rt.tracer_backend` chose."""
 
 from functools import cache
 from importlib import import_module
 
-from rislam_rt.backend import BackendInfo, prepare_backend, uninterrupted
+from rislam_rt.tracer_backend import BackendInfo, prepare_backend, uninterrupted
 
 
 @cache

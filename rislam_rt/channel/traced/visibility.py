@@ -1,8 +1,8 @@
 """Visibility test by Sionna's image method: which candidates for legs exist in the meshes, and where they bounce.
 
 `PathSolver` finds its candidates by shooting rays, for all pairs of sources and targets. Here the candidates are
-given (`sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory is
-one solve and no candidate depends on luck. The answer is the tracer's own: images in the meshes' planes, rays back
+given (`wall_sequences.py`), each row naming one far end, one device and one wall sequence, so that a whole trajectory
+is one solve and no candidate depends on luck. The answer is the tracer's own: images in the meshes' planes, rays back
 through the scene, occlusion, and the primitives hit.
 """
 
@@ -21,8 +21,8 @@ from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
-from rislam_rt.channel.traced.sequences import NO_WALL, CandidateIndices, turned_round
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_points
+from rislam_rt.channel.traced.wall_sequences import NO_WALL, CandidateIndices, turned_round
 
 
 class SingleRays:
@@ -39,7 +39,7 @@ class SingleRays:
         return getattr(self._scene, name)
 
     def ray_intersect(self, *args: Any, **options: Any) -> Any:
-        """Intersect rays with the scene like `mi.Scene.ray_intersect`, each ray by itself."""
+        """Intersect rays with the scene for a visibility test like `mi.Scene.ray_intersect`, each ray by itself."""
         return self._scene.ray_intersect(*args, **{**options, "coherent": False})
 
 
@@ -77,7 +77,7 @@ def visible_rows(
 def _clear_of_occluder(
     tracer_scene: TracerScene, spared: int, sequences: Integers, device: Floats, vertices: Floats
 ) -> Integers:
-    """Rows of visible legs whose segments to the last bounce miss the occluding mesh of the scatterer at their end."""
+    """Rows of legs that stay visible: the mesh of the scatterer at their end hides no segment but the last."""
     clear = np.ones(len(device), dtype=np.bool_)
     last = device
     for bounce, wall in enumerate(sequences.T):
@@ -101,7 +101,7 @@ def _trace(
 
 
 def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:
-    """Rows of the candidates that the tracer found visible with every bounce on the wall asked for."""
+    """Rows of the candidates that the tracer's visibility test confirmed with every bounce on the wall asked for."""
     # The image method also accepts a hit on another wall in the same plane; that is another path's business. Where
     # walls lie on each other the ray meets any of them, and the one on top reflects.
     valid = np.array(traced.valid, dtype=np.bool_)
@@ -120,7 +120,7 @@ def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuff
 
 @contextmanager
 def _short_segments() -> Iterator[None]:
-    """Lower Sionna's limit on the length of segments to `SEGMENT_LIMIT` for the duration of a `with` block."""
+    """Lower Sionna's limit on the length of segments to `SEGMENT_LIMIT` for a visibility test, in a `with` block."""
     own = image_method.MIN_SEGMENT_LENGTH
     image_method.MIN_SEGMENT_LENGTH = SEGMENT_LIMIT
     try:
@@ -130,7 +130,8 @@ def _short_segments() -> Iterator[None]:
 
 
 def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateIndices) -> PathsBuffer:
-    """Fill Sionna's path buffer with candidates, from far ends to devices over wall sequences (N, D), in reverse.
+    """Fill Sionna's path buffer with candidates to test their visibility, from far ends to devices over wall sequences
+    (N, D), in reverse.
 
     Its vertices are any point of each wall's plane, which the image method needs, from the tracer scene's origin.
     """
@@ -152,13 +153,13 @@ def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateI
 
 
 def read_vertices(tracer_scene: TracerScene, buffer: PathsBuffer, keep: Integers, sequences: Integers) -> Floats:
-    """Bounce points (N, D, 3) [m] read from the tracer's buffer for the paths `keep`, from device to far end."""
+    """Bounce points (N, D, 3) [m] of the visible paths `keep` from the tracer's buffer, from device to far end."""
     columns = [np.array(getattr(buffer, f"vertices_{axis}"), dtype=np.float64) for axis in "xyz"]
     return turned_vertices(np.stack(columns, axis=-1)[keep, : sequences.shape[1]] + tracer_scene.origin, sequences)
 
 
 def turned_vertices(vertices: Floats, sequences: Integers) -> Floats:
-    """Bounce points (N, D, 3) of the tracer's buffer in opposite order, zero where there is no wall."""
+    """Bounce points (N, D, 3) of visible paths, opposite to the tracer's buffer, zero where there is no wall."""
     index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
     turned = np.take_along_axis(vertices, np.maximum(index, 0)[..., None], axis=1)
     return np.where((index >= 0)[..., None], turned, 0.0)

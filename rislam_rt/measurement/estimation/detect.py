@@ -111,7 +111,7 @@ def _climb(
 
 
 def _signals(grid: MatchedFilterGrid, point: Floats) -> list[Complexes]:
-    """Signal of a path at a point (3,), as factors over tones, rows and columns."""
+    """Signal of a path at a point (3,) of the detection grid, as factors over tones, rows and columns."""
     return [phasor(value * place) for place, value in zip(grid.places, point, strict=True)]
 
 
@@ -124,7 +124,7 @@ def _moments(grid: MatchedFilterGrid, signal: list[Complexes], residual: Complex
 
 
 def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
-    """Newton steps (3,) to a peak of |a^H y|^2, each parameter alone; uphill also where the curvature is positive."""
+    """Newton steps (3,) to a detected peak of |a^H y|^2, each parameter alone; uphill for either curvature."""
     value, first, second = moments.T
     power = value.real**2 + value.imag**2
     gradient = value.real * first.real + value.imag * first.imag
@@ -134,7 +134,7 @@ def _newton_moves(moments: Complexes, grid: MatchedFilterGrid) -> Floats:
 
 
 def into_range(parameters: Floats, window: tuple[float, float]) -> Floats:
-    """Clip path parameters (..., 3): the delay to the window, the direction cosines to the unit disc."""
+    """Clip parameters (..., 3) of detected paths: the delay to the window, the direction cosines to the unit disc."""
     delay = np.clip(parameters[..., :1], *window)
     cosines = parameters[..., 1:]
     return np.concatenate([delay, cosines / np.maximum(np.linalg.norm(cosines, axis=-1, keepdims=True), 1.0)], axis=-1)

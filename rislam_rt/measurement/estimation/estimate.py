@@ -64,7 +64,8 @@ def estimate_paths(
     sounding: Sounding, grid: MatchedFilterGrid, samples: Complexes, threshold: float, window: tuple[float, float],
     most: int, known: Floats = NOTHING,
 ) -> Estimate:  # fmt: skip
-    """Estimate all paths in samples (L, M) whose noise has unit variance: detect, refine, drop, and repeat.
+    """The waveform estimator: all paths in samples (L, M) whose noise has unit variance; detect, refine, drop, and
+    repeat.
 
     Parameters
     ----------
@@ -112,7 +113,8 @@ def _finish(
 
 
 def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
-    """Which paths (P,) to refine: the last `fresh` ones, and those from whose signal these take more than noise."""
+    """Which paths (P,) the waveform estimator refines next: the last `fresh` ones, and those from whose signal these
+    take more than noise."""
     energy = np.abs(fit.amplitude[-fresh:]) ** 2 / num_samples
     touched = np.any(np.abs(fit.inner.signal[:, -fresh:]) ** 2 * energy > TOUCHED, axis=1)
     touched[-fresh:] = True
@@ -122,7 +124,8 @@ def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
 def drop(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
 ) -> LeastSquaresFit:
-    """Drop paths of a fit that left the window or the unit disc, or that lower the cost by less than the threshold."""
+    """Step of the waveform estimator: drop paths that left the window or the unit disc, or that lower the cost too
+    little."""
     keep = np.all(np.abs(fit.parameters - into_range(fit.parameters, window)) <= SLACK, axis=-1)
     if not keep.all():
         fit = subset_fit(sounding, fit, keep, samples)
@@ -131,7 +134,7 @@ def drop(
 
 
 def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float) -> LeastSquaresFit:
-    """Drop paths of a fit that their neighbours, once refined, can explain as well.
+    """Step of the waveform estimator: drop paths of a fit that their neighbours, once refined, can explain as well.
 
     Noise alone lowers the cost by its highest peak when a path is added, so the threshold is the one of the search.
     Only paths whose amplitude is uncertain by more than that are tried, the most uncertain first.
@@ -155,7 +158,8 @@ def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshol
 def _neighbours_instead(
     sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, row: int, enough: float
 ) -> Floats | None:
-    """Parameters (P - 1, 3) of a fit without one path, neighbours refined; None if the cost is not below `enough`."""
+    """The waveform estimator's fit with one path less, its neighbours refined (P - 1, 3); None if the cost is not below
+    `enough`."""
     near = np.flatnonzero(np.abs(fit.inner.signal[row]) > COUPLED * sounding.num_samples)
     whole, local = residual_fit(sounding, fit, near, samples)
     others = near != row
@@ -169,6 +173,7 @@ def _neighbours_instead(
 
 
 def _among(parameters: Floats, marked: Floats) -> Booleans:
-    """Which paths (P, 3) lie within `SLACK` of one of the paths `marked` (Q, 3)."""
+    """Which paths (P, 3) the waveform estimator holds for those `marked` (Q, 3), being within `SLACK` of one of
+    them."""
     apart = np.abs(parameters[:, None] - marked)
     return np.any(np.all(apart < SLACK, axis=-1), axis=1)

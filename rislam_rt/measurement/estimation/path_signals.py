@@ -34,7 +34,7 @@ class Sounding(NamedTuple):
 
     @property
     def num_samples(self) -> int:
-        """Number of samples L M, which is the energy of a path's signal of unit amplitude."""
+        """Number of samples L M of a sounding, which is the energy of a path's signal of unit amplitude."""
         return len(self.frequency) * len(self.row) * len(self.col)
 
 
@@ -72,7 +72,7 @@ class PathSignals(NamedTuple):
 
     @property
     def antennas(self) -> Complexes:
-        """Antenna vectors (L, P) of the paths."""
+        """Antenna vectors (L, P) of the paths' signals."""
         return (self.row[:, None] * self.col).reshape(len(self.row) * len(self.col), -1)
 
     def correlate(self, sounding: Sounding, samples: Complexes) -> Complexes:
@@ -164,7 +164,7 @@ def correlate_waves(sounding: Sounding, waves: Complexes, samples: Complexes) ->
 
 
 def _excess(sounding: Sounding, parameters: Floats) -> Floats:
-    """Excess length (L, P) [wavelengths] of each path to each element over that to the array's centre."""
+    """Excess length (L, P) [wavelengths] of each path's signal to each element over that to the array's centre."""
     x, y = (part.reshape(-1, 1) for part in np.meshgrid(sounding.row, sounding.col, indexing="ij"))
     radius = np.maximum(parameters[:, 0] / sounding.squint, SHORTEST_RADIUS)
     along = x * parameters[:, 1] + y * parameters[:, 2]

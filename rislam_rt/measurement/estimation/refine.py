@@ -99,7 +99,7 @@ def _fit(waves: PathSignals, inner: InnerProducts, seen: Complexes, energy: floa
 
 
 def _times(matrix: Floats, vector: Complexes) -> Complexes:
-    """Product of a real matrix (n, m) and complex amplitudes (m,), without making the matrix complex."""
+    """Product of a real matrix (n, m) and complex amplitudes (m,) in the refinement, the matrix staying real."""
     parts = np.ascontiguousarray(vector).view(np.float64).reshape(-1, 2)
     return np.asarray((matrix @ parts).view(np.complex128)[:, 0])
 
@@ -143,12 +143,12 @@ def residual_fit(
 
 
 def residual(fit: LeastSquaresFit, samples: Complexes) -> Complexes:
-    """Residual (L, M) of the samples after subtracting all fitted paths."""
+    """Residual (L, M) of the samples of a refinement, all fitted paths subtracted."""
     return samples - contribution(fit, np.arange(len(fit.amplitude)), samples)
 
 
 def contribution(fit: LeastSquaresFit, rows: Integers | Booleans, samples: Complexes) -> Complexes:
-    """Signal (L, M) of some of the fitted paths."""
+    """Signal (L, M) that some of the refined paths contribute to the fit."""
     if fit.exact is not None:
         return np.asarray((fit.exact[:, rows] @ fit.amplitude[rows]).reshape(samples.shape))
     return fit.waves.take(rows).sum(fit.amplitude[rows])
@@ -237,7 +237,8 @@ def amplitude_variance(inner: InnerProducts, known: Floats, amplitude: Complexes
 
 
 def without_idle(fit: LeastSquaresFit, threshold: float) -> Booleans:
-    """Which paths (P,) to keep when those are dropped, one by one, that lower the cost by less than the threshold.
+    """Which refined paths (P,) to keep when those are dropped, one by one, that lower the cost by less than the
+    threshold.
 
     The others' amplitudes are fitted again after each, by a rank-one change of their covariance.
     """

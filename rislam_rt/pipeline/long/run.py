@@ -16,7 +16,7 @@ from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise, summary_table
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.store import run_folder
 from rislam_rt.pipeline.store.exports import record_files
 from rislam_rt.progress import Tell

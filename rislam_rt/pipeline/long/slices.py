@@ -16,14 +16,14 @@ import numpy as np
 from rislam_rt.arrays import Integers
 from rislam_rt.errors import ResultError
 from rislam_rt.model import NOTHING, Body, Paths, Scene, SchemeResult, Trajectory
-from rislam_rt.pipeline import dataset
+from rislam_rt.pipeline import run_datasets
+from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.room.diffuse_clutter import trace_diffuse_clutter
-from rislam_rt.pipeline.run import build_channel
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.seeds import Seeds
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.progress import Tell
 from rislam_rt.storage.netcdf import read_dataset, write_dataset
 
@@ -79,11 +79,11 @@ def run_slices(
         part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
-            (slice_file(folder, number, PATHS_FILE), dataset.paths_to_dataset(own, scene.agent[first:last])),
-            (slice_file(folder, number, f"scheme_{name}.nc"), dataset.scheme_to_dataset(part)),
+            (slice_file(folder, number, PATHS_FILE), run_datasets.paths_to_dataset(own, scene.agent[first:last])),
+            (slice_file(folder, number, f"scheme_{name}.nc"), run_datasets.scheme_to_dataset(part)),
             (slice_file(folder, number, f"measurements_{name}.nc"), given_to_dataset(part)),
         ):
-            write_dataset(dataset.seal_dataset(data, run=run, slice=str(number)), file)
+            write_dataset(run_datasets.seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
 
 
@@ -112,16 +112,16 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
         for what in (PATHS_FILE, f"scheme_{name}.nc"):
             file = slice_file(folder, number, what)
             data = read_dataset(file)
-            dataset.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
+            run_datasets.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
             found.append(data)
-        scheme = dataset.dataset_to_scheme(found[1])
+        scheme = run_datasets.dataset_to_scheme(found[1])
         if scheme.scheme != name:
             raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield SlicePart(scene.agent[first:last], dataset.dataset_to_paths(found[0]), scheme)
+        yield SlicePart(scene.agent[first:last], run_datasets.dataset_to_paths(found[0]), scheme)
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:
-    """True trajectory, true paths and result of a scheme at every n-th cycle of a long run, at most `SHOWN` in all."""
+    """True trajectory, paths and a scheme's result at every n-th cycle of a long run's slices, at most `SHOWN`."""
     stride = -(-len(scene.agent) // SHOWN)
     paths, schemes, at = [], [], 0
     for part in parts:
@@ -192,13 +192,13 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
 
 
 def subsampled_paths(paths: Paths, rows: Integers) -> Paths:
-    """Paths of the cycles in `rows` alone."""
+    """Paths of the cycles in `rows` alone, of a long run's slice."""
     names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
     return replace(paths, **{name: getattr(paths, name)[rows] for name in names}, ris=None)
 
 
 def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
-    """Result of a scheme for the cycles in `rows` alone."""
+    """Result of a scheme for the cycles in `rows` alone, of a long run's slice."""
     names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
              "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
     return replace(
@@ -219,7 +219,7 @@ def path_columns(parts: Sequence[Paths]) -> list[Integers]:
 
 
 def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> Any:
-    """Array (K, count, ...) of arrays (K_i, P_i, ...) under each other, each at its `columns`; zero elsewhere."""
+    """Slices' arrays (K_i, P_i, ...) in one (K, count, ...) under each other, each at its `columns`; zero elsewhere."""
     tail = tuple(max(sizes) for sizes in zip(*(part.shape[2:] for part in parts), strict=True))
     table = np.zeros((sum(map(len, parts)), count, *tail), dtype=parts[0].dtype)
     row = 0
@@ -233,6 +233,6 @@ def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> An
 
 
 def _stacked(parts: Sequence[Integers]) -> Integers:
-    """Arrays of different width under each other, rows filled up with `NOTHING`."""
+    """Slices' arrays of different width under each other, rows filled up with `NOTHING`."""
     width = max(part.shape[1] for part in parts)
     return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1])), constant_values=NOTHING) for p in parts])

@@ -15,7 +15,7 @@ from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
 from rislam_rt.pipeline.scores.summary import has_diverged, landmark_track, map_score, nees_per_dof, over_budget
-from rislam_rt.pipeline.scores.walls import count_ghosts, wall_scores
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
 
 CLUTTER = None
 
@@ -46,7 +46,7 @@ class Tally:
             yield part
 
     def add(self, part: SlicePart) -> None:
-        """Add the errors, associations, landmarks and times of one slice to the sums."""
+        """Add the errors, associations, landmarks and times of one slice of a long run to the tally."""
         scheme, truth = part.scheme, part.motion.position
         errors = position_errors(scheme.position, truth)
         self.cycles += len(errors)
@@ -92,7 +92,7 @@ class Tally:
         }
 
     def _count_landmarks(self, part: SlicePart) -> None:
-        """Add the squared errors of each landmark in one slice, and the cycles in which it is held and identified."""
+        """Tally a slice's squared errors of each landmark, and the cycles in which it is held and identified."""
         track = landmark_track(self.scene, part.scheme)
         self.landmark_square += np.nansum(track.error**2, axis=0)
         self.held += (track.column >= 0).sum(axis=0)
@@ -104,7 +104,7 @@ class Tally:
             self.identified[number] += int(np.sum(part.scheme.named(panel)[rows, column[rows]]))
 
     def _landmarks(self) -> dict[str, dict[str, Any]]:
-        """Scores of each true landmark, by name."""
+        """Scores of each true landmark from the tally of a long run, by name."""
         found: dict[str, dict[str, Any]] = {}
         for number, name in enumerate(self.scene.landmarks):
             held, final = int(self.held[number]), float(self.landmark_final[number])
@@ -119,7 +119,7 @@ class Tally:
         return found
 
     def _count_components(self, part: SlicePart) -> None:
-        """Add to the counts of components by the landmark that the estimator associated and by their true source."""
+        """Tally a slice's components by the landmark that the estimator associated and by their true source."""
         scheme = part.scheme
         shown = scheme.component_path != NOTHING
         label = np.maximum(scheme.component_landmark[shown], -1)
@@ -129,7 +129,7 @@ class Tally:
             self.pairs[who, sources[path]] += count
 
     def _association(self) -> tuple[float, float, float]:
-        """Accuracy, precision and recall of data association."""
+        """Accuracy, precision and recall of data association from the tally of a long run."""
         labels = sorted({label for label, _ in self.pairs})
         sources = sorted({source for _, source in self.pairs}, key=lambda s: (s is not None, s))
         counts = np.array([[self.pairs[label, source] for source in sources] for label in labels], dtype=np.int64)
@@ -148,7 +148,7 @@ class _Overlap:
         self.origin: Floats | None = None
 
     def add(self, estimate: Floats, truth: Floats) -> None:
-        """Add estimated and true positions (K, 3) [m], relative to the first true one against cancellation."""
+        """Tally estimated and true positions (K, 3) [m] of a slice, relative to the first, against cancellation."""
         self.origin = truth[0].copy() if self.origin is None else self.origin
         estimate, truth = estimate - self.origin, truth - self.origin
         self.count += len(truth)
@@ -157,7 +157,7 @@ class _Overlap:
         self.cross += complex(np.sum(np.conj(_plane(estimate)) * _plane(truth)))
 
     def rmse(self) -> float:
-        """Root mean square error [m] of the positions after alignment."""
+        """Root mean square error [m] of a long run's tallied positions after alignment."""
         mean = self.sums / self.count
         overlap = self.cross - self.count * complex(np.conj(_plane(mean[:1])[0]) * _plane(mean[1:])[0])
         own, true, both = self.squares - self.count * np.stack([mean[0] ** 2, mean[1] ** 2, mean[0] * mean[1]])
@@ -167,5 +167,5 @@ class _Overlap:
 
 
 def _plane(points: Floats) -> Any:
-    """Horizontal coordinates of points (K, 3) as complex numbers x + jy."""
+    """Horizontal coordinates of points (K, 3) as complex numbers x + jy, to tally the alignment."""
     return points[:, 0] + 1j * points[:, 1]

@@ -8,7 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec, SchemeResult
 from rislam_rt.model.ris import join_sheets
-from rislam_rt.pipeline.dataset import AXES, names_of
+from rislam_rt.pipeline.run_datasets import AXES, names_of
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import Entry, padded, variables
 
@@ -144,7 +144,7 @@ def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
 
 
 def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, ...]]:
-    """Data sheet of the recorded RIS panels, and the phase code of each cycle; None without a panel."""
+    """Data sheet of the RIS panels among recorded inputs, and the phase code of each cycle; None without a panel."""
     if "code" not in data:
         return None, (None,) * data.sizes["time"]
     levels, elements = int(data.attrs["panel_levels"]), names_of(data.attrs["panel_element"])

@@ -14,7 +14,7 @@ from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import read_dataset
 
@@ -74,7 +74,7 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
 
 
 def run_rng(file: str | Path) -> np.random.Generator | None:
-    """Random generator of the filter from a run's file of measurements, with which its estimate repeats to the bit.
+    """Random generator of the filter from a file of measurements, with which a run's estimate repeats to the bit.
 
     None for a file of another origin.
     """
@@ -226,7 +226,8 @@ def _check_names(columns: Mapping[str, Floats], place: str) -> None:
 
 
 def _filled(columns: Mapping[str, Floats], radio: RadioConfig, place: str) -> dict[str, Floats]:
-    """Fields of measurements from a user's columns: cosines from angles, amplitudes and missing stds from the SNR."""
+    """Fields of measurements from the columns of a user's own table: cosines from angles, amplitudes and missing stds
+    from the SNR."""
     if "amplitude" in columns:
         amplitude = columns["amplitude"]
         with np.errstate(over="ignore"):

@@ -14,8 +14,8 @@ from rislam_rt.pipeline.assumed_model import tell_settings
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator, OwnDiagnostics
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.specification.read import Table, build_spec
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted
 
@@ -92,7 +92,7 @@ class Recorder:
 
     @property
     def estimator(self) -> Estimator:
-        """Functions to be used in place of the wrapped estimator's, which record what passes."""
+        """Functions to be used in place of the wrapped estimator's, which record for a replay what passes."""
         return self.inner._replace(init=self._init, step=self._step, estimate=self._estimate)
 
     @property
@@ -103,7 +103,8 @@ class Recorder:
 
     @property
     def answers(self) -> Answers:
-        """All estimates and diagnostics that the wrapped estimator returned so far, and its mean time."""
+        """All estimates and diagnostics that the wrapped estimator returned so far, and its mean time, as recorded for
+        a replay."""
         return Answers(tuple(self.estimates), tuple(self.infos), self.seconds / max(len(self.steps), 1))
 
     def _init(
@@ -176,7 +177,7 @@ def replay(
 
 
 def _alternated_panels(inputs: Inputs) -> int:
-    """Number of RIS panels that the receiver of a recording told apart by alternated codes; 0 where it did not."""
+    """Number of RIS panels that a replayed recording's receiver told apart by alternated codes; 0 for none."""
     if all(one.from_panel is None for one in inputs.measurements):
         return 0
     return 1 if inputs.panel is None else len(inputs.panel.panels)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.specification.spec import DiffuseSection
+from rislam_rt.pipeline.specification.pipeline_spec import DiffuseSection
 
 
 def check_diffuse(scene: Scene, section: DiffuseSection, channel: str) -> None:

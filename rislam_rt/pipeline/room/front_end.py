@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.measurement import FrontEnd, HardwareConfig, build_front_end, calibrate, capture, receive
-from rislam_rt.measurement.received import direct_gain
+from rislam_rt.measurement.received_paths import direct_gain
 from rislam_rt.model import Body, Paths, Trajectory
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 
 def prepare_front_end(

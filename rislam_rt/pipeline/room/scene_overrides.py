@@ -9,7 +9,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import RisPanel, Scatterer, Scene, join_panels
-from rislam_rt.pipeline.specification.spec import RoomSection
+from rislam_rt.pipeline.specification.pipeline_spec import RoomSection
 
 RADIUS = 0.05
 """[m] Radius of an added scatterer, a sphere: the paper's."""
@@ -46,14 +46,14 @@ def change_room(scene: Scene, room: RoomSection, *, rng: np.random.Generator) ->
 
 
 def _changed(panel: RisPanel, room: RoomSection) -> RisPanel:
-    """RIS panel with the rows, columns and phase levels that `[room]` gives."""
+    """RIS panel with the rows, columns and phase levels by which `[room]` overrides the scene's."""
     spec = panel.spec
     rows, cols = room.panel_rows or spec.rows, room.panel_cols or spec.cols
     return replace(panel, spec=replace(spec, rows=rows, cols=cols, levels=room.panel_levels or spec.levels))
 
 
 def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[Scatterer, ...]:
-    """The scene's first `count` scatterers; if it has fewer, spheres are added at random free places of the room."""
+    """Scatterers as `[room]` overrides their number: the scene's first `count`, or spheres at random free places."""
     found = list(scene.scatterers[:count])
     walls = build_walls(scene)
     surfaces = np.concatenate([walls.triangles, walls.occluders.triangles])
@@ -72,7 +72,7 @@ def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[
 
 
 def _is_free(point: Floats, surfaces: Floats, others: Floats, way: Floats) -> bool:
-    """Whether a point (3,) [m] keeps the least distances from triangles, other landmarks and the agent's positions."""
+    """Whether a scatterer added by scene overrides keeps clear of triangles, landmarks and the agent's positions."""
     if float(distance_to_triangles(point[None], surfaces).min()) < OFF_WALLS:
         return False
     nearest = float(np.linalg.norm(others - point, axis=1).min(initial=np.inf))

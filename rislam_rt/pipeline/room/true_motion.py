@@ -55,7 +55,7 @@ def draw_motion(scene: Scene, sigma_a: float, *, rng: np.random.Generator) -> Tr
 
 
 def draw_walks(time: Floats, sigma_a: float, count: int, *, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Positions and velocities (count, K, 2) [m, m/s] of random walks that start at rest in the origin."""
+    """Random walks in the true motion: positions and velocities (count, K, 2) [m, m/s] from rest in the origin."""
     dt = np.diff(time)[:, None]
     push = sigma_a * rng.standard_normal((count, len(time) - 1, 2))
     speed = np.zeros((count, len(time), 2))

@@ -10,15 +10,15 @@ from rislam_rt.model import NOTHING, PathKind, Paths, Scene, SchemeResult
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.walls import coplanar
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.scores.wall_scores import coplanar
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 Source = tuple[int, ...]
 """Source of a path: landmark and the plane that mirrors it (-1: none); of a wall return -1 and its planes, sorted."""
 
 
 def uses_wall_returns(scheme: str, settings: Settings) -> bool:
-    """Whether a scheme's estimator uses wall returns (VT paths) as measurements of its map."""
+    """Whether the score of association counts wall returns (VT paths) as sources: a scheme's estimator uses them."""
     known = scheme in SCHEMES or is_own(scheme)
     return known and ESTIMATORS[SCHEMES[scheme].estimator].use_vt(settings)
 
@@ -41,7 +41,7 @@ def component_labels(scene: Scene, paths: Paths, scheme: SchemeResult, *, use_vt
 
 
 def true_planes(scene: Scene) -> list[int]:
-    """Number of the plane that each wall of a scene lies in, (W,); coplanar walls have one."""
+    """Number (W,) of the plane that each wall, as a source of components, lies in; coplanar walls have one."""
     return [int(plane) for plane in coplanar(build_walls(scene))]
 
 

@@ -10,10 +10,10 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.bound import SchemeBound, scheme_bound
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
-from rislam_rt.pipeline.scores.walls import count_ghosts, seconds_audible, wall_scores
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
+from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 DIVERGED = 0.5
 """Position error [m] beyond which a run counts as diverged."""
@@ -51,7 +51,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     """Scores of one scheme in a run: position RMSE and bound, NEES, landmarks, walls, GOSPA, association, times."""
     scene, truth = result.scene, result.scene.agent.position
     errors = evaluate.position_errors(scheme.position, truth)
-    least = run_bound(result, scheme)
+    known = scheme.scheme in SCHEMES or is_own(scheme.scheme)
+    least = scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config) if known else None
     limit = least.agent if least else None
     error, bound = evaluate.root_mean_square(errors), None if limit is None else evaluate.root_mean_square(limit)
     squares = nees_per_dof(scheme, truth)
@@ -86,7 +87,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
 
 
 def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
-    """Normalised estimation error squared (NEES) of the position per degree of freedom, (K,); None if all is known."""
+    """Score of consistency: NEES of the position per degree of freedom, (K,); None if all is known."""
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
     if not len(axes):
         return None
@@ -94,21 +95,15 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
     return evaluate.normalised_squares((scheme.position - truth)[:, axes], block) / len(axes)
 
 
-def run_bound(result: SlamResult, scheme: SchemeResult) -> SchemeBound | None:
-    """Posterior bound of agent, landmarks and walls for a scheme of a run; None for a scheme of unknown name."""
-    if scheme.scheme not in SCHEMES and not is_own(scheme.scheme):
-        return None
-    return scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config)
-
-
 def has_diverged(errors: Floats, limit: Floats | None) -> bool:
-    """Whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
+    """Score: whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
     least = DIVERGED if limit is None else np.maximum(DIVERGED, FAR_OVER * limit)
     return bool((errors > least).any())
 
 
 def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dict[str, Any]:
-    """GOSPA [m] (order 2, cutoff `NEAR_LANDMARK`) of the map's points, without mirror images, against true landmarks.
+    """Score of the map: GOSPA [m] (order 2, cutoff `NEAR_LANDMARK`) of its points, without mirror images, against true
+    landmarks.
 
     Panels count among the true landmarks only if the scheme uses them (`panel`).
     """
@@ -120,12 +115,12 @@ def map_score(scene: Scene, estimate: MapEstimate, *, panel: bool = True) -> dic
 
 
 def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> list[str]:
-    """Names of the cycle's steps whose mean computing time exceeds their time budget."""
+    """Score of computing time: names of the cycle's steps whose mean time exceeds their budget."""
     return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
 
 
 def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
-    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle."""
+    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle, for their scores."""
     truth = scene.landmark_positions
     error = np.full((len(scheme.position), len(truth)), np.nan)
     column = np.full(error.shape, -1)

@@ -82,14 +82,14 @@ class RadioSection(Section):
 
     @property
     def energy(self) -> float:
-        """Energy [J] of one sounding, given or power times duration."""
+        """Energy [J] of one sounding by the radio's settings, given or power times duration."""
         if self.power_dbm is None or self.sounding_s is None:
             return self.energy_j
         return 1e-3 * linear(self.power_dbm) * self.sounding_s
 
     @property
     def antennas(self) -> Antennas:
-        """Patterns and polarisations of the transmit and receive antennas."""
+        """Patterns and polarisations of the transmit and receive antennas by the radio's settings."""
         return Antennas(self.tx_pattern, self.rx_pattern, self.tx_polarization, self.rx_polarization or "")
 
 
@@ -118,5 +118,5 @@ def build_radio(section: RadioSection) -> RadioConfig:
 
 
 def linear(decibel: float) -> float:
-    """Power ratio of a value in decibels."""
+    """Power ratio of a radio setting in decibels."""
     return float(np.power(10.0, decibel / 10.0))

@@ -34,7 +34,7 @@ def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -
 
 
 def map_table(estimate: MapEstimate) -> dict[str, Any]:
-    """Table of an estimated map for JSON: landmarks, their mirror images, walls."""
+    """Export of an estimated map as a table for JSON: landmarks, their mirror images, walls."""
     std = np.sqrt(np.einsum("nii->ni", estimate.covariance))
     features = [
         {
@@ -56,7 +56,7 @@ def map_table(estimate: MapEstimate) -> dict[str, Any]:
 
 
 def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    """Configuration without the settings that are None: TOML has no null."""
+    """Configuration to export without the settings that are None: TOML has no null."""
     return {
         key: _without_none(value) if isinstance(value, dict) else value
         for key, value in table.items()

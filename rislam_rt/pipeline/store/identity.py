@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import library_versions
-from rislam_rt.pipeline.specification.spec import PipelineSpec
-from rislam_rt.scene.file_names import safe_name
-from rislam_rt.storage.seal import SCHEMA, checksum, flatten
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
+from rislam_rt.scene.scene_folder import safe_name
+from rislam_rt.storage.checksums import SCHEMA, checksum, flatten
 
 SHORT = 8
 """Number of the hash's digits in a run folder's name; the marker file inside has all of them."""
@@ -45,7 +45,7 @@ class RunIdentity(NamedTuple):
         return short_name(name, self.digest)
 
     def difference(self, other: Mapping[str, Any]) -> str:
-        """Describe the first setting in which another run differs, as `key is A there and B here`."""
+        """Describe the first setting in which the identity of another run differs, as `key is A there and B here`."""
         here, there = dict(flatten(self.content)), dict(flatten(other))
         for key in sorted(here):
             if here[key] != there.get(key):

@@ -15,15 +15,15 @@ from typing import Any
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import SchemeResult, SlamResult, Trajectory
-from rislam_rt.pipeline import dataset
+from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
 from rislam_rt.pipeline.store.identity import RunIdentity
 from rislam_rt.scene import load_scene
+from rislam_rt.storage.checksums import file_digest, read_sealed, seal
 from rislam_rt.storage.files import has_marker, json_file, make_folders, remove_empty, remove_temporaries, write_atomic
 from rislam_rt.storage.lock import LOCK_FILE, hold
 from rislam_rt.storage.netcdf import dataset_bytes, read_dataset
-from rislam_rt.storage.seal import file_digest, read_sealed, seal
 
 RUN_FILE, PATHS_FILE = "run.json", "paths.nc"
 RUNNING, DONE = "running", "done"
@@ -51,9 +51,9 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             raise KeyError(name) from None
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
-        data = dataset.seal_dataset(dataset.scheme_to_dataset(result), **self._stamp())
+        data = run_datasets.seal_dataset(run_datasets.scheme_to_dataset(result), **self._stamp())
         if result.given is not None:
-            given = dataset.seal_dataset(given_to_dataset(result), **self._stamp())
+            given = run_datasets.seal_dataset(given_to_dataset(result), **self._stamp())
             self.put(f"measurements_{name}.nc", dataset_bytes(given))
         self.put(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
@@ -78,11 +78,11 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     @property
     def spoiled(self) -> list[str]:
-        """Names of schemes whose files were changed since they were written; they run again."""
+        """Names of schemes whose files in the run folder were changed since they were written; they run again."""
         return [name for name in self if name not in self]
 
     def mark(self, state: str, more: Mapping[str, Any] | None = None) -> None:
-        """Write the run's marker file with its state, identity, the SHA-256 of all files, and `more`.
+        """Write the run folder's marker file with its state, identity, the SHA-256 of all files, and `more`.
 
         Raises
         ------
@@ -100,7 +100,9 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         StoreError
             The disk refused.
         """
-        paths = dataset.seal_dataset(dataset.paths_to_dataset(result.paths, result.scene.agent), **self._stamp())
+        paths = run_datasets.seal_dataset(
+            run_datasets.paths_to_dataset(result.paths, result.scene.agent), **self._stamp()
+        )
         self.put(PATHS_FILE, dataset_bytes(paths))
         for name, content in export_files(result, summary).items():
             self.put(name, content)
@@ -113,17 +115,17 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         return self.folder
 
     def put(self, name: str, content: bytes) -> None:
-        """Write a file of the run, and note its SHA-256."""
+        """Write a file into the run folder, and note its SHA-256."""
         write_atomic(self.folder / name, content)
         self.files[name] = hashlib.sha256(content).hexdigest()
 
     def adopt(self, names: Iterable[str]) -> None:
-        """Note the SHA-256 of files that are in the folder already, and write the marker."""
+        """Note the SHA-256 of files that are in the run folder already, and write the marker."""
         self.files |= {name: file_digest(self.folder / name) for name in names}
         self.mark(RUNNING)
 
     def holds(self, names: Iterable[str]) -> bool:
-        """Whether all these files of the run are there, unchanged since they were written."""
+        """Whether all these files are in the run folder, unchanged since they were written."""
         try:
             return all(name in self.files and file_digest(self.folder / name) == self.files[name] for name in names)
         except ResultError:
@@ -217,7 +219,7 @@ def hold_run(folder: Path) -> Iterator[None]:
 
 
 def check_files(folder: Path, about: Mapping[str, Any]) -> None:
-    """Check that no file of a completed run was changed since it was written.
+    """Check that no file in the folder of a completed run was changed since it was written.
 
     Raises
     ------
@@ -264,8 +266,8 @@ def read_run(folder: Path) -> SlamResult:
             raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
         check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
-        dataset.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
-        paths, scene = dataset.dataset_to_paths(data), load_scene(folder / "scene")
+        run_datasets.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
+        paths, scene = run_datasets.dataset_to_paths(data), load_scene(folder / "scene")
         agent = Trajectory(
             data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
             data["true_heading"].to_numpy(), scene.agent.body,
@@ -283,7 +285,7 @@ def read_run(folder: Path) -> SlamResult:
 
 @contextmanager
 def reading_run(folder: Path) -> Iterator[None]:
-    """Turn whatever a damaged file raises while a run is read within this context into a one-line error.
+    """Turn whatever a damaged file raises while a run folder is read within this context into a one-line error.
 
     Raises
     ------
@@ -300,7 +302,7 @@ def reading_run(folder: Path) -> Iterator[None]:
 
 
 def _read_scheme(file: Path, name: str, run: str, cycles: int | None = None) -> SchemeResult:
-    """Read a scheme's result from its NetCDF file, and check that it is of this scheme and run."""
+    """Read a scheme's result from its NetCDF file in the run folder, and check that it is of this scheme and run."""
     data = read_dataset(file)
-    dataset.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
-    return dataset.dataset_to_scheme(data)
+    run_datasets.check_dataset(data, file, scheme=name, run=run, **({} if cycles is None else {"cycles": cycles}))
+    return run_datasets.dataset_to_scheme(data)

@@ -104,7 +104,7 @@ def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list
 
 
 def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> list[Artist]:
-    """Draw a scheme's estimated trajectory, 2 sigma ellipse and landmarks up to a cycle."""
+    """Frame of an animation: a scheme's estimated trajectory, 2 sigma ellipse and landmarks up to a cycle."""
     colour, done = scheme_colour(scheme.scheme), scheme.position[: cycle + 1, :2]
     ring = ellipse(done[-1], scheme.covariance[cycle, :2, :2])
     moving: list[Artist] = []

@@ -135,7 +135,7 @@ def _parameters(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> d
 
 
 def _distinct(scene: Scene) -> list[Material]:
-    """Materials of a scene's reflectors, each once."""
+    """Materials of a scene's reflectors, each once, for DeepMIMO."""
     return list(dict.fromkeys(one.material for one in scene.reflectors))
 
 
@@ -189,7 +189,7 @@ def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:
 
 
 def _npz(arrays: Mapping[str, Any]) -> bytes:
-    """Encode arrays as the content of a compressed `.npz` file."""
+    """Encode arrays as the content of a compressed `.npz` file of DeepMIMO."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()

@@ -88,5 +88,5 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
 
 
 def _colour(scheme: str) -> tuple[int, ...]:
-    """Colour of a scheme as red, green, blue from 0 to 255."""
+    """Colour of a scheme in a Rerun recording: red, green, blue from 0 to 255."""
     return tuple(round(255 * part) for part in to_rgb(scheme_colour(scheme)))

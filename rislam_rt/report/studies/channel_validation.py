@@ -9,7 +9,7 @@ from rislam_rt.report.markdown import table_lines
 from rislam_rt.report.studies.channel_validation_figure import draw_certificate
 from rislam_rt.report.style import to_png
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.studies.compare import Comparison
+from rislam_rt.studies.channel_validation import Comparison
 from rislam_rt.studies.spec import CompareSpec
 
 COMPARISON, CERTIFICATE = "channel_validation", "figures/path_certificate.png"
@@ -48,7 +48,7 @@ landmark, walls in the order of travel. Written by `rislam-rt` from one run; do 
 def write_comparison(
     found: Comparison, spec: CompareSpec, content: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path:
-    """Write the files of a comparison of both channels: page, JSON and figure; return the page's path.
+    """Write the files of the channel validation: page, JSON and figure; return the page's path.
 
     Raises
     ------

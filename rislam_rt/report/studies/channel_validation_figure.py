@@ -13,7 +13,7 @@ from rislam_rt.model import PathKind, Paths
 from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.style import KIND, TRUTH, WALL, styled
-from rislam_rt.studies.compare import Certificate
+from rislam_rt.studies.channel_validation import Certificate
 
 ALONE = "#CC79A7"
 """Colour of a path that only one channel has."""
@@ -51,7 +51,7 @@ def draw_certificate(certificate: Certificate) -> Figure:
 
 
 def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) -> None:
-    """Draw all paths of one channel from above, those that the other channel lacks on top."""
+    """Draw all paths of one channel from above for the validation, those that the other channel lacks on top."""
     _draw_plan(axis, certificate)
     columns = np.flatnonzero(paths.valid[0])
     only = {path.label for path in certificate.report.one_sided if path.side == name}
@@ -66,7 +66,7 @@ def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) ->
 
 
 def _draw_alone(axis: Axes, certificate: Certificate) -> None:
-    """Draw the paths that only one channel has, with their explanations below."""
+    """Draw the paths that only one channel has in the validation, with their explanations below."""
     _draw_plan(axis, certificate)
     sides = {"traced": certificate.traced, "analytic": certificate.analytic}
     one_sided = certificate.report.one_sided
@@ -91,7 +91,8 @@ def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
 
 
 def _draw_errors(axis: Axes, certificate: Certificate) -> None:
-    """Draw the errors of matched paths, the tracer's float32 against float64, in rows by quantity and path class."""
+    """Draw the errors of matched paths of the channel validation, the tracer's float32 against float64, in rows by
+    quantity and path class."""
     report = certificate.report
     rows = (
         ("length [m]", report.length_error), ("gain [dB]", report.gain_error_db), ("phase [rad]", report.phase_error),
@@ -112,7 +113,7 @@ def _draw_errors(axis: Axes, certificate: Certificate) -> None:
 
 
 def _draw_plan(axis: Axes, certificate: Certificate) -> None:
-    """Draw walls, landmarks and agent of the compared pose from above."""
+    """Draw walls, landmarks and agent of the pose of the channel validation from above."""
     scene = certificate.scene
     for edge in wall_edges(build_walls(scene)):
         axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)

@@ -31,7 +31,7 @@ FEWEST = 5
 
 
 def weights_file(found: Training) -> bytes:
-    """Encode the classifier's trained network as the content of an `.npz` file without pickle."""
+    """Encode the trained network of the classifier as the content of an `.npz` file without pickle."""
     buffer = io.BytesIO()
     np.savez(buffer, **network_arrays(found.network))
     return buffer.getvalue()
@@ -195,7 +195,8 @@ def _rooms(found: Training) -> dict[str, Examples]:
 
 
 def _panel_summary(found: Training) -> list[str]:
-    """Table of how often the direct panel path is removed, by code policy and rule: of all examples, and worst room."""
+    """Table of the classifier's page: how often the direct panel path is removed, by code policy and rule, of all
+    examples, and worst room."""
     judges = rules(found.network)
     titles = ["codes", "looks", "rooms", *(f"{name}: dropped, worst room" for name in NAME.values())]
     rows = []
@@ -212,7 +213,8 @@ def _panel_summary(found: Training) -> list[str]:
 
 
 def _panel_rooms(found: Training) -> list[str]:
-    """Table of how often the direct panel path is removed in each room: by the network, and by baselines."""
+    """Table of the classifier's page: how often the direct panel path is removed in each room, by the network, and by
+    baselines."""
     judges = rules(found.network)
     titles = ["room", *(f"`{policy}`" for policy in POLICIES), "geometric, `exact`", "amplitude, `exact`"]
     rows = []
@@ -266,5 +268,5 @@ def _by_snr(found: Training, rule: str) -> dict[str, tuple[float, int]]:
 
 
 def _f1(score: ClassifierScore) -> str:
-    """Table cell: F1 with its interval."""
+    """Table cell of the classifier's page: F1 with its interval."""
     return f"{score.f1:.3f} ({score.low:.3f} to {score.high:.3f})"

@@ -127,7 +127,7 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
 
 
 def _method(found: Fig4a, spec: Fig4aSpec, scene: str) -> list[str]:
-    """Lines on how the curves of Fig. 4(a) were computed."""
+    """Lines of the page of Fig. 4(a) on how its curves were computed."""
     source = "ray tracing (Sionna RT)" if spec.channel == "traced" else "image sources"
     far, near, share = found.distance[0], found.distance[-1], f"{spec.coverage:.0%}"
     return [
@@ -168,11 +168,11 @@ def _extent(distance: Floats, where: Booleans) -> str:
 
 
 def _interval(curve: Any) -> dict[str, list[float]]:
-    """Middle and ends of a gain curve as lists, by name."""
+    """Middle and ends of a gain curve of Fig. 4(a) as lists, by name."""
     return {name: values.tolist() for name, values in curve._asdict().items()}
 
 
 def _spread(curve: Any, place: int) -> str:
-    """Table cell: gain at a place with its interval."""
+    """Table cell of Fig. 4(a): gain at a place with its interval."""
     middle, low, high = (values[place] for values in curve)
     return f"{middle:.2f} ({low:.2f} to {high:.2f})"

@@ -82,5 +82,5 @@ def _place(score: SchemeScore, along: str, ticks: Sequence[str], numeric: bool) 
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a number, and not a boolean."""
+    """Whether a sweep's axis value is a number, and not a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)

@@ -8,8 +8,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import Interval
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.scores.audible import HEARD
-from rislam_rt.report.swept.table_cells import NOTHING
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.report.markdown import NOTHING
 from rislam_rt.storage.files import csv_file
 from rislam_rt.studies.swept import Group, paired_gain, spread
 
@@ -50,13 +50,14 @@ def interval_entry(name: str, interval: Interval | None, unit: str = "") -> dict
 
 
 def rmse_change(group: Group, scheme: str, reference: Floats) -> Interval | None:
-    """Relative change of a scheme's RMSE against a reference (R,) [m], with its interval, from pairs of equal seeds."""
+    """Entry of a scheme's change of RMSE against a reference (R,) [m], with its interval, from pairs of equal seeds."""
     gain = paired_gain(group.column(scheme, "rmse_m"), reference)
     return Interval(-gain.value, -gain.upper, -gain.lower) if gain else None
 
 
 def what_limits(entry: Mapping[str, Any], over_bound: float | None = None) -> str:
-    """What limits an error: `bound` if it is near its posterior bound, else `association` if that is poor, or `filter`.
+    """What limits the error of an entry: `bound` if it is near its posterior bound, else `association` if that is poor,
+    or `filter`.
 
     The error is the agent's, or one that is `over_bound` times its bound.
     """
@@ -83,7 +84,7 @@ def by_scheme(entries: Sequence[Mapping[str, Any]], along: str) -> dict[str, lis
 
 
 def failure_notes(groups: Sequence[Group]) -> list[str]:
-    """Markdown lines on how many runs of a study failed or diverged, with the error messages."""
+    """Notes beside the entries of a study, in Markdown: how many runs failed or diverged, with the error messages."""
     runs = sum((len(group.results) - group.missing) * len(group.schemes) for group in groups)
     failed = sum(group.failed(scheme) for group in groups for scheme in group.schemes)
     diverged = sum(group.diverged(scheme) for group in groups for scheme in group.schemes)
@@ -94,13 +95,13 @@ def failure_notes(groups: Sequence[Group]) -> list[str]:
 
 
 def panels_of(group: Group, scheme: str) -> list[str]:
-    """Names of the landmarks in a scheme's scores that are panels."""
+    """Names of the landmarks in an entry's scores that are panels."""
     names = group.parts(scheme, "landmarks")
     return [name for name in names if not np.isnan(group.column(scheme, "landmarks", name, "cycles_identified")).all()]
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """RMS errors and bounds of panel and scatterers at the end of the runs, and the share mapped; None of nothing."""
+    """Entry of panel and scatterers: RMS errors and bounds at the runs' end, and the share mapped; None of nothing."""
     panels = panels_of(group, scheme)
     names = group.parts(scheme, "landmarks")
     own = panels if SCHEMES[scheme].panel else []
@@ -113,7 +114,7 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """RMS errors, bounds and own std of walls found at the end; the share is of those heard for `HEARD` s in all."""
+    """Entry of walls found at the end: RMS errors, bounds and own std; share of those heard for `HEARD` s in all."""
     names = group.parts(scheme, "walls")
     angle, offset, own, least, near, audible = (
         _pooled(group, scheme, "walls", names, part)
@@ -137,33 +138,33 @@ def _pooled(group: Group, scheme: str, name: str, members: Sequence[str], part: 
 
 
 def bound_beside(bound: Floats, error: Floats) -> float | None:
-    """RMS bound of the landmarks or walls that were found, to compare with their error; of all if none was."""
+    """Bound that an entry shows beside the error: RMS of the landmarks or walls that were found; of all if none was."""
     found = ~np.isnan(error)
     return _rms(bound[found] if found.any() else bound)
 
 
 def _rms(values: Floats) -> float | None:
-    """RMS of the values that are known; None without any."""
+    """RMS of an entry's values that are known; None without any."""
     known = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else None
 
 
 def mean_known(values: Floats) -> float | None:
-    """Mean of the values that are not NaN; None without any."""
+    """Mean of an entry's values that are not NaN; None without any."""
     known = values[~np.isnan(values)]
     return float(np.mean(known)) if len(known) else None
 
 
 def _share(values: Floats) -> float | None:
-    """Share of values that are not NaN; None of no values."""
+    """Share of an entry's values that are not NaN; None of no values."""
     return float(np.mean(~np.isnan(values))) if len(values) else None
 
 
 def _finite(value: float | None) -> float | None:
-    """The value; None if it is not finite."""
+    """The value of an entry; None if it is not finite."""
     return value if value is not None and np.isfinite(value) else None
 
 
 def _cell(value: Any) -> Any:
-    """CSV cell of a value, numbers with six digits."""
+    """CSV cell of an entry's value, numbers with six digits."""
     return "" if value is None else f"{value:.6g}" if isinstance(value, float) else value

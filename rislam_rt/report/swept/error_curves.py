@@ -35,7 +35,7 @@ def draw_error(axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, An
 
 
 def mark_metres(side: Axis) -> None:
-    """Set the ticks of a logarithmic axis to 1, 2 and 5 of every power of ten, in plain numbers."""
+    """Set the ticks of error curves' logarithmic axis to 1, 2 and 5 of every power of ten, in plain numbers."""
     side.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     side.set_major_formatter(lambda value, _: f"{value:g}")
     side.set_minor_formatter(NullFormatter())
@@ -49,7 +49,7 @@ def draw_rmse(axis: Axes, row: float, entry: Mapping[str, Any], colour: str, **m
 
 
 def numbers(entries: Sequence[Mapping[str, Any]], name: str) -> Floats:
-    """One number of every entry, (E,), NaN where there is none."""
+    """One number of every entry, (E,), for error curves, NaN where there is none."""
     return np.array([np.nan if entry[name] is None else entry[name] for entry in entries], dtype=np.float64)
 
 

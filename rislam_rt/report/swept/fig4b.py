@@ -6,11 +6,19 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.report.markdown import (
+    NOTHING,
+    metres,
+    metres_between,
+    paragraph,
+    percent_between,
+    picture,
+    ratio,
+    table_lines,
+)
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
-from rislam_rt.report.swept.table_cells import NOTHING, metres, metres_between, percent_between, ratio
 from rislam_rt.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
 from rislam_rt.studies.swept.sweep import SNR
 
@@ -108,7 +116,7 @@ def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str
 
 
 def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table of the RMSE reductions by the paper's scheme, from pairs of runs with the same motion and noise."""
+    """Table for Fig. 4(b) of the RMSE reductions by the paper's scheme, from pairs of equal motion and noise."""
     rivals = list(dict.fromkeys(entry["over"] for entry in gains))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in gains):
@@ -126,7 +134,7 @@ def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Table of bounds, NEES, association and what limits the error, by SNR and scheme."""
+    """Table for Fig. 4(b) of bounds, NEES, association and what limits the error, by SNR and scheme."""
     rows = [
         [
             f"{entry['snr_db']:g}", entry["scheme"], metres(entry["bound_m"]), ratio(entry["over_bound"]),

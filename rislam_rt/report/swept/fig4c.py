@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import picture, table_lines
+from rislam_rt.report.markdown import metres, metres_between, percent_between, picture, ratio, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, panels_of, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, mark_metres
-from rislam_rt.report.swept.table_cells import metres, metres_between, percent_between, ratio
 from rislam_rt.studies.swept import Fig4cSpec, Group, paired_gain, spread
 
 TITLE = "Error against the panel's size: Fig. 4(c)"
@@ -76,7 +75,7 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
 
 
 def panel_error(group: Group, scheme: str) -> Any:
-    """Position error (R,) [m] of the (first) panel at the end of each run; NaN where it is not mapped."""
+    """Position error (R,) [m] of the (first) panel at the end of each run, for Fig. 4(c); NaN if not mapped."""
     panels = panels_of(group, scheme)
     return group.column(scheme, "landmarks", panels[0], "final_m") if panels else np.full(len(group.results), np.nan)
 
@@ -91,5 +90,5 @@ def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
 
 
 def _percent(fall: Mapping[str, Any], name: str) -> str:
-    """A reduction in percent with its interval, in words."""
+    """A reduction in percent with its interval, in words, for Fig. 4(c)."""
     return "an unknown share" if fall[name] is None else percent_between(fall, name)

@@ -84,7 +84,7 @@ def write_swept(
 
 
 def _of_receiver(spec: SweptSpec) -> bool:
-    """Whether a study's cells have scores of the receiver alone, and none of schemes."""
+    """Whether the files of a study are of the receiver alone: its cells have no scores of schemes."""
     return isinstance(spec, HardwareSpec)
 
 

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.report.markdown import NOTHING, paragraph, percent, picture, ratio, table_lines
 from rislam_rt.report.style import styled
-from rislam_rt.report.swept.table_cells import NOTHING, percent, ratio
 from rislam_rt.studies.swept import Group, HardwareSpec
 from rislam_rt.studies.swept.spec import CALIBRATED, MismatchSection
 
@@ -99,7 +98,7 @@ TITLES = {"false": "false", "panel": "panel", "landmarks": "landmarks", "error_o
 
 
 def _means(group: Group | None, key: str) -> dict[str, Any]:
-    """Mean of each of the receiver's scores over the front ends drawn."""
+    """Mean of each of the receiver's scores in the hardware study over the front ends drawn."""
     rows = [result.get(key, result["receiver"]) for result in group.results if result] if group is not None else []
     known = {name: [row[name] for row in rows if row.get(name) is not None] for name in SCORES}
     return {"runs": len(rows), **{name: float(np.mean(values)) if values else None for name, values in known.items()}}
@@ -108,7 +107,7 @@ def _means(group: Group | None, key: str) -> dict[str, Any]:
 def _limit(
     fault: MismatchSection, entries: Sequence[Mapping[str, Any]], way: str, ideal: Mapping[str, Any]
 ) -> str | None:
-    """Largest tolerable level of an impairment, in the file's order; None if not even the first is tolerable."""
+    """Largest tolerable level of a hardware impairment, in the file's order; None if even the first is not."""
     limit = None
     for entry in entries:
         if entry["fault"] == fault.name and entry["way"] == way:

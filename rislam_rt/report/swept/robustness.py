@@ -5,11 +5,19 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.report.markdown import (
+    metres,
+    metres_between,
+    paragraph,
+    percent,
+    percent_between,
+    picture,
+    ratio,
+    table_lines,
+)
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import interval_entry, rmse_change, scheme_entry
 from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
-from rislam_rt.report.swept.table_cells import metres, metres_between, percent, percent_between, ratio
 from rislam_rt.studies.swept import Group, RobustnessSpec
 
 WORST = 3
@@ -97,7 +105,7 @@ _HEAD = ["mismatch", "level", "scheme", "agent RMSE [m]", "change", "bound [m]",
 
 
 def _worst_rows(content: Mapping[str, Any]) -> list[list[str]]:
-    """Table rows of the worst mismatches with their remedies."""
+    """Table rows of the mismatches worst for robustness, with their remedies."""
     rows = []
     first = content["entries"][0]["scheme"] if content["entries"] else ""
     for name in content["worst"][:WORST]:

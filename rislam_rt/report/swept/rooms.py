@@ -8,12 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
-from rislam_rt.pipeline.scores.audible import HEARD
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.report.markdown import metres, metres_between, paragraph, picture, ratio, table_lines
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import mark_metres
-from rislam_rt.report.swept.table_cells import metres, metres_between, ratio
 from rislam_rt.studies.swept import Group, RoomsSpec
 
 TITLE = "All rooms"
@@ -45,7 +44,8 @@ def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
 
 
 def budget(entry: Mapping[str, Any], name: str) -> str:
-    """What limits a score that misses its aim in a room: `bound`, `association`, `filter`, or `not heard` (no path)."""
+    """What limits a score that misses its aim in one of the rooms: `bound`, `association`, `filter`, or `not heard` (no
+    path)."""
     if name not in BOUND_OF:
         return what_limits(entry)
     error, bound = entry[name], entry[BOUND_OF[name]]
@@ -64,7 +64,7 @@ def missed_aims(entry: Mapping[str, Any]) -> list[str]:
 
 
 def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
-    """Draw the agent's RMSE of all schemes in every room, with posterior bounds as short bars, and the aim."""
+    """Draw the agent's RMSE of all schemes in many rooms, with posterior bounds as short bars, and the aim."""
     entries = content["entries"]
     rooms = list(dict.fromkeys(entry["room"] for entry in entries))
     series = {entry["series"]: entry["scheme"] for entry in entries}
@@ -143,7 +143,7 @@ NAMES = {
 
 
 def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> str:
-    """Table cell: error and bound of a room's landmarks or walls, and the share that was found."""
+    """Table cell of the study in many rooms: error and bound of landmarks or walls, and the share that was found."""
     bound = entry[BOUND_OF[name]]
     known = "" if bound is None else f"bound {bound:.{digits}f}"
     if entry[name] is None:

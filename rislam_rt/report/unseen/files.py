@@ -60,13 +60,13 @@ def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Ma
 
 
 def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Score card of a class of rooms reduced to what the page shows, numbers with six digits."""
+    """Score card of a class of unseen rooms reduced to what the page shows, numbers with six digits."""
     kept = {name: value for name, value in entry.items() if name in SHOWN}
     return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 
 
 def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]:
-    """Table rows of all runs in unseen rooms: series, properties of the room, scores with six digits."""
+    """Rows of a file with all runs in unseen rooms: series, properties of the room, scores with six digits."""
     good = [run for members in runs.values() for run in members if run.scores]
     names = list(dict.fromkeys(name for run in good for name in run.scores))
     entries = []
@@ -77,7 +77,7 @@ def run_entries(runs: Mapping[str, Sequence[SchemeRun]]) -> list[dict[str, Any]]
 
 
 def _six(value: Any) -> Any:
-    """Table cell of a value, numbers with six digits."""
+    """Cell of a file of the study in unseen rooms, numbers with six digits."""
     if isinstance(value, float):
         return f"{value:.6g}" if np.isfinite(value) else ""
     return "" if value is None else value

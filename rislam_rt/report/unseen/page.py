@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
-from rislam_rt.pipeline.scores.audible import HEARD
-from rislam_rt.report.markdown import paragraph, picture, table_lines
-from rislam_rt.report.swept.table_cells import NOTHING
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.report.markdown import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
 from rislam_rt.studies.unseen.score import FAR_OVER, GOOD_ANGLE, GOOD_OFFSET, LASTING, LOST, NEAR_POINT, SETTLED
 from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
@@ -34,7 +33,7 @@ def unseen_page(
 
 
 def _meaning() -> list[str]:
-    """Lines on what the scores mean."""
+    """Lines of the page of unseen rooms on what the scores mean."""
     text = """Errors of the agent's position, absolute and relative to the true start: the second is without the error
     that the agent was told its start with, which no measurement of an unknown room can mend. Bounds are posterior
     bounds of the same motion, codes and settings, with landmarks and walls unknown, the association known, and white
@@ -79,7 +78,7 @@ def _series(spec: UnseenSpec) -> list[str]:
 
 
 def _toml(value: Any) -> str:
-    """A setting's value as in TOML."""
+    """A setting's value as in TOML, on the page of unseen rooms."""
     return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
@@ -101,7 +100,7 @@ def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
 
 
 def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
-    """Lines on the runs that failed."""
+    """Lines of the page of unseen rooms on the runs that failed."""
     found = [(name, run) for name, members in runs.items() for run in members if run.failed]
     return [f"- room {run.room}, {name}: {run.failed}" for name, run in found] or ["None."]
 

@@ -59,7 +59,8 @@ def read_runs(rows: Sequence[Row]) -> list[SchemeRun]:
 
 
 def _banded(name: str, limits: Sequence[float], unit: str = "") -> Callable[[Mapping[str, Any]], str]:
-    """Function that classifies a room by a number: below the first limit, between two, from the last on."""
+    """Function that classifies an unseen room by a number, for score cards: below the first limit, between two, from
+    the last on."""
 
     def band(traits: Mapping[str, Any]) -> str:
         number = int(np.searchsorted(limits, traits[name], side="right"))
@@ -126,7 +127,7 @@ def class_cards(runs: Sequence[SchemeRun]) -> list[dict[str, Any]]:
 
 
 def in_order(names: Iterable[str]) -> list[str]:
-    """Sort names of classes of rooms: `below ...` first, `from ...` last, the others by name."""
+    """Sort names of classes of unseen rooms: `below ...` first, `from ...` last, the others by name."""
     return sorted(names, key=lambda name: (not name.startswith("below"), name.startswith("from"), name))
 
 
@@ -141,7 +142,7 @@ def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
 def cycle_times(
     runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Mapping[str, Any]]
 ) -> dict[str, float | None]:
-    """Median CPU time [ms] of the estimator per cycle, by series; the last of a cell's times counts."""
+    """Median CPU time [ms] of the estimator per cycle for a score card, by series; a cell's last time counts."""
     told = {entry["ident"]: entry.get("timing", {}) for entry in timings}
     found: dict[str, float | None] = {}
     for name, members in runs.items():
@@ -152,18 +153,18 @@ def cycle_times(
 
 
 def column(runs: Sequence[SchemeRun], name: str) -> Floats:
-    """One score of all runs, (R,); NaN where there is none."""
+    """One score of all runs in unseen rooms, (R,), for score cards; NaN where there is none."""
     found = [run.scores.get(name) for run in runs]
     return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
 
 
 def _count(runs: Sequence[SchemeRun], name: str) -> int:
-    """Sum of a score that counts."""
+    """Sum on a score card of a score that counts."""
     return int(np.nansum(column(runs, name)))
 
 
 def _spread(name: str, values: Floats) -> dict[str, float | None]:
-    """Median with its 95 % interval, and 95th percentile, of a score, by name."""
+    """Spread of a score on a score card: median with its 95 % interval, and 95th percentile, by name."""
     known = values[~np.isnan(values)]
     low = high = None
     if len(known) > 1:
@@ -173,7 +174,7 @@ def _spread(name: str, values: Floats) -> dict[str, float | None]:
 
 
 def _share(name: str, count: int, runs: int) -> dict[str, Any]:
-    """Share `count` of `runs` with its interval, by name."""
+    """Share `count` of `runs` with its interval on a score card, by name."""
     found = share_interval(count, runs) if runs and count <= runs else Interval(np.nan, np.nan, np.nan)
     value, low, high = (None if np.isnan(part) else float(part) for part in found)
     return {name: value, f"{name}_low": low, f"{name}_high": high, f"{name}_count": count, f"{name}_of": runs}

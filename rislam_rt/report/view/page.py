@@ -43,5 +43,5 @@ def view_page(title: str, about: str, data: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=16)
 def _asset(name: str) -> str:
-    """Text of a file of this package folder."""
+    """Text of a file (script or style) for the HTML page of a view."""
     return files("rislam_rt.report.view").joinpath(name).read_text(encoding="utf-8")

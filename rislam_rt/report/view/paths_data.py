@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.adviser.codes import aimed_paths
+from rislam_rt.adviser.forecast_codes import aimed_paths
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, Scene, Trajectory
-from rislam_rt.pipeline.specification.spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.style import KIND
 from rislam_rt.report.view.room_data import room_data, rounded, spread

@@ -34,7 +34,7 @@ def room_data(scene: Scene) -> dict[str, Any]:
 
 
 def spread(count: int, most: int) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
-    """Indices spread evenly over `count` entries, at most `most`, with the first and the last."""
+    """Indices of what a view shows, spread evenly over `count` entries, at most `most`, with the first and the last."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.int64))
 
 

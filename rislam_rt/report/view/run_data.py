@@ -45,14 +45,15 @@ def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[st
 
 
 def _lost(scheme: SchemeResult, rows: Integers) -> str:
-    """Digits, one for each cycle shown: 1 if the filter reported divergence then or since the one shown before."""
+    """Digits in the view of a run, one a cycle shown: 1 if the filter reported divergence since the one before."""
     lost = np.array([outcome == "diverged" for outcome in scheme.outcome], dtype=np.int64)
     begins = np.append(0, rows[:-1] + 1)
     return "".join("1" if lost[first : last + 1].any() else "0" for first, last in zip(begins, rows, strict=True))
 
 
 def _ellipse(covariance: Floats) -> list[float]:
-    """Half axes [m] of the 2 sigma ellipse of a position covariance (2, 2), and the angle [rad] of the first."""
+    """Ellipse in the view of a run: half axes [m] of 2 sigma of a position covariance (2, 2), and the angle [rad] of
+    the first."""
     value, vector = np.linalg.eigh(covariance)
     half = 2.0 * np.sqrt(np.maximum(value, 0.0))
     return [*rounded(half, FINE + 1), round(float(np.arctan2(vector[1, 0], vector[0, 0])), 3)]
@@ -76,7 +77,7 @@ def _landmark(scheme: SchemeResult, column: int, rows: Integers) -> dict[str, An
 
 
 def _code(scheme: SchemeResult, row: int, shapes: list[list[int]]) -> str:
-    """Phase levels applied in a cycle in base 36, of one width, panel by panel with `|` between."""
+    """Code in the view of a run: phase levels in base 36, of one width, panel by panel with `|` between."""
     index = scheme.applied[row].ravel()
     digits = len(np.base_repr(scheme.levels - 1, 36))
     sizes = [rows * cols for rows, cols in shapes]

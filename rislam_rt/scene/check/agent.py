@@ -89,7 +89,8 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Name of the reflector with a small piece around a point (3,) that holds no mark (H, 3); empty without one."""
+    """Object around the agent, of the scene check: name of the reflector with a small piece around a point (3,) that
+    holds no mark (H, 3); empty without one."""
     scene_box = np.prod(room.bounds[1] - room.bounds[0])
     for number, reflector in enumerate(room.scene.reflectors):
         mine = room.triangles[room.owner == number]

@@ -1,22 +1,17 @@
 """Geometric queries to a mesh: triangles near a point, crossed by a segment, hit by a ray, or around a point."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, row_blocks
 from rislam_rt.geometry.triangles import edge_planes, triangle_planes
-
-_CHUNK = 2_000_000
-"""Point-triangle pairs that a query works out in one go: 16 MB an array."""
 
 
 def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
-    """Pairs (point, triangle) no more than `distance` [m] apart, of points (K, 3) and triangles (T, 3, 3)."""
+    """Query to a mesh: pairs (point, triangle) up to `distance` [m] apart, of points (K, 3), triangles (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
-    for rows in _blocks(len(points), len(triangles)):
+    for rows in row_blocks(len(points), len(triangles)):
         k, t = np.nonzero(np.abs(points[rows] @ normal.T - offset) <= distance)
         near = _depth(points[rows][k], edges, t) >= -distance
         found.append((k[near] + rows.start, t[near]))
@@ -24,11 +19,11 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
 
 
 def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
-    """Pairs (segment, triangle) where a segment, `start` to `end` (K, 3), passes through a triangle (T, 3, 3)."""
+    """Query to a mesh: pairs (segment, triangle) where `start` to `end` (K, 3) passes through a triangle (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
-    for rows in _blocks(len(start), len(triangles)):
+    for rows in row_blocks(len(start), len(triangles)):
         a, b = start[rows] @ normal.T - offset, end[rows] @ normal.T - offset
         k, t = np.nonzero(a * b < 0.0)
         fraction = (a[k, t] / (a[k, t] - b[k, t]))[:, None]
@@ -39,8 +34,8 @@ def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, 
 
 
 def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float = 1e-6) -> Integers:
-    """Index (D,) of the nearest triangle (T, 3, 3) that each ray from one point (3,) along unit vectors (D, 3) hits, -1
-    for none.
+    """Query to a mesh: index (D,) of the nearest triangle (T, 3, 3) that each ray from one point (3,) along unit
+    vectors (D, 3) hits, -1 for none.
 
     `slack` [m] widens every triangle, so that no ray slips through the seam between two.
     """
@@ -48,7 +43,7 @@ def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float
     edges = edge_planes(triangles)
     height = offset - normal @ origin
     nearest = np.full(len(directions), -1, dtype=np.int64)
-    for rows in _blocks(len(directions), len(triangles)):
+    for rows in row_blocks(len(directions), len(triangles)):
         slope = directions[rows] @ normal.T
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = height / slope
@@ -76,7 +71,7 @@ def winding(point: Floats, triangles: Floats) -> float:
 
 
 def sphere_directions(count: int) -> Floats:
-    """Unit vectors (count, 3) of rays in all directions, spread evenly over the sphere (Fibonacci lattice)."""
+    """Unit vectors (count, 3) of rays to query a mesh, spread evenly over the sphere (Fibonacci lattice)."""
     k = np.arange(count) + 0.5
     z = 1.0 - 2.0 * k / count
     phi = k * np.pi * (3.0 - np.sqrt(5.0))
@@ -85,15 +80,9 @@ def sphere_directions(count: int) -> Floats:
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
-    """Distance (S,) [m] of points (S, 3) from the nearest edge line of their triangle: positive inside."""
+    """Query to a mesh: distance (S,) [m] of points (S, 3) from their triangle's nearest edge, positive inside."""
     inward, offset = edges
     return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
-
-
-def _blocks(rows: int, columns: int) -> Iterator[slice]:
-    """Slices of a point-triangle table's rows, each of no more than `_CHUNK` pairs."""
-    step = max(1, _CHUNK // max(columns, 1))
-    return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
 
 def _joined(found: list[tuple[Integers, Integers]]) -> tuple[Integers, Integers]:

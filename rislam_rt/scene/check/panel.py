@@ -58,7 +58,8 @@ def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:
 
 
 def _overlap(one: RisPanel, other: RisPanel) -> bool:
-    """Whether two RIS panels overlap: they look the same way from one plane, and no axis of either separates them."""
+    """Scene check: whether two RIS panels overlap, that is look the same way from one plane, and no axis of either
+    separates them."""
     gap = other.center - one.center
     if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > MIN_CLEARANCE:
         return False
@@ -145,7 +146,7 @@ def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]
 
 
 def _delay_spread(room: TriangleArray, panel: RisPanel) -> float:
-    """Delay spread over a RIS panel [s]: largest difference over elements of Tx, element, Rx, at 50 cycles."""
+    """Scene check: delay spread over a RIS panel [s], the largest difference of Tx, element, Rx, at 50 cycles."""
     motion = room.scene.agent
     cycles = np.unique(np.linspace(0, len(motion) - 1, 50).astype(np.int64))
     corners = panel.spec.offsets()[:: max(panel.spec.rows - 1, 1), :: max(panel.spec.cols - 1, 1)].reshape(-1, 3)

@@ -73,5 +73,5 @@ def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
 
 
 def without_area(triangles: Floats) -> Booleans:
-    """Whether (T,) triangles (T, 3, 3) are no more than a line."""
+    """Whether (T,) triangles (T, 3, 3) of a scene are no more than a line, for the scene check."""
     return triangle_heights(triangles) <= MIN_ALTITUDE

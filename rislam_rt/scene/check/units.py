@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Finding
-from rislam_rt.scene.mesh_files import UNITS
+from rislam_rt.scene.mesh_placement import UNITS
 
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
 """Units other than metres that rooms are drawn in, and their names in a scene file."""
@@ -95,7 +95,8 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Dotted field and largest number wherever a path of keys leads in a scene file's table."""
+    """Numbers that the scene check of units looks at: dotted field and largest number wherever a path of keys leads in
+    a scene file."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):
@@ -103,7 +104,8 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
-    """Dotted field and point (3,) wherever a path of keys leads in a scene file's table; of a list, each."""
+    """Points that the scene check of units looks at: dotted field and point (3,) wherever a path of keys leads in a
+    scene file; of a list, each."""
     for field, value in _places(table, path, ""):
         listed = isinstance(value, list) and value and isinstance(value[0], list)
         for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:
@@ -112,7 +114,8 @@ def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:
-    """Dotted field and value wherever a path of keys leads in a scene file's table; in lists of tables, of each."""
+    """Fields that the scene check of units looks at: dotted field and value wherever a path of keys leads; in lists of
+    tables, of each."""
     if isinstance(part, list) and path:
         for number, item in enumerate(part):
             yield from _places(item, path, f"{field}[{number}]")

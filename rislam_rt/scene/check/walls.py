@@ -29,7 +29,7 @@ class WallParts(NamedTuple):
     """(T,) wall of each triangle."""
 
     def reflector(self, wall: int) -> int:
-        """Number of the reflector that a wall belongs to."""
+        """Number of the reflector that a wall belongs to, for the scene check."""
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
@@ -79,7 +79,7 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
 
 
 def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
-    """Whether a wall of triangles (T, 3, 3) has a side in the room, as the foot of a crate has not."""
+    """Scene check: whether a wall of triangles (T, 3, 3) has a side in the room, as the foot of a crate has not."""
     normal, _ = triangle_planes(wall)
     middle = wall.mean(axis=1)
     sides = np.concatenate([middle + MIN_CLEARANCE * normal, middle - MIN_CLEARANCE * normal])
@@ -89,7 +89,7 @@ def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
 
 
 def _flattest(triangles: Floats, part: PlanarRegions) -> float:
-    """Smallest angle [rad] at which two walls of one mesh meet in an edge, infinite where none do."""
+    """Scene check: smallest angle [rad] at which two walls of one mesh meet in an edge, infinite where none do."""
     _, corner = np.unique(np.round(triangles.reshape(-1, 3), 6) + 0.0, axis=0, return_inverse=True)
     corner = corner.reshape(-1, 3)
     ends = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)

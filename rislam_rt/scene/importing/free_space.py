@@ -138,7 +138,7 @@ def _eyes(stations: Floats, triangles: Floats) -> Floats:
 
 
 def _spread(triangles: Floats, count: int) -> tuple[Floats, Floats]:
-    """Points spread over triangles by their area, and the normals there, to test whether they are visible."""
+    """Points spread over an imported room's triangles by area, with normals, to test whether free space sees them."""
     edge = triangles[:, 1:] - triangles[:, :1]
     area = np.cumsum(np.linalg.norm(triangle_cross(triangles), axis=1))
     chosen: Integers = np.searchsorted(area, (np.arange(count) + 0.5) / count * area[-1])

@@ -98,7 +98,7 @@ class MaterialAssignment:
         return self.rest
 
     def by_hand(self, *names: str) -> dict[str, Any] | None:
-        """Material that the user gave for any of the names; None if there is none."""
+        """Material of an import that the user gave for any of the names; None if there is none."""
         for pattern, table in self.choices.items():
             if any(fnmatchcase(name, pattern) for name in names if name):
                 self.used.add(pattern)
@@ -106,7 +106,7 @@ class MaterialAssignment:
         return None
 
     def remarks(self) -> list[str]:
-        """Remark on the walls whose material was assumed, on one line; none if there are none."""
+        """Remark on the walls of an import whose material was assumed, on one line; none if there are none."""
         if not self.assumed:
             return []
         names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
@@ -114,7 +114,8 @@ class MaterialAssignment:
         return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def check_used(self, names: Iterable[str]) -> None:
-        """Check that every material that the user gave has been used; `names`: some that could have been meant.
+        """Check that every material that the user gave for an import has been used; `names`: some that could have been
+        meant.
 
         Raises
         ------
@@ -128,7 +129,7 @@ class MaterialAssignment:
 
 
 def itu_by_word(name: str) -> str | None:
-    """ITU material that a word in a material's or node's name stands for, `Oak.003` for wood; None if none does."""
+    """ITU material that a word in the name of an imported material or node stands for, `Oak.003` for wood."""
     plain = re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
     for itu in get_args(ItuMaterial):
         if f"_{itu}_" in f"_{plain}_":

@@ -11,9 +11,9 @@ from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.plane_segmentation import planar_regions
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import find_free, is_seen
+from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
-from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets, weld
 from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, numbered, own_name, wall_name
@@ -44,7 +44,7 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
 
 
 def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from a mesh, by its flat regions or a scan's planes: reflectors with materials, occluders."""
+    """Draft of a room from an imported mesh, by flat regions or a scan's planes: reflectors, materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]

@@ -10,9 +10,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.importing.obj import read_obj
+from rislam_rt.scene.importing.obj_files import read_obj
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader, check_glb, node_mesh, sound_mesh, unfold
-from rislam_rt.scene.read_inside_folder import read_inside
+from rislam_rt.scene.scene_folder import read_inside
 
 MESH_FORMATS = (".glb", ".gltf", ".obj", ".ply", ".stl")
 """Endings of the mesh files that can be imported."""
@@ -66,7 +66,7 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
 
 
 def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
-    """Read all of a file to import, up to a limit [bytes].
+    """Read the content of a mesh file to import, up to a limit [bytes].
 
     Raises
     ------
@@ -88,7 +88,7 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
 
 
 def _sound(triangles: Floats) -> Floats:
-    """Triangles (T, 3, 3) of an imported part after a check of their coordinates."""
+    """Triangles (T, 3, 3) of a part of an imported mesh file after a check of their coordinates."""
     corners = triangles.reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     return sound_mesh(Mesh(corners, faces), MAX_IMPORT_FACES, ANY_UNIT).vertices[faces]

@@ -8,16 +8,16 @@ import numpy as np
 from rislam_rt.errors import SceneError
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.extrude import extrude
-from rislam_rt.scene.importing.floor_plan import build_plan, parse_corners, parse_geojson
+from rislam_rt.scene.importing.floor_plans.extrusion import extrude
+from rislam_rt.scene.importing.floor_plans.floor_plan import build_plan, parse_corners, parse_geojson
+from rislam_rt.scene.importing.floor_plans.svg_drawing import parse_svg
+from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.mesh_room import import_mesh
 from rislam_rt.scene.importing.mesh_source import read_content
-from rislam_rt.scene.importing.options import ImportOptions
 from rislam_rt.scene.importing.placement import check_size
 from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
-from rislam_rt.scene.importing.svg import parse_svg
 from rislam_rt.scene.load import check_scene
-from rislam_rt.scene.mesh_files import UNITS
+from rislam_rt.scene.mesh_placement import UNITS
 from rislam_rt.scene.room_files import room_files
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_files

@@ -5,9 +5,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.mesh_source import MeshPart
-from rislam_rt.scene.importing.options import ImportOptions
-from rislam_rt.scene.mesh_files import UNITS, place_points
+from rislam_rt.scene.mesh_placement import UNITS, place_points
 
 SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
 """Diagonals [m] outside of which an imported room is taken to be in a wrong unit, unless the user gave one."""

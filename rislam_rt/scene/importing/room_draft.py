@@ -13,7 +13,8 @@ from rislam_rt.scene.check.mesh_queries import ray_hits
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.room_files import BASELINE, CYCLES, RoomFiles, panel, reflector
+from rislam_rt.scene.motion.suggested_motion import BASELINE
+from rislam_rt.scene.room_files import CYCLES, RoomFiles, panel, reflector
 from rislam_rt.scene.write import mesh_file
 
 FROM_EDGE = 0.1
@@ -89,7 +90,8 @@ def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | N
 
 
 def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace) -> bool:
-    """Whether the corners of a proposed RIS panel lie on one host and are seen from the middle of the agent's line."""
+    """Whether the corners of a RIS panel proposed for the draft lie on one host and are seen from the middle of the
+    agent's line."""
     mesh, _ = draft.reflectors[host]
     down = np.cross(normal, right)
     corners = center + FROM_EDGE * np.array([right + down, right - down, -right + down, -right - down])

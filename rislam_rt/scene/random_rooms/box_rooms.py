@@ -5,8 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory
-from rislam_rt.scene.shapes import block, hexahedron
-from rislam_rt.scene.solids import sphere_mesh
+from rislam_rt.scene.shapes import block, hexahedron, sphere_mesh
 
 SIZE, HEIGHT = (3.5, 9.0), (2.3, 4.0)
 """Ranges [m] of a random box room's sides and height."""

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.random_rooms.floor_plan import depth_inside
+from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import Roof
 from rislam_rt.scene.shapes import block
 

@@ -6,8 +6,8 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.scene.check.mesh_queries import crossings
-from rislam_rt.scene.random_rooms.floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
+from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
 
 PLACES = ("open", "below", "hidden")
@@ -64,7 +64,7 @@ def draw_scatterer(
 
 
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
-    """Share of the agent's path (K, 3) from which furniture hides a landmark (3,), every tenth position looked at."""
+    """Share of the agent's path (K, 3) from which furniture hides a random landmark (3,), at every tenth position."""
     seen_from = way[::10]
     triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
     if not triangles:
@@ -89,7 +89,7 @@ def draw_panel(
 
 
 def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec:
-    """Draw the data sheet of a RIS panel with this normal and up: size, levels, and element pattern."""
+    """Draw the data sheet of a random RIS panel with this normal and up: size, levels, and element pattern."""
     rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
     if rng.uniform() < SQUARE:
         cols = rows
@@ -98,7 +98,7 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Draw a RIS panel's host, centre, normal and up on a wall, above the start; None where it does not fit."""
+    """Draw a random RIS panel's place on a wall, above the start: host, centre, normal, up; None if it does not fit."""
     outline = ground.outline
     along = np.roll(outline, -1, axis=0) - outline
     length = np.linalg.norm(along, axis=1)
@@ -115,7 +115,7 @@ def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Fl
 
 
 def _in_ceiling(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:
-    """Draw the place of a RIS panel in the ceiling: host, centre, normal and up; None where it does not fit."""
+    """Draw the place of a random RIS panel in the ceiling: host, centre, normal and up; None where it does not fit."""
     outline, roof = ground.outline, ground.roof
     flat = rng.uniform(outline.min(axis=0), outline.max(axis=0))
     ridge = (flat - roof.point) @ roof.axis

@@ -8,7 +8,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.model import Body, Trajectory
-from rislam_rt.scene.random_rooms.floor_plan import depth_inside
+from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import Roof
 
 MOTIONS = ("straight", "curve", "corner", "stop", "turn", "climb")

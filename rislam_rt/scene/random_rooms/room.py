@@ -10,9 +10,9 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material, Reflector, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.random_rooms.floor_plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_pieces
 from rislam_rt.scene.random_rooms.landmarks import MOST, PLACES, SHARES, draw_panel, draw_scatterer, hidden_share
+from rislam_rt.scene.random_rooms.random_floor_plan import SHAPES, area, draw_plan, extent
 from rislam_rt.scene.random_rooms.random_motion import MOTIONS, draw_motion, draw_motion_profile
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
@@ -131,7 +131,7 @@ def _landmarks(
 
 
 def _sphere(number: int, position: Floats, rng: np.random.Generator) -> Scatterer:
-    """Make a spherical scatterer of random radius at a position (3,) [m]."""
+    """Make a random room's spherical scatterer of random radius at a position (3,) [m]."""
     radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
     return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
 
@@ -152,7 +152,7 @@ def _reflectors(
 
 
 def scene_digest(scene: Scene) -> str:
-    """SHA-256 over all numbers of a scene that was made in memory; the scene of a file has that of its files."""
+    """SHA-256 over all numbers of a random room, made in memory; the scene of a file has that of its files."""
     digest = hashlib.sha256()
 
     def take(name: str, *arrays: Floats) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.random_rooms.floor_plan import extent, halve, triangulate
+from rislam_rt.scene.random_rooms.random_floor_plan import extent, halve, triangulate
 
 CEILINGS = ("flat", "shed", "gable")
 """Forms of a random room's ceiling: level, one slope, two slopes (over convex plans)."""

@@ -62,8 +62,8 @@ def read_material(bsdf: Element) -> XmlMaterial:
 
 
 def material_element(material: Material | None, name: str) -> Element:
-    """Make the `<bsdf>` element of a Sionna scene file for a material: its own ITU slab, a slab of given permittivity,
-    or air for None.
+    """Material in a Sionna scene file (XML), a `<bsdf>` element: its own ITU slab, a slab of given permittivity, or air
+    for None.
 
     A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
     only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no
@@ -87,7 +87,7 @@ def material_element(material: Material | None, name: str) -> Element:
 
 
 def _number(values: dict[str, Element], name: str, default: float) -> float:
-    """Number that a Sionna material gives under a name, or else the default."""
+    """Number that a material of a Sionna scene file (XML) gives under a name, or else the default."""
     return number(values[name], "value") if name in values else default
 
 
@@ -98,3 +98,10 @@ def _made(**values: Any) -> Material:
     except SceneError as error:
         what, _, mend = str(error).partition("; ")
         raise Fault(what, mend) from None
+
+
+def material_word(material: Material | None) -> str:
+    """Kind of a material for its name in a written XML scene; Sionna takes names with `itu` its own way."""
+    if material is None:
+        return "air"
+    return material.itu if material.itu else ("constant" if material.level is not None else "slab")

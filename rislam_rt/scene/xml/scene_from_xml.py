@@ -15,9 +15,9 @@ from rislam_rt.scene.importing.free_space import FreeSpace
 from rislam_rt.scene.importing.room_draft import RoomDraft, propose_panel
 from rislam_rt.scene.load import SCENE_FILE, build_panel, load_scene
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
-from rislam_rt.scene.motion import straight_motion
+from rislam_rt.scene.motion.agent_motion import straight_motion
+from rislam_rt.scene.motion.suggested_motion import suggest_agent
 from rislam_rt.scene.schema import RisSection
-from rislam_rt.scene.suggested_motion import suggest_agent
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_scene
 from rislam_rt.scene.xml.materials import material_element, read_material

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_about
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_MESH_BYTES, Mesh, MeshReader
-from rislam_rt.scene.read_inside_folder import read_inside
+from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.xml.untrusted_xml import children
 
 FILES = {"ply": ".ply", "obj": ".obj"}
@@ -69,7 +69,7 @@ def to_world(shape: Element) -> Floats:
 
 
 def number(element: Element, name: str, default: float | None = None) -> float:
-    """Number in an attribute of an element of an XML scene file.
+    """Number in an attribute of a shape's element in an XML scene file.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def _part(part: Element) -> Floats:
 
 
 def _triple(part: Element, default: float) -> Floats:
-    """Three numbers of an element of an XML scene file, from `value` (one for all, or three) or from x, y and z."""
+    """Three numbers of a shape's element in an XML scene file, from `value` (one for all, or three) or x, y, z."""
     if part.get("value") is None:
         return np.array([number(part, axis, default) for axis in "xyz"])
     values = _numbers(part)
@@ -131,7 +131,7 @@ def _triple(part: Element, default: float) -> Floats:
 
 
 def _numbers(part: Element) -> list[float]:
-    """Numbers in the `value` of an element of an XML scene file."""
+    """Numbers in the `value` of a shape's element in an XML scene file."""
     text = part.get("value", "")
     try:
         return [float(word) for word in text.replace(",", " ").split()]
@@ -140,7 +140,7 @@ def _numbers(part: Element) -> list[float]:
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:
-    """Rotation (3, 3) by an angle [rad] about an axis (3,), as `<rotate>` of an XML scene file asks for it."""
+    """Rotation (3, 3) of a shape by an angle [rad] about an axis (3,), as `<rotate>` of an XML scene asks for it."""
     length = np.linalg.norm(axis)
     if not length > 0.0:
         raise Fault("<rotate> without an axis", "give x, y and z of one")
@@ -148,8 +148,8 @@ def _rotation(axis: Floats, angle: float) -> Floats:
 
 
 def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
-    """Clip a mesh to a window of the plan, lowest and highest x and y (2, 2) [m]: faces outside go, those across are
-    cut.
+    """Clip the shapes of an XML scene to a window of the plan, lowest and highest x and y (2, 2) [m]: faces outside go,
+    those across are cut.
 
     Sutherland and Hodgman (Commun. ACM 1974), side by side; a cut triangle comes back as a fan of triangles.
     """
@@ -166,7 +166,7 @@ def clip_mesh(mesh: Mesh, window: Floats) -> Mesh:
 
 
 def _clipped(polygon: Floats, window: Floats) -> Floats:
-    """Clip a convex polygon (n, 3) to a window of the plan."""
+    """Clip a convex polygon (n, 3) of an XML scene's shape to a window of the plan."""
     for axis in (0, 1):
         for sign, limit in ((1.0, window[0, axis]), (-1.0, window[1, axis])):
             depth = sign * (polygon[:, axis] - limit)

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from rislam_rt.model import Material, Scene
 from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.write import mesh_file, scene_files, write_files
-from rislam_rt.scene.xml.materials import material_element
+from rislam_rt.scene.xml.materials import material_element, material_word
 
 XML_FILE = "scene.xml"
 """Name of the XML scene file in the folder that is written for Sionna RT."""
@@ -58,7 +58,9 @@ def xml_bytes(scene: Scene) -> bytes:
     shapes: list[tuple[str, Material | None]] = [(r.name, r.material) for r in scene.reflectors]
     shapes += [(shade.name, None) for shade in scene.occluders]
     shapes += [(SHADE_OF + s.name, None) for s in scene.scatterers if s.shade is not None]
-    names = {m: f"{_word(m)}-{number}" for number, m in enumerate(dict.fromkeys(material for _, material in shapes))}
+    names = {
+        m: f"{material_word(m)}-{number}" for number, m in enumerate(dict.fromkeys(material for _, material in shapes))
+    }
     root.extend(material_element(material, name) for material, name in names.items())
     for name, material in shapes:
         shape = SubElement(root, "shape", {"type": "ply", "id": f"mesh-{name}"})
@@ -81,10 +83,3 @@ def left_behind(scene: Scene) -> list[str]:
         notes.append(f"{len(scene.scatterers)} scatterers (of shadows: a shape of air, which hides their centre too)")
     notes += [f"the panel '{panel.name}'" for panel in scene.panels]
     return [*notes, "the agent's motion, and Tx and Rx on it"]
-
-
-def _word(material: Material | None) -> str:
-    """Kind of a material for its name in a written XML scene; Sionna takes names with `itu` its own way."""
-    if material is None:
-        return "air"
-    return material.itu if material.itu else ("constant" if material.level is not None else "slab")

@@ -1,6 +1,6 @@
 """Classifiers that tell tracks of landmark paths from wall returns: a small network, its features, a baseline."""
 
-from rislam_rt.slam.classify.geometric import classify_geometric
+from rislam_rt.slam.classify.geometric_classifier import classify_geometric
 from rislam_rt.slam.classify.network import (
     Network,
     blend,

@@ -90,7 +90,8 @@ def image_misfit(seen: Floats, std: Floats, strength: Floats, offset: Floats, st
 
 
 def _mirrors(shown: Floats, offset: Floats, strength: Floats, cost: Floats, walls: Integers) -> _Mirrors:
-    """Reflections in all sequences of up to two walls, from the images (W, 3) of the Tx that their returns show."""
+    """Mirrors for the image misfit: reflections in all sequences of up to two walls, from the images (W, 3) of the Tx
+    that their returns show."""
     normal = shown - offset
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     depth = np.sum(0.5 * (shown + offset) * normal, axis=1)
@@ -111,7 +112,8 @@ def _mirrors(shown: Floats, offset: Floats, strength: Floats, cost: Floats, wall
 def _predict(
     mirrors: _Mirrors, point: Floats, offset: Floats, strength: Floats, length: Floats, points: Integers
 ) -> tuple[Floats, Floats, Floats, Integers]:
-    """Predicted images of points in mirrors: returns (C, 3), log strengths (C,), uncertainties (C,), parents (C, 5)."""
+    """Images of points in mirrors whose misfit is asked: returns (C, 3), log strengths (C,), uncertainties (C,),
+    parents (C, 5)."""
     rx, tx = np.nonzero(mirrors.bounces[:, None] + mirrors.bounces <= 2)
     keep = mirrors.bounces[rx] + mirrors.bounces[tx] > 0
     rx, tx = rx[keep], tx[keep]
@@ -133,7 +135,8 @@ def _predict(
 
 
 def _mirror_gap(point: Floats, shown: Floats, offset: Floats, walls: Integers, cost: Floats) -> Floats:
-    """Distance (T,) [m] by which points are nearer to the Tx than to its images in walls; doubtful walls count less."""
+    """Distance (T,) [m] by which points are nearer to the Tx than to its images in walls, for the image misfit;
+    doubtful walls count less."""
     gap = np.linalg.norm(point[:, None] - shown[walls], axis=2) - np.linalg.norm(point - offset, axis=1)[:, None]
     own: Booleans = np.arange(len(point))[:, None] == walls
     return np.asarray(np.minimum(np.where(own, OUTSIDE, gap + 0.1 * cost[walls]).min(axis=1), OUTSIDE))

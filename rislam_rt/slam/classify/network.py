@@ -34,7 +34,7 @@ class Network(NamedTuple):
 
 
 def classify(features: Floats, network: Network) -> Floats:
-    """Probability (M,) that each row of features (M, F) belongs to a landmark path (PS, VS, RIS, VRIS: keep)."""
+    """Probability (M,) by the network that rows of features (M, F) are of landmark paths (PS, VS, RIS, VRIS: keep)."""
     return np.asarray(0.5 * (1.0 + np.tanh(0.5 * log_odds(features, network))))
 
 

@@ -168,7 +168,8 @@ class _Fitted(NamedTuple):
 
 
 def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> _Fitted:
-    """Least-squares turns of tracks' directions; `level` (T, W, 2, 2) brings free mean cosines to the body frame."""
+    """Feature of tracks: least-squares turns of their directions; `level` (T, W, 2, 2) brings free mean cosines to the
+    body frame."""
     root = np.sqrt(weight)
     columns = np.concatenate([level, by_turn, seen[..., None]], axis=-1) * root[..., None]
     gram = np.einsum("tkia,tkib->tab", columns, columns)
@@ -184,7 +185,7 @@ def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> 
 
 
 def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) -> _Fitted:
-    """Least-squares approach of tracks, the change of their lengths with the agent's motion; mean lengths are free."""
+    """Feature of tracks: least-squares approach, change of length with the agent's motion; mean lengths are free."""
     total = np.maximum(weight.sum(axis=1), 1e-300)
     x, y, z = (v - (np.sum(weight * v, axis=1) / total)[:, None] for v in (towards, seen, bulge))
     mean, spread = APPROACH_PRIOR
@@ -196,7 +197,7 @@ def _fit_approach(seen: Floats, weight: Floats, towards: Floats, bulge: Floats) 
 
 
 def _latest(sightings: Sightings) -> tuple[Floats, Floats]:
-    """Latest measurement (T, 3) of each track, cosines in room axes, and its standard deviations (T, 3)."""
+    """Latest sighting (T, 3) of each track as a feature, cosines in room axes, and its standard deviations (T, 3)."""
     last = sightings.held.shape[1] - 1 - np.argmax(sightings.held[:, ::-1], axis=1)
     rows = np.arange(len(last))
     seen, std = sightings.seen[rows, last], sightings.std[rows, last]
@@ -205,7 +206,7 @@ def _latest(sightings: Sightings) -> tuple[Floats, Floats]:
 
 
 def _mean(values: Floats, held: Booleans) -> Floats:
-    """Mean (T, ...) over the cycles that a track was seen, of values (T or 1, W, ...)."""
+    """Mean (T, ...), for a track's features, over the cycles of its sightings, of values (T or 1, W, ...)."""
     share = held / np.maximum(held.sum(axis=1, keepdims=True), 1)
     return np.einsum("tk,tk...->t...", share, np.broadcast_to(values, (*held.shape, *values.shape[2:])))
 
@@ -226,5 +227,5 @@ def stillness(turn: Floats, turn_std: Floats, approach: Floats, approach_std: Fl
 
 
 def _log_normal(miss: Floats, std: Floats) -> Floats:
-    """Log density of a normal, without its constant."""
+    """Log density of a normal, without its constant, for features of sightings."""
     return np.asarray(-0.5 * (miss / std) ** 2 - np.log(std))

@@ -48,7 +48,8 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
 
 
 def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool) -> tuple[Floats, Floats]:
-    """Smoothest motion along the particles' trail (K, 4) to now: window head (7 + 3F,), accelerations (K - 1, A)."""
+    """Gaussian view's smoothest motion along the particles' trail (K, 4) to now: window head (7 + 3F,), accelerations
+    (K - 1, A)."""
     count, head = len(trail), mean.copy()
     accel = np.zeros((count - 1, len(std)))
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)

@@ -11,9 +11,10 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RadioConfig, RisCode, SensorModel
-from rislam_rt.model.sensor import ONE_PULSE
+from rislam_rt.model.sensor_model import ONE_PULSE
 from rislam_rt.slam.classify import Sightings, classify, classify_geometric, load_classifier, track_features
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.input_checks import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.nested.gaussian_view import gaussian_view
 from rislam_rt.slam.nested.particles.engine_choice import pick_engine
@@ -33,7 +34,6 @@ from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.observations import PANEL, free_space, stranger_density
 from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import REMOVED, StepInfo
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init
@@ -168,12 +168,12 @@ def _move(
 
 
 def _refresh_view(front: WindowState, belief: Nested, config: SlamConfig) -> WindowState:
-    """Window state whose window is the Gaussian view of the particles, after these have changed."""
+    """Window state of the particle filter after its particles have changed: its window is their Gaussian view."""
     return front._replace(window=gaussian_view(belief, front.window.step, front.heading, config))
 
 
 def _spans(front: WindowState) -> Floats:
-    """Times (K,) [s] from each pose of the particles' trail to now."""
+    """Times (K,) [s] from each pose of the particle filter's trail to now."""
     return np.append(np.cumsum(front.window.step[::-1])[::-1], 0.0)
 
 
@@ -187,7 +187,8 @@ def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
 
 
 def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
-    """Tracks not examined for births (young; wall returns, if thrown away), and which log entries are wall returns."""
+    """Tracks the particle filter does not examine for births (young; wall returns, if thrown away), and which log
+    entries are wall returns."""
     tracks, scene = front.tracks, front.scene
     need = config.nested.birth_cycles if config.use_vt or not len(front.landmarks.ident) else WALL_CYCLES
     looked = np.maximum(tracks.looked, 2 * need // 3)  # looked at again when their measurements have grown by a half
@@ -203,7 +204,7 @@ def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Bool
 def _follow_map(
     belief: Nested, before: WindowState, after: WindowState, config: SlamConfig, *, rng: np.random.Generator
 ) -> Nested:
-    """Particles with the landmarks that the window state holds now: removed ones dropped, a new one initialised."""
+    """Particles of the nested filter with the map's present landmarks: removed ones dropped, a new one initialised."""
     keep = np.isin(before.landmarks.ident, after.landmarks.ident)
     belief = belief if keep.all() else drop(belief, keep)
     for row in range(len(belief.clouds), len(after.landmarks.ident)):
@@ -213,7 +214,7 @@ def _follow_map(
 
 
 def _history(front: WindowState, row: int) -> LandmarkHistory:
-    """Measurements from which a new feature of the map was found, and its prior, for its particles' initialisation."""
+    """Measurements in which a new feature of the map was found, and its prior, for the particle filter to start."""
     landmarks, log, window = front.landmarks, front.log, front.window
     at = (log.form[:, 0] == landmarks.ident[row]).any(axis=1).nonzero()[0]
     forms = landmarks.rows(log.form[at[0]])
@@ -244,7 +245,8 @@ def _history(front: WindowState, row: int) -> LandmarkHistory:
 def wall_returns(
     tracks: WindowTracks, log: Log, cycle: int, poses: Floats, body: Body, radio: RadioConfig, config: NestedConfig
 ) -> Booleans:
-    """Whether each track (T,) is a wall return, by the classifier, from K estimated poses (K, 4) [m, rad].
+    """Whether each track (T,) is a wall return for the particle filter, by the classifier, from K estimated poses (K,
+    4) [m, rad].
 
     What the receiver says ran over the panel is none, however it looks to a classifier.
     """

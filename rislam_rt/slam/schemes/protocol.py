@@ -18,20 +18,23 @@ class SlamEstimator(Protocol):
         self, start: StartPrior, body: Body, ris: DataSheet | None, sensor: SensorModel, config: Any,
         *, rng: np.random.Generator,
     ) -> Any:  # fmt: skip
-        """State of the estimator before the first cycle: the start prior of the agent, and an empty map."""
+        """Protocol of an estimator: state before the first cycle, the start prior of the agent, and an empty map."""
         ...
 
     def step(
         self, state: Any, measurement: Measurement, code: RisCode | None, dt: float, heading: float, config: Any,
         *, rng: np.random.Generator,
     ) -> tuple[Any, Any]:  # fmt: skip
-        """State after a measurement, and its `StepInfo`: `dt` [s] since the last, `heading` [rad], code as believed."""
+        """Protocol of an estimator: state after a measurement, and its `StepInfo`; `dt` [s] since the last, `heading`
+        [rad], code as believed."""
         ...
 
     def predict(self, state: Any, dt: float, config: Any) -> SlamEstimate:
-        """Estimate of pose and map predicted `dt` [s] ahead without noise, for which the next code is designed."""
+        """Protocol of an estimator: pose and map predicted `dt` [s] ahead without noise, for which the next code is
+        designed."""
         ...
 
     def estimate(self, state: Any, config: Any) -> SlamEstimate:
-        """Estimate that the state holds: mean, covariance, equally likely samples of the pose, and the map."""
+        """Protocol of an estimator: what the state holds, that is mean, covariance, equally likely samples of the pose,
+        and the map."""
         ...

@@ -186,7 +186,7 @@ def with_tilts(view: CycleAssociation, tilts: Tilts) -> CycleAssociation:
 
 
 def _median(values: Floats) -> Floats:
-    """Median (A,) of each column of values (M, A); numpy's own takes ten times as long for so few."""
+    """Median (A,) of each column of values (M, A) for association; numpy's own takes ten times as long for so few."""
     values, middle = np.sort(values, axis=0), len(values) // 2
     return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 

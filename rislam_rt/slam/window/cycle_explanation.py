@@ -58,8 +58,8 @@ def components_to_explain(measurement: Measurement, scene: KnownEnvironment) -> 
 def log_associations(
     state: WindowState, observed: Observations, view: CycleAssociation
 ) -> tuple[WindowState, Booleans]:
-    """Append a cycle's components to the log with the paths that they were associated with, and mark which of the
-    associated ones (A,) update the Gaussian.
+    """Write a cycle's explanation into the log: append its components with the paths that they were associated with,
+    and mark which of the associated ones (A,) update the Gaussian.
 
     With `use_vt = false` wall returns are recognised, but update nothing.
     """
@@ -181,7 +181,7 @@ def _loudest(log: Log, rows: Integers) -> Floats:
 
 
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
-    """Mean squared residuals (A,) of explained rows of the log, in reported standard deviations."""
+    """Mean squared residuals (A,) of explained components, as rows of the log, in reported standard deviations."""
     if not len(rows):
         return np.zeros(0)
     at = np.searchsorted(left.row, rows)
@@ -276,8 +276,8 @@ def _weigh_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonE
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Landmark label (A,) of forms (A, 5): the ident of a point or wall, or a combined one of a point's image in a wall
-    and of two walls in either order."""
+    """Landmark label (A,) of the forms (A, 5) that explain components: the ident of a point or wall, or a combined one
+    of a point's image in a wall and of two walls in either order."""
     if not len(forms):
         return np.zeros(0, dtype=np.int64)
     point, first, second = forms[:, 0] >= 0, forms[:, 3], forms[:, 4]

@@ -7,9 +7,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import MapEstimate, SlamEstimate, empty_map
 from rislam_rt.slam.config import SlamConfig
-from rislam_rt.slam.gaussian_draws import even_draws, square_root
 from rislam_rt.slam.map_geometry import MAX_LEAN, images_in, wall_planes
 from rislam_rt.slam.predicted_returns import AXES, poses_of
+from rislam_rt.slam.sampling import even_draws, square_root
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmarks.duplicate_walls import second_planes
@@ -21,8 +21,8 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
-    """Estimate of pose and map `dt` [s] ahead at constant velocity, without process noise, with candidates for RIS
-    panels that the map lacks."""
+    """Estimate by the window filter of pose and map `dt` [s] ahead at constant velocity, without process noise, with
+    candidates for RIS panels that the map lacks."""
     ahead = estimate(state, config, dt)
     unknown = [panel for panel, row in enumerate(state.landmarks.panels) if row < 0]
     if state.scene.ris is None or not unknown:
@@ -54,8 +54,8 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
 
 
 def shift_covariance(features: Floats, landmarks: WindowTable, shift: Floats) -> Floats:
-    """Covariance (3F, 3F) of features (F, 3) caused by the start's position error alone, of standard deviation `shift`
-    (3,) [m], which moves them all together.
+    """Covariance (3F, 3F) that estimates of features (F, 3) have by the start's position error alone, of standard
+    deviation `shift` (3,) [m], which moves them all together.
 
     A wall's three numbers, the image of an anchor that stays, move by `2 n n^T` of what the wall itself does.
     """

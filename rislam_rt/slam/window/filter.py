@@ -6,10 +6,10 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
+from rislam_rt.slam.input_checks import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, stranger_density
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_checks import check_sides, check_step
 from rislam_rt.slam.step_info import StepInfo
 from rislam_rt.slam.window import motion_learning, tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again, with_tilts
@@ -130,8 +130,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
 
 
 def smoothed(state: WindowState) -> Floats:
-    """Smoothed positions (K, 3) [m] of all cycles so far, each from a window's length of later cycles, fewer for the
-    last ones."""
+    """Smoothed positions (K, 3) [m] by the window filter in all cycles so far, each from a window's length of later
+    cycles, fewer for the last ones."""
     return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
 
 

@@ -39,7 +39,8 @@ class Elevations(NamedTuple):
 
 
 def elevations(rise: Floats, std: Floats, cosines: Floats) -> Elevations:
-    """Predicted elevations of returns of sines (R,), standard deviations (R,) and direction cosines (R, 2)."""
+    """Predicted elevations over the horizon of returns of sines (R,), standard deviations (R,) and direction cosines
+    (R, 2)."""
     return Elevations(rise, std, np.stack([-cosines[:, 1], cosines[:, 0]], axis=1))
 
 
@@ -58,7 +59,7 @@ class _Near(NamedTuple):
 
 
 def _near(returns: Elevations, log_like: Floats) -> _Near:
-    """Returns that may come in nearly level, by the map and by the log likelihoods (R, Z) of what was heard of them.
+    """Returns near the horizon, by the map and by the log likelihoods (R, Z) of what was heard of them.
 
     A level body hears them: their elevation is at the plane at least.
     """
@@ -137,12 +138,12 @@ def weigh_tilts(
 
 
 def _chance(above: Floats, shows: Floats, asked: Booleans, heard: Booleans) -> Floats:
-    """Probability (..., R) of what was heard of returns that arrive above the plane with probabilities `above`; what is
-    heard where a return should be may be something else."""
+    """Probability (..., R) of what was heard of returns above the horizon with probabilities `above`; what is heard
+    where a return should be may be something else."""
     hit = CONSTANTS.rare + (1.0 - CONSTANTS.rare) * above
     return np.where(asked, np.where(heard, hit, 1.0 - shows * above), 1.0)
 
 
 def prior_tilts(probability: Floats) -> Tilts:
-    """Tilts of a cycle before it is heard, from probabilities (C, L) of the levels of its deviations."""
+    """Tilts of the horizon in a cycle before it is heard, from probabilities (C, L) of the levels of its deviations."""
     return attitude.tilts(attitude.foreseen(probability), None)

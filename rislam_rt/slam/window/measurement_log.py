@@ -116,7 +116,7 @@ class Residuals(NamedTuple):
     """(A,) expected mean squares of the errors, in reported deviations (see `squares`); 0 before a solution."""
 
     def take(self, rows: Any) -> "Residuals":
-        """Only some of the measurements' residuals."""
+        """Residuals of only some of the log's measurements."""
         return Residuals._make(field[rows] for field in self)
 
 
@@ -132,7 +132,7 @@ def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float) -> F
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
-    """Distinct forms (U, 5) among forms (N, 5), and the index (N,) of each among them."""
+    """Distinct forms (U, 5) among the forms (N, 5) of the log's measurements, and the index (N,) of each among them."""
     base = int(forms.max(initial=0)) + 3
     code = (forms + 1) @ base ** np.arange(forms.shape[1])[::-1]
     _, first, place = np.unique(code, return_index=True, return_inverse=True)

@@ -48,7 +48,8 @@ def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]
 
 
 def level(state: WindowState, first: int, change: Floats) -> WindowState:
-    """Level the log's measurements of the poses from `first` on by changes (K, A) [rad] of their attitudes."""
+    """Level the log's measurements, as they are re-linearised, of the poses from `first` on by changes (K, A) [rad] of
+    their attitudes."""
     log, by, begin = state.log, np.zeros((len(change), 3)), state.cycle - state.window.num_poses + 1 + first
     by[:, : change.shape[1]] = change
     late = slice(np.searchsorted(log.cycle, begin), None)
@@ -68,8 +69,8 @@ class _Whitened(NamedTuple):
 
 
 def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats) -> tuple[_Whitened, Floats]:
-    """Residuals (A, 3) of explained rows of the log, heard at slots (A,) of the poses (K, 4), and the predictions'
-    jacobians (A, 3, 4 + 3F) by pose and features, both in standard deviations."""
+    """Residuals (A, 3) as re-linearised of explained rows of the log, heard at slots (A,) of the poses (K, 4), and the
+    predictions' jacobians (A, 3, 4 + 3F) by pose and features, both in standard deviations."""
     window, log, scene, form = state.window, state.log, state.scene, state.log.form[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
@@ -95,5 +96,6 @@ def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats)
 
 
 def trust(left: Floats) -> Floats:
-    """Weights (A,) of residuals (A, 3) under Student's t, for iteratively reweighted least squares."""
+    """Weights (A,) under which residuals (A, 3) are re-linearised, by Student's t, for iteratively reweighted least
+    squares."""
     return np.asarray((CONSTANTS.tail + 3.0) / (CONSTANTS.tail + np.vecdot(left, left)))

@@ -6,10 +6,10 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.model import PanelCandidate, RisCode
 from rislam_rt.slam.arrival_rays import scatterer_positions
-from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER
 from rislam_rt.slam.predicted_returns import Poses, reflect
+from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
@@ -29,8 +29,8 @@ PATIENCE = 2
 def weigh_tracks(
     tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None
 ) -> WindowTracks:
-    """Update each track's odds of being a RIS panel, were it a point heard over no wall, by this cycle's amplitude or
-    missed detection under the phase code."""
+    """Update of RIS candidates: each track's odds of being a panel, were it a point heard over no wall, by this cycle's
+    amplitude or missed detection under the phase code."""
     rows = (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks

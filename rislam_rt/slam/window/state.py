@@ -65,11 +65,11 @@ class WindowState(NamedTuple):
 
     @property
     def attitude_variance(self) -> Floats:
-        """Expected variance (A,) [rad^2] of the attitude about each axis."""
+        """Expected variance (A,) [rad^2] of the window state's attitude about each axis."""
         return attitude.variance(self.sway)
 
     @property
     def attitude_covariance(self) -> Floats:
-        """Covariance (K, A, A) [rad^2] of the attitude in the window's cycles, under the deviations that are known by
-        now."""
+        """Covariance (K, A, A) [rad^2] of the window state's attitude in its cycles, under the deviations that are
+        known by now."""
         return np.asarray(np.linalg.inv(self.attitude_information + np.diag(1.0 / self.attitude_variance)))

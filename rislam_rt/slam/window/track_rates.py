@@ -48,15 +48,15 @@ class _Histories(NamedTuple):
     """(T,) [m^2/s^2] of the rate of its own."""
 
     def total(self, value: Floats) -> Floats:
-        """Sums (T,) of values (N,) over each track."""
+        """Sums (T,) over each track's history of values (N,)."""
         return np.asarray(np.bincount(self.which, value, len(self.span)), dtype=np.float64)
 
     def mean(self, value: Floats) -> Floats:
-        """Weighted means (T,) of values (N,) over each track."""
+        """Weighted means (T,) over each track's history of values (N,)."""
         return self.total(self.weight * value) / self.total(self.weight)
 
     def slope(self, value: Floats) -> tuple[Floats, Floats]:
-        """Slopes (T,) [m/s] of weighted line fits to values (N,), and their variances."""
+        """Rates (T,) [m/s] of the tracks, slopes of weighted line fits to values (N,), and their variances."""
         information = self.total(self.weight * self.time**2)
         return self.total(self.weight * self.time * value) / information, 1.0 / information
 
@@ -85,7 +85,8 @@ def rate_factor(state: WindowState) -> RateFactor | None:
 
 
 def _histories(state: WindowState, rows: Integers, which: Integers, slot: Integers) -> _Histories:
-    """Histories of tracks, given as rows (N,) of the log with their tracks (N,) and slots (N,)."""
+    """Histories of the tracks whose rates are asked, given as rows (N,) of the log with their tracks (N,) and slots
+    (N,)."""
     window, log, body = state.window, state.log, state.scene.body
     place, clock = window_gaussian.poses(window)[:, :3], np.concatenate([[0.0], np.cumsum(window.step)])
     first = np.searchsorted(which, np.arange(which[-1] + 1))
@@ -167,7 +168,8 @@ def _shares(found: _Histories, state: WindowState) -> Floats:
 
 
 def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
-    """Quadratic cost on the window's positions by tracks that follow them with probabilities `share` (T,)."""
+    """Rates of tracks as a quadratic cost on the window's positions, by tracks that follow them with probabilities
+    `share` (T,)."""
     count, many, left = len(found.span), state.window.num_poses, found.left - found.mean(found.left)[found.which]
     rate, spread = found.slope(left)
     trust = (CONSTANTS.tail + 1.0) / (CONSTANTS.tail + found.weight * (left - rate[found.which] * found.time) ** 2)
@@ -205,5 +207,5 @@ def _first_step(found: _Histories, share: Floats, rate: Floats, spread: Floats, 
 
 
 def _normal(off: Floats, variance: Floats) -> Floats:
-    """Densities (T,) of centred normals."""
+    """Densities (T,) of centred normals, for the tracks' rates."""
     return np.asarray(np.exp(-0.5 * off**2 / variance) / np.sqrt(2.0 * np.pi * variance))

@@ -188,8 +188,8 @@ def alive(tracks: WindowTracks, cycle: int, above: Floats, level: Floats) -> Boo
 
 
 def nearly_level(tracks: WindowTracks) -> Elevations:
-    """Elevations of the tracks: those at the rim of the unit disc, within a deviation, are level as far as upright
-    walls are."""
+    """Elevations of the tracks that nothing explains: those at the rim of the unit disc, within a deviation, are level
+    as far as upright walls are."""
     seen, std = tracks.mean[..., 0], np.sqrt(tracks.covariance[:, 1, 0, 0])
     radius = np.hypot(seen[:, 1], seen[:, 2]) + std
     rise = np.sqrt(np.maximum(1.0 - radius**2, 0.0))

@@ -43,7 +43,7 @@ class ClassifierScore(NamedTuple):
 
 
 def rules(network: Network) -> dict[str, Rule]:
-    """Classification rules by name: the network over a track's life or cycle by cycle, geometry, amplitude.
+    """Classification rules to score by name: the network over a track's life or cycle by cycle, geometry, amplitude.
 
     All of them remove components as short as the direct path.
     """
@@ -56,7 +56,7 @@ def rules(network: Network) -> dict[str, Rule]:
 
 
 def odds_over_life(examples: Examples, network: Network) -> Floats:
-    """Log odds (N,) that a component is to be kept, averaged over the classifications of its track so far."""
+    """Log odds (N,) of the classifier that a component is to be kept, averaged over its track so far."""
     fresh = log_odds(examples.features, network)
     found, held = np.empty(len(fresh)), dict[tuple[int, int, int], tuple[float, int]]()
     names = zip(examples.walk.tolist(), examples.policy.tolist(), examples.track.tolist(), strict=True)
@@ -83,7 +83,7 @@ def score(examples: Examples, rule: Rule, coverage: float, *, rng: np.random.Gen
 
 
 def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: np.random.Generator) -> Floats:
-    """Mean over rooms of a classification rule's F1, (3,) with its interval, walks resampled within each room."""
+    """Score of the classifier: mean over rooms of a rule's F1, (3,) with interval, walks resampled in each room."""
     draws = []
     for examples in rooms:
         tables = _tables(examples, rule(examples))
@@ -110,7 +110,8 @@ def importance(examples: Examples, network: Network, *, rng: np.random.Generator
 
 
 def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ...]) -> dict[str, tuple[float, int]]:
-    """F1 of a classification rule and number of examples in bins `edges[i] <= value < edges[i + 1]` of age or SNR."""
+    """Score of the classifier by a value: F1 of a rule and number of examples in bins `edges[i] <= value < edges[i +
+    1]` of age or SNR."""
     kept, known = rule(examples), examples.labelled & ~examples.near
     bins = {}
     for low, high in pairwise(edges):
@@ -122,7 +123,8 @@ def by_value(examples: Examples, rule: Rule, value: Floats, edges: tuple[int, ..
 
 
 def path_classes(examples: Examples) -> dict[str, Booleans]:
-    """Which examples (N,) are of each path class, by name; paths with walls are split by the legs that have them."""
+    """Which examples (N,) of the classifier are of each path class, by name; paths with walls are split by the legs
+    that have them."""
     found = {}
     for kind in PathKind:
         over_walls = kind in (PathKind.VS, PathKind.VRIS)
@@ -134,20 +136,22 @@ def path_classes(examples: Examples) -> dict[str, Booleans]:
 
 
 def mistakes(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
-    """Number of misclassified examples and of all examples, by path class."""
+    """Number of examples that the classifier gets wrong, and of all, by path class."""
     wrong = rule(examples) != examples.keep
     return {name: (int(np.sum(wrong & rows)), int(np.sum(rows))) for name, rows in path_classes(examples).items()}
 
 
 def right_by_class(examples: Examples, rule: Rule) -> float:
-    """Mean over the path classes of the share of examples classified correctly, rare classes counting in full."""
+    """Score of the classifier: mean over the path classes of the share of examples classified correctly, rare classes
+    counting in full."""
     kept = rule(examples)
     shares = [np.mean((kept == examples.keep)[examples.kind == kind]) for kind in PathKind if kind in examples.kind]
     return float(np.mean(shares)) if shares else 1.0
 
 
 def panel_dropped(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
-    """Number of examples of the direct panel path that a rule removes, and of all such examples, by code policy."""
+    """Score of the classifier: number of examples of the direct panel path that a rule removes, and of all such, by
+    code policy."""
     dropped, panel = ~rule(examples), examples.kind == PathKind.RIS
     rows = {name: panel & (examples.policy == number) for number, name in enumerate(POLICIES)}
     return {name: (int(np.sum(dropped & own)), int(np.sum(own))) for name, own in rows.items()}
@@ -159,13 +163,13 @@ def f1(keep: Booleans, kept: Booleans) -> float:
 
 
 def _tables(examples: Examples, kept: Booleans) -> Integers:
-    """Confusion counts (walks, 4) of each walk as `_counts` gives them, clutter left out."""
+    """Confusion counts (walks, 4) of the classifier in each walk as `_counts` gives them, clutter left out."""
     walks = np.unique(examples.walk)
     return np.array([_counts(kept, examples.keep, examples.labelled & (examples.walk == walk)) for walk in walks])
 
 
 def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
-    """Confusion counts among `rows`: kept rightly, kept wrongly, removed wrongly, removed rightly."""
+    """Confusion counts of the classifier among `rows`: kept rightly, kept wrongly, removed wrongly, removed rightly."""
     return (
         int(np.sum(rows & kept & keep)), int(np.sum(rows & kept & ~keep)), int(np.sum(rows & ~kept & keep)),
         int(np.sum(rows & ~kept & ~keep)),
@@ -173,11 +177,11 @@ def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, i
 
 
 def _f1(tables: Any) -> Floats:
-    """F1 of confusion counts (..., 4)."""
+    """F1 of the classifier's confusion counts (..., 4)."""
     hit, false, missed = tables[:, 0], tables[:, 1], tables[:, 2]
     return np.asarray(np.where(hit + false + missed > 0, 2.0 * hit / np.maximum(2 * hit + false + missed, 1), 1.0))
 
 
 def _share(part: float, whole: float) -> float:
-    """Ratio of two counts; 1 of none."""
+    """Ratio of two counts of the classifier's score; 1 of none."""
     return float(part / whole) if whole else 1.0

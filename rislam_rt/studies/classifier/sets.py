@@ -10,9 +10,9 @@ import numpy as np
 from rislam_rt.errors import SceneError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene, Trajectory
-from rislam_rt.pipeline.run import build_channel
+from rislam_rt.pipeline.channels import build_channel
+from rislam_rt.pipeline.specification.pipeline_spec import build_receiver
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import build_receiver
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.scene.random_rooms.box_rooms import random_room

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from rislam_rt.pipeline.specification.pipeline_spec import ReceiverSection
 from rislam_rt.pipeline.specification.section import Count, Positive, Section
-from rislam_rt.pipeline.specification.spec import ReceiverSection
 from rislam_rt.scene.random_rooms import CYCLES
 from rislam_rt.studies.spec import ComparedRoomSection, RadioStudySpec
 

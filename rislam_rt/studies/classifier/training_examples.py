@@ -103,7 +103,7 @@ def gather_walk(
 
 
 def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:
-    """True class (`Examples.kind`) and `.legs` of components by their columns of the paths, -1 for clutter."""
+    """True class (`Examples.kind`) and `.legs` of training examples by their columns of the paths, -1 for clutter."""
     over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
     over = np.where(paths.kind >= PathKind.PS, over, 0)
     true = column >= 0
@@ -117,17 +117,18 @@ class _TrackHistory:
         self.rows: dict[int, dict[int, Floats]] = {}
 
     def add(self, labels: Integers, rows: Floats, cycle: int) -> None:
-        """Store one measurement of each labelled track in a cycle."""
+        """Store one measurement of each labelled track in a cycle, for training examples."""
         for label, row in zip(labels.tolist(), rows, strict=True):
             self.rows.setdefault(label, {})[cycle] = row
 
     def forget(self, living: Integers) -> None:
-        """Drop the measurements of all tracks but the `living`."""
+        """Drop the measurements of all tracks but the `living`, for training examples."""
         alive = set(living.tolist())
         self.rows = {label: held for label, held in self.rows.items() if label in alive}
 
     def sightings(self, labels: Integers, cycle: int, position: Floats, heading: Floats) -> Sightings:
-        """Measurements of the tracks with these labels in the window that ends at a cycle, with the agent's poses."""
+        """Measurements of the tracks with these labels in the window that ends at a cycle, with the agent's poses, for
+        training examples."""
         first = max(0, cycle - WINDOW + 1)
         table = np.zeros((len(labels), cycle - first + 1, 7))
         table[..., 3:6] = 1.0

@@ -42,7 +42,7 @@ def random_walk(scene: Scene, cycles: int, *, rng: np.random.Generator) -> Traje
 
 
 def _arc(scene: Scene, start: Floats, cycles: int, rng: np.random.Generator) -> Trajectory:
-    """Trajectory from `start` (3,) [m] with random constant speed and turn rate."""
+    """Walk on an arc from `start` (3,) [m] with random constant speed and turn rate."""
     time = CYCLE * np.arange(cycles, dtype=np.float64)
     speed, rate = rng.uniform(*SPEED), TURN_RATE * rng.standard_normal()
     heading = rng.uniform(-np.pi, np.pi) + rate * time
@@ -76,6 +76,6 @@ def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.ran
 
 
 def _middle(paths: Paths) -> int:
-    """Cycle at which the code of the policy `aimed` is designed: the middle one of those with a direct panel path."""
+    """Cycle of a walk at which the code of the policy `aimed` is designed: the middle one with a direct panel path."""
     there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
     return int(there[len(there) // 2]) if len(there) else 0

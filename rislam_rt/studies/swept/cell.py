@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.measurement import paper_snr_db
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.cycle import Receptions
 from rislam_rt.pipeline.long.slices import subsampled_paths
-from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, result_of, run_scheme
+from rislam_rt.pipeline.run import RunSetup, prepare_setup, result_of, run_scheme
 from rislam_rt.pipeline.scores.summary import summarise_scheme
-from rislam_rt.pipeline.specification.read import Table, build_spec
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec
 from rislam_rt.progress import tell_nobody
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside

@@ -32,20 +32,20 @@ class Group(NamedTuple):
         return [name for name in SCHEMES if name in ran] + sorted(ran - set(SCHEMES))
 
     def column(self, scheme: str, *name: str) -> Floats:
-        """One score of a scheme over all repetitions, (R,); NaN where there is none.
+        """One collected score of a scheme over all repetitions, (R,); NaN where there is none.
 
         `name` are the nested keys, e.g. `"landmarks", "ris", "rmse_m"`.
         """
         return np.array([_look(result, scheme, name) for result in self.results], dtype=np.float64)
 
     def parts(self, scheme: str, name: str) -> list[str]:
-        """Keys that a nested score of a scheme has in any repetition: names of landmarks (`landmarks`) or `walls`."""
+        """Keys that a collected nested score of a scheme has in any repetition: landmarks' names, or `walls`."""
         found = [result["schemes"].get(scheme, {}).get(name, {}) for result in self.results if result]
         return list(dict.fromkeys(part for entry in found for part in entry))
 
     @property
     def reasons(self) -> list[str]:
-        """Error messages of the schemes that failed, each once."""
+        """Error messages collected from the schemes that failed, each once."""
         entries = [(name, entry) for result in self.results if result for name, entry in result["schemes"].items()]
         return list(dict.fromkeys(f"{name}: {entry['failed']}" for name, entry in entries if "failed" in entry))
 
@@ -85,7 +85,8 @@ def spread(values: Floats) -> Interval | None:
 
 
 def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
-    """Relative reduction of our RMSE against theirs, `1 - ours / theirs`, with its interval, over seeds that both have.
+    """Relative reduction of our collected RMSE against theirs, `1 - ours / theirs`, with its interval, over seeds that
+    both have.
 
     None for fewer than two seeds.
     """
@@ -97,7 +98,7 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
-    """Difference [m] of their RMSE and ours, with its interval, over seeds that both have; None of fewer than two."""
+    """Difference [m] of their collected RMSE and ours, with interval, over common seeds; None of fewer than two."""
 
     def difference(samples: Floats) -> Floats:
         root = rms_over_runs(samples)
@@ -108,13 +109,13 @@ def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
 
 
 def _pairs(ours: Floats, theirs: Floats) -> Floats:
-    """Pairs (S, 2) of the values of those seeds that both have."""
+    """Pairs (S, 2) of the collected values of those seeds that both have."""
     pairs = np.stack([ours, theirs], axis=-1)
     return pairs[~np.isnan(pairs).any(axis=1)]
 
 
 def _look(result: Mapping[str, Any] | None, scheme: str, name: Sequence[str]) -> float:
-    """One score of a scheme by nested keys; NaN if there is none."""
+    """One of the collected scores of a scheme by nested keys; NaN if there is none."""
     found: Any = result["schemes"].get(scheme) if result else None
     for part in name:
         found = found.get(part) if isinstance(found, Mapping) else None

@@ -13,10 +13,11 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement import FrontEnd, measure
 from rislam_rt.model import PathKind, Paths, Trajectory
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.room.front_end import prepare_front_end
-from rislam_rt.pipeline.run import prepare_channel, prepare_setup
-from rislam_rt.pipeline.signals import panel_codes
-from rislam_rt.pipeline.specification.spec import Settings, build_settings
+from rislam_rt.pipeline.run import prepare_setup
+from rislam_rt.pipeline.signal_simulation import panel_codes
+from rislam_rt.pipeline.specification.pipeline_spec import Settings, build_settings
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside

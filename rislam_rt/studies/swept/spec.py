@@ -33,7 +33,7 @@ class SweptSpec(StudySpec):
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """Variants of the SLAM run in the study: its `variants`, if it has any."""
+        """Variants of the SLAM run that a swept study specifies: its `variants`, if it has any."""
         return list(getattr(self, "variants", ()))
 
     @model_validator(mode="after")
@@ -62,7 +62,7 @@ class Fig4bSpec(_OneRoom):
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """Variants of motion and start."""
+        """Variants of motion and start that the study of Fig. 4(b) specifies."""
         return self.cases
 
 
@@ -102,7 +102,7 @@ class MismatchSection(Section):
         return self
 
     def variant(self, level: float | int | str) -> "VariantSection":
-        """Variant of the SLAM run with this mismatch at a level."""
+        """Variant of the SLAM run that the robustness study specifies for this mismatch at a level."""
         values = {**self.set, self.key: level}
         return VariantSection(name=f"{self.name}_{level}", group=self.name, note=self.note, set=values)
 
@@ -116,7 +116,8 @@ class RobustnessSpec(_OneRoom):
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """The reference without mismatch, and then every level of every mismatch."""
+        """Variants that the robustness study specifies: the reference without mismatch, and then every level of every
+        mismatch."""
         levels = [mismatch.variant(level) for mismatch in self.mismatches for level in mismatch.levels]
         return [VariantSection(name="reference"), *levels]
 
@@ -134,7 +135,8 @@ class HardwareSpec(_OneRoom):
 
     @property
     def all_variants(self) -> list[VariantSection]:
-        """An ideal front end, and every level of every impairment, without and with calibration."""
+        """Variants that the hardware study specifies: an ideal front end, and every level of every impairment, without
+        and with calibration."""
         variants = [VariantSection(name="reference")]
         for fault in self.faults:
             for level in fault.levels:

@@ -10,7 +10,7 @@ from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.own_methods import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.studies.spec import study_record

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rislam_rt.model import RisCode, SchemeResult
+from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.replay import Recorder
-from rislam_rt.pipeline.run import RunSetup, prepare_channel, prepare_setup, run_scheme
+from rislam_rt.pipeline.run import RunSetup, prepare_setup, run_scheme
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.signals import SignalsSpec, build_signals
-from rislam_rt.pipeline.specification.spec import ESTIMATOR_SECTIONS, PipelineSpec
+from rislam_rt.pipeline.signal_simulation import SignalsSpec, build_signals
+from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, PipelineSpec
 from rislam_rt.progress import tell_nobody
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene
@@ -75,7 +76,8 @@ def _run(
 
 
 def _applied_signals(setup: RunSetup, result: SchemeResult, spec: PipelineSpec, seed: int) -> "xr.Dataset":
-    """Samples of the received signal under the codes that a run applied; their noise is not that of its components."""
+    """Samples of the received signal under the codes that a run in an unseen room applied; their noise is not that of
+    its components."""
     section = spec.receiver.model_copy(update={"estimator": "waveform"})
     own = SignalsSpec(seed=seed, code="zero", radio=spec.radio, receiver=section)
     paths = without_panel(setup.paths)
@@ -101,7 +103,7 @@ def scheme_here(asked: str, room: RandomRoom) -> str:
 
 
 def trace_key(spec: PipelineSpec) -> str:
-    """Settings that true motion and paths depend on, as text: the key under which they are cached."""
+    """Settings that true motion and paths of a cell in unseen rooms depend on, as text: the key of the cache."""
     content = spec.model_dump(mode="json", exclude={*SEEN_BY_TRACER_NOT, *ESTIMATOR_SECTIONS})
     content["radio"] |= {"reference_snr_db": None, "noise_psd": None}
     return json.dumps(content, sort_keys=True)
@@ -116,6 +118,6 @@ def find_setup(seed: int, key: str) -> tuple[RandomRoom, RunSetup]:
 
 
 def room_traits(room: RandomRoom) -> dict[str, Any]:
-    """Properties of a random room as plain data: seed, shape and other classes, number of scatterers."""
+    """Properties of an unseen room as plain data: seed, shape and other classes, number of scatterers."""
     traits = {field.name: getattr(room, field.name) for field in fields(room) if field.name != "scene"}
     return {**traits, "scatterers": len(room.scene.scatterers)}

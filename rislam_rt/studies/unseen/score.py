@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
-from rislam_rt.pipeline.scores.audible import heard_long
+from rislam_rt.pipeline.scores.audible_paths import heard_long
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0
@@ -77,14 +77,14 @@ def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outc
 
 
 def _lasting(flag: Booleans, time: Floats) -> Booleans:
-    """Cycles from which on a flag (K,) is set for `LASTING` seconds without a break."""
+    """Cycles, to score births, from which on a flag (K,) is set for `LASTING` seconds without a break."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else LASTING
     length = max(1, round(LASTING / step))
     return np.asarray(np.convolve(flag, np.ones(length), "valid") >= length) if len(flag) >= length else flag[:0]
 
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:
-    """Scores of walls: how many detectable ones the last map has, their errors and delays, and ghost walls."""
+    """Scores of walls in an unseen room: how many detectable ones the map has, errors, delays, ghost walls."""
     heard, walls = heard_long(truth.wall_audible, time), truth.walls(told)
     first = np.full(len(heard), -1)
     match = np.full(len(heard), -1)
@@ -108,7 +108,8 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
 
 
 def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Floats) -> dict[str, Any]:
-    """Scores of landmarks: how many detectable ones the last map has, errors and delays, panel, ghost points, GOSPA."""
+    """Scores of landmarks in an unseen room: how many detectable ones the last map has, errors and delays, panel, ghost
+    points, GOSPA."""
     there = truth.landmark[: len(truth.landmark) - (truth.panel and inputs.panel is None)]
     audible = truth.landmark_audible[:, : len(there)]
     heard = heard_long(audible, inputs.time)
@@ -165,19 +166,20 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
 
 
 def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:
-    """Position errors of a run; `told` (3,) [m] is the error of the start prior."""
+    """Position errors of a run in an unseen room, to score; `told` (3,) [m] is the error of the start prior."""
     offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
     return Errors(np.linalg.norm(offset, axis=1), np.linalg.norm(offset - told, axis=1))
 
 
 def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
-    """Position RMSE [m], RMS posterior bound and their ratio, by name."""
+    """Score in an unseen room: position RMSE [m], RMS posterior bound and their ratio, by name."""
     rmse, least = evaluate.root_mean_square(errors), evaluate.root_mean_square(bound)
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
 def _nees(truth: Truth, answers: Answers) -> float | None:
-    """Mean NEES of the absolute position error over the cycles, per degree of freedom; None if no axis is filtered."""
+    """Score in an unseen room: mean NEES of the absolute position error over the cycles, per degree of freedom; None if
+    no axis is filtered."""
     covariance = np.array([estimate.covariance for estimate in answers.estimates])
     axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :3, :3]).min(axis=0) > 0.0)
     if not len(axes):
@@ -188,11 +190,12 @@ def _nees(truth: Truth, answers: Answers) -> float | None:
 
 
 def _delay(first: Integers, audible: Booleans, time: Floats) -> float | None:
-    """Median time [s] from the first cycle in which a landmark or wall is detectable to the first that maps it."""
+    """Score in an unseen room: median time [s] from the first cycle in which a landmark or wall is detectable to the
+    first that maps it."""
     known = (first >= 0) & audible.any(axis=0)
     return _median(time[first[known]] - time[np.argmax(audible[:, known], axis=0)])
 
 
 def _median(values: Floats) -> float | None:
-    """Median; None of no values."""
+    """Median of a score in an unseen room; None of no values."""
     return float(np.median(values)) if len(values) else None

@@ -33,7 +33,7 @@ class UnseenSpec(SweptSpec):
 
     @property
     def is_test(self) -> bool:
-        """Whether the rooms are test rooms."""
+        """Whether the study in unseen rooms is specified to use the test rooms."""
         return self.first >= TEST
 
     @model_validator(mode="after")

@@ -51,7 +51,8 @@ def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """Function that checks a cell's settings, and returns all that its result depends on: settings, room, code."""
+    """Function that checks the settings of a cell in unseen rooms, and returns all that its result depends on:
+    settings, room, code."""
     draw, versions, code = cache(draw_room), library_versions(), code_digest()
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:

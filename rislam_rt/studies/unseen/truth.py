@@ -10,11 +10,11 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import Surfaces, root_mean_square
 from rislam_rt.information import posterior_bound
 from rislam_rt.model import Paths, Scene, SchemeResult
-from rislam_rt.pipeline.scores.audible import audible_paths, audible_planes
-from rislam_rt.pipeline.scores.bound import bound_problem
+from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
-from rislam_rt.pipeline.scores.walls import coplanar, wall_surfaces
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.posterior_bound import bound_problem
+from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 
 class Truth(NamedTuple):
@@ -53,7 +53,7 @@ class Truth(NamedTuple):
     """(K,) [m] the same relative to the start, which then has no error."""
 
     def walls(self, shift: Floats) -> Surfaces:
-        """Surfaces of the true walls, moved by `shift` (3,) [m]."""
+        """Surfaces of the true walls of an unseen room, moved by `shift` (3,) [m]."""
         return Surfaces(self.wall_middle + shift, self.wall_normal, self.wall_spread)
 
 
@@ -73,7 +73,8 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
 
 
 def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
-    """Posterior bounds on the RMS position errors (K,) [m] of a run, absolute, and relative to the start.
+    """True posterior bounds on the RMS position errors (K,) [m] of a run in an unseen room, absolute, and relative to
+    the start.
 
     The motion model is white acceleration with the RMS that the true motion has, horizontally and vertically, whatever
     a filter assumes. The height after the start is not known if the agent climbs. In an unknown room no measurement

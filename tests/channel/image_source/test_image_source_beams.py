@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from rislam_rt.channel.compare import random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.beams import Beams, _through, enclosing_balls, group_positions
-from rislam_rt.channel.image_source.facets import SEAM, build_facets
+from rislam_rt.channel.image_source.beam_tracing import Beams, _through, enclosing_balls, group_positions
+from rislam_rt.channel.image_source.wall_facets import SEAM, build_facets
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.planes import mirror

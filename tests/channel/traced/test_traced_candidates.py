@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from rislam_rt.channel.traced import TracedChannel, sequences
-from rislam_rt.channel.traced.sequences import (
+from rislam_rt.channel.traced import TracedChannel, wall_sequences
+from rislam_rt.channel.traced.wall_sequences import (
     BACK,
     FRONT,
     NO_WALL,
@@ -99,7 +99,7 @@ def test_rows_in_blocks():
 
 
 def test_too_many_sequences_are_refused_in_one_line(rooms, monkeypatch):
-    monkeypatch.setattr(sequences, "MOST_LOOKS", 20)
+    monkeypatch.setattr(wall_sequences, "MOST_LOOKS", 20)
     channel = TracedChannel(rooms.paper(), RadioConfig(), 2)
     with pytest.raises(ConfigError, match="depth: 2 received; 6 walls allow 30 sequences"):
         channel.paths(rooms.at([1.3, 2.1, 0.8]))

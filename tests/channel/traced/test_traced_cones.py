@@ -8,10 +8,10 @@ import pytest
 
 from rislam_rt.channel.compare import compare_paths, random_poses
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.traced import TracedChannel, sequences, shortest_segment
+from rislam_rt.channel.traced import TracedChannel, shortest_segment, wall_sequences
 from rislam_rt.model import Material, RadioConfig, Reflector
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.solids import sphere_mesh
+from rislam_rt.scene.shapes import sphere_mesh
 
 SCENES = Path(__file__).parents[3] / "scenes"
 
@@ -69,7 +69,7 @@ def test_cones_lose_nothing(rooms, monkeypatch, name, near):
     channel = TracedChannel(scene, RadioConfig(), depth)
     every = channel.paths(trajectory)
     assert every.source == "traced, refined, all wall sequences"
-    monkeypatch.setattr(sequences, "MANY", 0)
+    monkeypatch.setattr(wall_sequences, "MANY", 0)
     narrowed = channel.paths(trajectory)
     assert narrowed.source == "traced, refined, wall sequences in cones"
     assert len(identities(every)) > 50
@@ -80,7 +80,7 @@ def test_a_round_body_in_a_room(rooms, monkeypatch):
     """320 facets: cones and beams, two ways that share nothing, against each other and against all sequences."""
     scene = with_ball(rooms.paper())
     trajectory = random_poses(scene, 10, rng=np.random.default_rng(1))
-    monkeypatch.setattr(sequences, "MANY", 10_000)
+    monkeypatch.setattr(wall_sequences, "MANY", 10_000)
     traced = TracedChannel(scene, RadioConfig(), 2).paths(trajectory)
     beams, every = (
         ImageSourceChannel(scene, RadioConfig(), 2, how).paths(trajectory) for how in ("auto", "exhaustive")

@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.channel.compare.path_matching import named_identity
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.model import Occluder, PathKind, RadioConfig
-from rislam_rt.scene.solids import sphere_mesh
+from rislam_rt.scene.shapes import sphere_mesh
 
 RADIO = RadioConfig()
 RADIUS = 0.3

@@ -16,8 +16,8 @@ from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
 from rislam_rt.pipeline.recordings.own_measurements import inputs_of, localise, read_inputs
 from rislam_rt.pipeline.recordings.replay import replay
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.spec import PipelineSpec
 from rislam_rt.scene.write import tum_bytes
 from rislam_rt.shipped import find_pipeline, find_room
 from rislam_rt.slam import StartPrior

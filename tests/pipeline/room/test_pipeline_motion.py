@@ -11,7 +11,7 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.room.true_motion import CLEARANCE, draw_motion, draw_walks
 from rislam_rt.pipeline.run import cut_scene, prepare_setup
-from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
 

@@ -11,7 +11,7 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.room.scene_overrides import ABOVE, APART, OFF_WALLS, change_room
 from rislam_rt.pipeline.run import check_run, prepare_setup
-from rislam_rt.pipeline.specification.spec import RoomSection
+from rislam_rt.pipeline.specification.pipeline_spec import RoomSection
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[3]

@@ -8,14 +8,14 @@ import pytest
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.evaluate import association_score
 from rislam_rt.model import PathKind, RadioConfig
-from rislam_rt.pipeline.dataset import SCHEME
+from rislam_rt.pipeline.run_datasets import SCHEME
 from rislam_rt.pipeline.scores.component_sources import (
     component_labels,
     path_sources,
     true_planes,
     uses_wall_returns,
 )
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 PER_CYCLE = [
     name

@@ -14,9 +14,9 @@ from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.scheme_simulation import without_panel
-from rislam_rt.pipeline.scores.bound import over_distortion, scheme_bound
+from rislam_rt.pipeline.scores.posterior_bound import over_distortion, scheme_bound
 from rislam_rt.pipeline.scores.summary import map_score, summarise
-from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
 SHORT = ["channel=image_source", "cycles=40", "depth=1"]

@@ -9,10 +9,10 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import match_planes, plane_distance
 from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
-from rislam_rt.pipeline.scores.bound import SchemeBound
+from rislam_rt.pipeline.scores.posterior_bound import SchemeBound
 from rislam_rt.pipeline.scores.summary import landmark_track, over_budget, summarise
-from rislam_rt.pipeline.scores.walls import coplanar, count_ghosts, wall_scores, wall_surfaces
-from rislam_rt.pipeline.specification.spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.scores.wall_scores import coplanar, count_ghosts, wall_scores, wall_surfaces
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.toml import put_dotted
 
 

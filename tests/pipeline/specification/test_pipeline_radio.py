@@ -10,9 +10,9 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import Antennas, RadioConfig
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.assumed_model import tell_settings
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
-from rislam_rt.pipeline.specification.read import load_radio
-from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.specification.read_pipeline import load_radio
 
 PIPELINE = Path(__file__).parents[3] / "pipelines" / "trace_then_slam.toml"
 SECTORS = ("radio.tx_pattern=dipole", "radio.rx_pattern=tr38901", "radio.tx_polarization=H")

@@ -10,7 +10,7 @@ from rislam_rt.design import DesignConfig
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import HardwareConfig, ReceiverConfig, reference_gain
 from rislam_rt.pipeline import PipelineSpec, load_spec
-from rislam_rt.pipeline.specification.spec import (
+from rislam_rt.pipeline.specification.pipeline_spec import (
     DesignSection,
     HardwareSection,
     NestedSection,

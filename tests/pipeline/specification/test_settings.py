@@ -8,8 +8,8 @@ from pydantic import BaseModel
 
 from rislam_rt.cli.config import command
 from rislam_rt.errors import ConfigError
-from rislam_rt.pipeline.specification.settings import Setting, explain, list_settings
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
+from rislam_rt.pipeline.specification.settings_list import Setting, explain, list_settings
 from rislam_rt.shipped import room_beside, shipped_pipelines
 from rislam_rt.studies import load_any
 

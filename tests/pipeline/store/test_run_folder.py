@@ -14,7 +14,7 @@ import pytest
 
 from rislam_rt.errors import ConfigError, ResultError, StoreError
 from rislam_rt.model import MapEstimate, SchemeResult
-from rislam_rt.pipeline.dataset import (
+from rislam_rt.pipeline.run_datasets import (
     MAP,
     PATHS,
     SCHEME,
@@ -27,10 +27,10 @@ from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.store.identity import code_digest, run_identity
 from rislam_rt.pipeline.store.run_folder import find_run, open_run, read_run, read_summary, scheme_file
 from rislam_rt.scene import load_scene
+from rislam_rt.storage.checksums import file_digest, seal
 from rislam_rt.storage.files import write_atomic, write_pieces
 from rislam_rt.storage.lock import hold
 from rislam_rt.storage.netcdf import read_dataset, write_dataset
-from rislam_rt.storage.seal import file_digest, seal
 
 ROOM = Path(__file__).parents[3] / "scenes" / "paper_room"
 

@@ -15,7 +15,7 @@ from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
-from rislam_rt.pipeline.specification.spec import build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.report.exports.animation import gif_bytes
 from rislam_rt.report.page import build_page
 from rislam_rt.report.view.page import SCRIPTS, view_fragment, view_page, view_script

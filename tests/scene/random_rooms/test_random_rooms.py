@@ -7,8 +7,8 @@ from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene import check_scene
 from rislam_rt.scene.random_rooms import MOTIONS, SHAPES, RandomRoom, draw_room
-from rislam_rt.scene.random_rooms.floor_plan import area, depth_inside, draw_plan, triangulate
 from rislam_rt.scene.random_rooms.landmarks import MOST
+from rislam_rt.scene.random_rooms.random_floor_plan import area, depth_inside, draw_plan, triangulate
 from rislam_rt.scene.random_rooms.random_motion import CLIMB, CORNER, CYCLE, OFF_WALLS, SPIN
 
 MEANT = ("below the array", "more than a perfect plate", "more than 1 / B", "never in front", "a wavelength or more")

@@ -16,7 +16,7 @@ from rislam_rt.pipeline.cycle import Receptions
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.run import RunSetup, run_scheme
 from rislam_rt.pipeline.schemes import SCHEMES
-from rislam_rt.pipeline.specification.spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.scene.random_rooms import RandomRoom
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
 from rislam_rt.studies.unseen.cell import find_setup, scheme_here, trace_key

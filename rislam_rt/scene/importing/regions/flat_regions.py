@@ -113,7 +113,7 @@ def crease_groups(facets: FlatRegions, chosen: Booleans, low: float, high: float
 
 
 def _edges(faces: Integers, normal: Floats) -> Edges:
-    """Pairs of a mesh's triangles that share an edge, with the angles at which they meet."""
+    """Pairs of a mesh's triangles that share an edge, with the angles at which they meet, to find flat regions."""
     ends = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     owner = np.tile(np.arange(len(faces)), 3)
     order = np.lexsort((owner, ends[:, 1], ends[:, 0]))

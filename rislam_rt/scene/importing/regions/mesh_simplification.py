@@ -41,7 +41,7 @@ def region_mesh(facets: FlatRegions, regions: Integers, kept: Booleans, toleranc
 
 
 def _onto(points: Floats, normal: Floats, offset: float) -> Floats:
-    """Points of a simplified mesh put into a plane, moved only where rounding does not explain that they are off."""
+    """Simplification of a mesh: points put into a plane, moved only where rounding does not explain their distance."""
     height = points @ normal - offset
     return points - height[:, None] * normal if np.abs(height).max() > 1e-6 else points
 
@@ -74,7 +74,7 @@ def _filled(
 
 
 def _off_loop(corners: Floats, loop: Floats) -> float:
-    """Largest distance [m] of a flat region's corners (n, 3) from its simplified closed loop (m, 3)."""
+    """Error of a simplification: largest distance [m] of a flat region's corners (n, 3) from its loop (m, 3)."""
     edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
     return float(distance_to_edges(corners, edges).max())
 
@@ -86,8 +86,8 @@ def _around(hole: Floats, outers: list[Floats]) -> int | None:
 
 
 def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
-    """Simplify clutter, triangles (T, 3, 3), by joining the corners in each cell [m] in their mean; also the largest
-    distance [m] that one moved.
+    """Simplify the mesh of clutter, triangles (T, 3, 3), by joining the corners in each cell [m] in their mean; also
+    the largest distance [m] that one moved.
 
     What shrinks to a line or a point is gone: it was finer than a cell. Rossignac and Borrel 1993.
     """
@@ -106,5 +106,5 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 
 
 def has_area(triangles: Floats) -> Booleans:
-    """Whether (T,) triangles (T, 3, 3) are more than a line: higher than a tenth of a millimetre."""
+    """Whether (T,) triangles (T, 3, 3) of a simplified mesh are higher than a tenth of a millimetre, no mere line."""
     return np.asarray(triangle_heights(triangles) > 1e-4)

@@ -109,7 +109,8 @@ def plain_name(name: str) -> str:
 
 
 def own_name(name: str) -> str:
-    """Plain name of a wall from its node's name; empty too where that says no more than wall, floor or ceiling."""
+    """Plain name of a group of flat regions from its node's name; empty too where that says no more than wall, floor or
+    ceiling."""
     plain = plain_name(name)
     return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
 
@@ -143,7 +144,8 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
 
 
 def compass_side(direction: Floats) -> str:
-    """Side of the compass that a horizontal direction points to, `east` along x, in eighths."""
+    """Side of the compass, for the name of a group of flat regions, of a horizontal direction, `east` along x, in
+    eighths."""
     return _SIDES[int(np.round(np.degrees(np.arctan2(direction[1], direction[0])) / 45.0)) % 8]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
-from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
 from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
 from rislam_rt.scene.importing.regions.region_groups import RegionGroup
@@ -109,7 +109,7 @@ def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> 
 
 
 def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -> Booleans:
-    """Whether (R,) each flat region of an object lies on a wall of the room's shell from which the object rises."""
+    """Whether (R,) each surface of an imported object lies on a wall of the shell from which the object rises."""
     resting = np.zeros(len(mirror), dtype=np.bool_)
     walls = pieces[0].regions[mirror[pieces[0].regions]]
     corners = facets.mesh.vertices[facets.mesh.faces]
@@ -130,7 +130,7 @@ def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -
 
 
 def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
-    """Wall (R,) that each flat region belongs to: in the shell, those of one plane and part are one wall."""
+    """Wall (R,) that each surface of an imported mesh belongs to: in the shell, those of one plane and part are one."""
     group = np.arange(len(mirror))
     rows = shell[mirror[shell]]
     for place, i in enumerate(rows):
@@ -188,7 +188,8 @@ def _with_clutter(
 
 
 def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
-    """Simplify clutter in the smallest cells [m] that leave few triangles; also the error [m] and the cell."""
+    """Simplify an imported mesh's surfaces of clutter in the smallest cells [m] that leave few triangles; also the
+    error [m] and the cell."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
         if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:

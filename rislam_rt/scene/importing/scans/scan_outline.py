@@ -75,7 +75,8 @@ def _outline(
 
 
 def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats, float, float]:
-    """Normal, offset [m] and sine of the angle of the line where another plane cuts one, in its frame (3, 2)."""
+    """Line where a scanned plane's outline ends at another plane: normal, offset [m] and sine of the angle, in its
+    frame (3, 2)."""
     line = frame.T @ other.normal
     slope = float(np.linalg.norm(line))
     rest = other.offset - plane.offset * float(plane.normal @ other.normal)
@@ -112,7 +113,7 @@ def _meeting_cells(
 
 
 def _to_corner(flat: Floats, near: Booleans, other_flat: Floats, other_near: Booleans) -> Booleans:
-    """Whether (S,) points (S, 2) of a meeting line lie between its end and its crossing with one that ends there."""
+    """Whether (S,) points (S, 2) of an outline's meeting line lie between its end and the crossing of another."""
     distance, at = cKDTree(other_flat).query(flat)
     meet = int(np.argmin(distance))
     steps = int(BREAK / (0.5 * CELL))

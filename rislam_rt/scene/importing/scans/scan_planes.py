@@ -115,7 +115,7 @@ def _fits(cloud: PointCloud, rows: Integers, plane: Floats, offset: float) -> bo
 
 
 def _fit(points: Floats, weight: Floats, side: Floats) -> tuple[Floats, float]:
-    """Normal, on the side of `side`, and offset of the plane of least weighted squares through points (N, 3)."""
+    """Fit of a scanned plane to points (N, 3) by weighted least squares: normal, on the side of `side`, and offset."""
     middle = weight @ points / weight.sum()
     local = points - middle
     normal = np.linalg.eigh(np.einsum("n,ni,nj->ij", weight, local, local))[1][:, 0]

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.importing.options import ImportOptions
+from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, Welded
 from rislam_rt.scene.importing.regions.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_planes
 from rislam_rt.scene.importing.scans.point_cloud import downsample_mesh

@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.nested.particles.landmark_cloud import kernel_width
-from rislam_rt.slam.systematic_resampling import systematic_ancestors
+from rislam_rt.slam.sampling import systematic_ancestors
 
 ROOM = 10
 """Number of agent particles per dimension that are needed to correct a covariance."""

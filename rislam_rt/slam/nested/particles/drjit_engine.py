@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.backend import prepare_backend
 from rislam_rt.slam.nested.particles.landmark_cloud import (
     DEEPEST,
     HOPELESS,
@@ -29,6 +28,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import (
     restoring_map,
 )
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
+from rislam_rt.tracer_backend import prepare_backend
 
 TOP = 2**20 - 1
 """Largest quantised coordinate, in steps."""
@@ -52,30 +52,31 @@ class Quantisation(NamedTuple):
 
 
 def steps(reach: Floats) -> Floats:
-    """Quantisation steps [m] that hold offsets up to `reach` [m]."""
+    """Quantisation steps [m] of the Dr.Jit engine's particles that hold offsets up to `reach` [m]."""
     return np.maximum(reach / TOP, FINEST)
 
 
 def encode(points: Floats, step: Floats) -> Words:
-    """Quantised words (B, M, 2) of points (B, M, 3), with a step [m] for each block (B,)."""
+    """Quantised words (B, M, 2) of the Dr.Jit engine's particles (B, M, 3), with a step [m] for each block (B,)."""
     whole = np.clip(np.rint(points / step[:, None, None]), -TOP, TOP).astype(np.int32).view(np.uint32)
     first, second = join(whole[..., 0], whole[..., 1], whole[..., 2])
     return np.stack([first, second], axis=-1).astype(np.uint32)
 
 
 def decode(words: Words, step: Floats) -> Floats:
-    """Points (B, M, 3) [m] of quantised words; undoes `encode`."""
+    """Particles (B, M, 3) [m] from the Dr.Jit engine's quantised words; undoes `encode`."""
     parts = split(words[..., 0], words[..., 1])
     return np.stack([part.astype(np.uint32).view(np.int32) >> 11 for part in parts], axis=-1) * step[:, None, None]
 
 
 def join(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
-    """Pack three signed coordinates of 21 bits into two 32-bit words, in arithmetic for numpy and Dr.Jit alike."""
+    """Pack three signed 21-bit coordinates of the engine's particles into two 32-bit words, for numpy and Dr.Jit."""
     return (x << 11) | ((z >> 10) & LOW), (y << 11) | ((z & 1023) << 1)
 
 
 def split(first: Any, second: Any) -> tuple[Any, Any, Any]:
-    """Unpack two 32-bit words into three coordinates in the upper 21 bits of a word; a shift of 11 drops the rest."""
+    """Unpack the engine's two 32-bit words into three coordinates in the upper 21 bits of a word; a shift of 11 drops
+    the rest."""
     return first, second, (first << 21) | ((second & LOW) << 10)
 
 
@@ -86,7 +87,7 @@ LANES = {"llvm": 8, "cuda": 64}
 
 
 class DrJitEngine:
-    """Engine of landmark particles in Dr.Jit, on the device that `rislam_rt.backend` chose."""
+    """Engine of landmark particles in Dr.Jit, on the device that `rislam_rt.tracer_backend` chose."""
 
     def __init__(self) -> None:
         self.name = prepare_backend().variant.split("_")[0]
@@ -96,20 +97,22 @@ class DrJitEngine:
         self._four_int, self._four_signed, self._two_int = types.Array4u, types.Array4i, types.Array2u
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
-        """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
+        """Build a landmark's cloud in Dr.Jit, of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
         step = steps(np.abs(points).max(axis=(1, 2)))
         grid = Quantisation(self._int(encode(points, step).ravel()), step)
         total = np.logaddexp.reduce(log_weight, axis=1)[row]
         return Cloud(grid, self._upload(log_weight), block, row, total, points.shape[1])
 
     def read(self, cloud: Cloud) -> tuple[Floats, Floats]:
-        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle, for tests and pictures."""
+        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle from Dr.Jit, for tests and
+        pictures."""
         points = decode(cloud.points.words.numpy().reshape(-1, cloud.size, WORDS), cloud.points.step)[cloud.block]
         log_weight = cloud.log_weight.numpy().reshape(-1, cloud.size)[cloud.row]
         return points, log_weight - cloud.log_total[:, None]
 
     def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
-        """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
+        """Multiply the weights of a cloud in a Dr.Jit kernel by the likelihood of some returns, given by constants (K,
+        N) float32."""
         dr, count, size = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, size)
         known = self._known(constants, agent)
@@ -135,7 +138,8 @@ class DrJitEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=found.log_total), found
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud in a Dr.Jit kernel to `size` equally weighted particles per agent particle, of mean 0,
+        covariance (N, 3, 3)."""
         count = len(cloud.block)
         children = self._draw(cloud, self._ancestors(cloud, size, kernel.comb), size, kernel.stride)
         grain = cloud.points.step[cloud.block]
@@ -153,7 +157,7 @@ class DrJitEngine:
         return Cloud(points, uniform, np.arange(count), np.zeros(count, dtype=np.int64), np.zeros(count), size)
 
     def compact(self, cloud: Cloud) -> Cloud:
-        """Copy a cloud without the blocks and rows that no agent particle points at."""
+        """Copy a cloud in Dr.Jit without the blocks and rows that no agent particle points at."""
         used, block = np.unique(cloud.block, return_inverse=True)
         rows, row = np.unique(cloud.row, return_inverse=True)
         words = self._pick(cloud.points.words, self._four_int, used, WORDS * cloud.size // PACKET)
@@ -162,7 +166,7 @@ class DrJitEngine:
         return cloud._replace(points=points, log_weight=log_weight, block=block, row=row)
 
     def _add(self, top: Any, sums: tuple[Any, ...], log_weight: Any, x: Any, y: Any, z: Any) -> tuple[Any, ...]:
-        """Add a packet of particles to a lane's sums, which are relative to the largest log weight so far."""
+        """Add a packet of particles to a lane's sums in a Dr.Jit kernel, relative to the largest log weight so far."""
         dr = self._dr
         peak = dr.maximum(top, dr.max(log_weight))
         scale = dr.exp(dr.maximum(top - peak, DEEPEST))
@@ -178,13 +182,13 @@ class DrJitEngine:
         )
 
     def _dot(self, start: Any, first: Any, second: Any) -> Any:
-        """Add the products of two packets to `start`: one sum a lane, so that all sums stay in registers."""
+        """Add the products of two packets to `start` in a Dr.Jit kernel, a sum a lane: all sums stay in registers."""
         for a, b in zip(first, second, strict=True):
             start = self._dr.fma(a, b, start)
         return start
 
     def _ancestors(self, cloud: Cloud, size: int, comb: Floats) -> Any:
-        """Ancestors (N * size,) by systematic resampling: survivors mark first children, a running maximum fills in."""
+        """Ancestors (N * size,) in Dr.Jit by systematic resampling: first children marked, a running maximum fills."""
         dr, count, old = self._dr, len(cloud.block), cloud.size
         agent, place, lanes = self._lanes(count, old)
         packets = old // PACKET
@@ -241,7 +245,8 @@ class DrJitEngine:
         return children
 
     def _mixed(self, children: Any, at: Any, base: Any, size: int, kernel: Kernel) -> list[Any]:
-        """Four points at packet `at`, of agent particles whose points begin at `base`, mixed with their partners."""
+        """Four points at packet `at` of a Dr.Jit kernel, of agent particles whose points begin at `base`, mixed with
+        their partners."""
         partner = at * PACKET + kernel.offset
         partner = self._dr.select(partner >= size, partner - size, partner)
         own, other = self._packet(children, base + at * PACKET), self._packet(children, base + partner)
@@ -269,7 +274,8 @@ class DrJitEngine:
         return sums[:3].T, sums[3:][SECOND].transpose(2, 0, 1), lane_sums[0].max(axis=1).astype(np.float64)
 
     def _mix(self, children: Any, count: int, size: int, kernel: Kernel, mean: Floats, turn: Floats) -> Any:
-        """Quantised words of the mixed points less their means (N, 3), turned, stretched to new steps by (N, 3, 3)."""
+        """Quantised words, in Dr.Jit, of the mixed points less their means (N, 3), turned, stretched to new steps by
+        (N, 3, 3)."""
         dr = self._dr
         agent, place, lanes = self._lanes(count, size)
         known = self._known(np.concatenate([mean, turn.reshape(count, 9)], axis=1).T, agent)
@@ -297,7 +303,8 @@ class DrJitEngine:
         return [self._four(self._dr.reinterpret_array(self._four_signed, part) >> 11) for part in parts]
 
     def _loop(self, start: tuple[Any, ...], packets: int, body: Callable[..., tuple[Any, ...]]) -> tuple[Any, ...]:
-        """Run `body` on every lane's packets; the first of the state is the lane's step, the same for all lanes."""
+        """Run `body` in a Dr.Jit kernel on every lane's packets; the first of the state is the lane's step, the same
+        for all lanes."""
         return self._dr.while_loop(start, lambda step, *_: step < packets, body)
 
     def _lanes(self, count: int, size: int) -> tuple[Any, Any, int]:

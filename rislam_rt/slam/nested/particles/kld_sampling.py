@@ -21,7 +21,8 @@ def kld_count(cells: float) -> float:
 
 
 def occupied_cells(covariance: Floats, cell: float) -> float:
-    """Number of cells of edge `cell` [m] that a Gaussian fills within two standard deviations along its axes."""
+    """Number of cells of edge `cell` [m] that a Gaussian fills within two standard deviations along its axes, for
+    KLD-sampling."""
     std = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0.0))
     return float(np.prod(np.maximum(4.0 * std / cell, 1.0)))
 
@@ -35,7 +36,8 @@ def num_agents(covariance: Floats, config: NestedConfig) -> int:
 
 
 def num_points(covariance: Floats, agents: int, features: int, config: NestedConfig) -> int:
-    """Number of particles of a landmark, a multiple of 4, by its covariance (3, 3) [m^2] for one agent particle.
+    """Number of particles of a landmark by KLD-sampling, a multiple of 4, by its covariance (3, 3) [m^2] for one agent
+    particle.
 
     `capacity` is shared by `features` landmarks of `agents` agent particles each.
     """

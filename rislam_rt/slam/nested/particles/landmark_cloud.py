@@ -82,10 +82,12 @@ class CloudEngine(Protocol):
         """Offsets (N, M, 3) and normalised log weights (N, M) of every agent particle, for tests and pictures."""
 
     def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
-        """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
+        """What an engine does with a landmark's cloud: multiply its weights by the likelihood of some returns,
+        constants (K, N) float32."""
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
+        """What an engine does with a landmark's cloud: resample it to `size` equally weighted particles per agent
+        particle, of mean 0, covariance (N, 3, 3)."""
 
     def compact(self, cloud: Cloud) -> Cloud:
         """Copy a cloud without the blocks and rows that no agent particle points at."""

@@ -14,7 +14,7 @@ from rislam_rt.slam.nested.particles.landmark_cloud import (
     restoring_map,
 )
 from rislam_rt.slam.nested.particles.sightline import Kinds, log_likelihood
-from rislam_rt.slam.systematic_resampling import ancestors_at
+from rislam_rt.slam.sampling import ancestors_at
 
 Singles = npt.NDArray[np.float32]
 """Arrays of float32."""
@@ -29,18 +29,18 @@ class NumpyEngine:
     """Name of the engine."""
 
     def build(self, points: Floats, log_weight: Floats, block: Integers, row: Integers) -> Cloud:
-        """Build a landmark's cloud of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
+        """Build a landmark's cloud in numpy, of blocks of points (B, M, 3) [m] and rows of log weights (R, M)."""
         flat = np.ascontiguousarray(np.swapaxes(points, 1, 2), dtype=np.float32)
         total = np.logaddexp.reduce(log_weight, axis=1)[row]
         return Cloud(flat, log_weight.astype(np.float32), block, row, total, points.shape[1])
 
     def read(self, cloud: Cloud) -> tuple[Floats, Floats]:
-        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle, for tests and pictures."""
+        """Offsets (N, M, 3) [m] and normalised log weights (N, M) of every agent particle, numpy's, for tests."""
         points = np.swapaxes(cloud.points[cloud.block], 1, 2)
         return points.astype(np.float64), cloud.log_weight[cloud.row] - cloud.log_total[:, None]
 
     def weigh(self, cloud: Cloud, kinds: Kinds, constants: Floats) -> tuple[Cloud, CloudSums]:
-        """Multiply the weights of a cloud by the likelihood of some returns, given by constants (K, N) float32."""
+        """Multiply the weights of a cloud, in numpy, by the likelihood of returns, constants (K, N) float32."""
         count, size = len(cloud.block), cloud.size
         new = np.empty((count, size), dtype=np.float32)
         lanes = np.empty((12, count, 1))
@@ -58,7 +58,7 @@ class NumpyEngine:
         return cloud._replace(log_weight=new, row=np.arange(count), log_total=sums.log_total), sums
 
     def resample(self, cloud: Cloud, covariance: Floats, size: int, kernel: Kernel) -> Cloud:
-        """Resample a cloud to `size` equally weighted particles per agent particle, of mean 0, covariance (N, 3, 3)."""
+        """Resample a cloud, in numpy, to `size` equal particles per agent particle, mean 0, covariance (N, 3, 3)."""
         count = len(cloud.block)
         fresh = np.empty((count, 3, size), dtype=np.float32)
         child = np.arange(size)
@@ -77,20 +77,20 @@ class NumpyEngine:
         return Cloud(fresh, uniform, np.arange(count), np.zeros(count, dtype=np.int64), np.zeros(count), size)
 
     def compact(self, cloud: Cloud) -> Cloud:
-        """Copy a cloud without the blocks and rows that no agent particle points at."""
+        """Copy a cloud, in numpy, without the blocks and rows that no agent particle points at."""
         used, block = np.unique(cloud.block, return_inverse=True)
         rows, row = np.unique(cloud.row, return_inverse=True)
         return cloud._replace(points=cloud.points[used], log_weight=cloud.log_weight[rows], block=block, row=row)
 
 
 def _chunks(count: int, size: int) -> list[slice]:
-    """Slices of the agent particles that are handled together, of `size` landmark particles each."""
+    """Slices of the agent particles that numpy weighs together, of `size` landmark particles each."""
     step = max(1, CACHE // size)
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
 
 
 def _sum_up(log_weight: Singles, x: Singles, y: Singles, z: Singles) -> Floats:
-    """Sums (12, n) for `combine` over the landmark particles of each of n agent particles."""
+    """Sums (12, n) in numpy for `combine` over the landmark particles of each of n agent particles."""
     top = log_weight.max(axis=1)
     weight = np.exp(np.maximum(log_weight - top[:, None], np.float32(DEEPEST)))
     wx, wy, wz = weight * x, weight * y, weight * z

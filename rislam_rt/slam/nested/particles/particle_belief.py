@@ -242,7 +242,8 @@ def _renew_agents(
 
 
 def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
-    """Cloud of a landmark for the children of resampled agent particles, written anew only if most of it is unused."""
+    """Belief after resampling: cloud of a landmark for the children of agent particles, written anew only if most of it
+    is unused."""
     block, row = cloud.block[ancestors], cloud.row[ancestors]
     cloud = cloud._replace(block=block, row=row, log_total=cloud.log_total[ancestors])
     written = int(cloud.block.max(initial=0)) + 1
@@ -250,7 +251,7 @@ def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
 
 
 def _normalised(log_weight: Floats) -> tuple[Floats, float]:
-    """Normalised log weights of agent particles, and the logarithm of their former sum; hopeless ones become equal."""
+    """Normalised log weights of the belief's agent particles, and their former log sum; hopeless ones become equal."""
     top = float(np.max(log_weight))
     if not np.isfinite(top):
         return np.full(len(log_weight), -np.log(len(log_weight))), -np.inf
@@ -259,5 +260,5 @@ def _normalised(log_weight: Floats) -> tuple[Floats, float]:
 
 
 def _root(covariance: Floats) -> Floats:
-    """Lower Cholesky factor of a new landmark's covariance (3, 3), which may be singular by rounding."""
+    """Lower Cholesky factor of a new landmark's covariance (3, 3) in the particles' belief, even a singular one."""
     return np.linalg.cholesky(covariance + 1e-12 * (np.trace(covariance) + 1e-12) * np.eye(3))

@@ -80,12 +80,12 @@ NUM_NOISE = 10
 
 
 def num_constants(kinds: Kinds) -> int:
-    """Number of constants that returns of these kinds need for each agent particle."""
+    """Number of constants of a sightline that returns of these kinds need for each agent particle."""
     return sum(NUM_NOISE + NUM_LEG[kind.tx][0] + NUM_LEG[kind.rx][1] + NUM_AXES for kind in kinds)
 
 
 def pack(sightings: Sequence[Sighting], count: int) -> Floats:
-    """Constants (K, N) float32 of several returns over one landmark, for `count` agent particles."""
+    """Constants (K, N) float32 of the sightlines of several returns over one landmark, for `count` agent particles."""
     columns = [np.zeros((count, 0))]
     for sighting in sightings:
         columns += [sighting.line.tx, sighting.line.rx, sighting.line.axes]
@@ -94,7 +94,8 @@ def pack(sightings: Sequence[Sighting], count: int) -> Floats:
 
 
 def _noise_constants(sighting: Sighting) -> Floats:
-    """Constants (10,) of a measurement: value, whitening matrix and peak; `power` and `log_factor` are in these."""
+    """Constants (10,) of a measurement along a sightline: value, whitening matrix and peak; `power` and `log_factor`
+    are in these."""
     lower = np.linalg.cholesky(sighting.covariance)
     white = np.sqrt(sighting.power) * np.linalg.inv(lower)
     peak = -sighting.power * (np.sum(np.log(np.diag(lower))) + 1.5 * np.log(2.0 * np.pi)) + sighting.log_factor
@@ -104,7 +105,8 @@ def _noise_constants(sighting: Sighting) -> Floats:
 def log_likelihood(
     kinds: Kinds, constant: Callable[[int], Any], x: Any, y: Any, z: Any, rsqrt: Callable[[Any], Any]
 ) -> Any:
-    """Log likelihood of returns, summed, for a landmark's particles at offsets (x, y, z) [m] from the cloud's centre.
+    """Log likelihood of returns along their sightlines, summed, for a landmark's particles at offsets (x, y, z) [m]
+    from the cloud's centre.
 
     Written in plain arithmetic, so that it runs on numpy arrays and inside a Dr.Jit kernel alike.
 
@@ -160,7 +162,7 @@ def _square(dx: Any, dy: Any, dz: Any) -> Any:
 
 
 def _offset(leg: Leg, take: Iterator[Any], x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
-    """Vector from the device to the far end of a particle's leg: its point, or the device mirrored."""
+    """Vector of a sightline from the device to the far end of a particle's leg: its point, or the device mirrored."""
     if leg == Leg.POINT:
         return x + next(take), y + next(take), z + next(take)
     sx, sy, sz = x + next(take), y + next(take), z + next(take)
@@ -215,7 +217,7 @@ def _trace_leg(
 
 
 def _mirror(axes: Floats, normal: Floats) -> Floats:
-    """Directions (N, 3, 2) mirrored in planes through the origin with normals (N, 3) of any length."""
+    """Directions (N, 3, 2) of sightlines mirrored in planes through the origin with normals (N, 3) of any length."""
     along = np.einsum("ni,nik->nk", normal, axes) / np.sum(normal**2, axis=1)[:, None]
     return axes - 2.0 * normal[..., None] * along[:, None]
 

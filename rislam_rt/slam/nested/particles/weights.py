@@ -74,7 +74,8 @@ def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine
 
 
 def _innovations(gap: Floats, by_state: Floats, covariance: Floats, noise: Floats) -> tuple[Floats, float]:
-    """Whitened innovation (A, 3) of each return by itself, and the normalised innovation squared of all together."""
+    """Whitened innovation (A, 3) of each return that weighs particles, and the normalised innovation squared of all
+    together."""
     rows, flat = np.arange(len(gap)), by_state.reshape(-1, len(covariance))
     total = flat @ covariance @ flat.T + np.diag(noise.ravel())
     blocks = total.reshape(len(gap), 3, len(gap), 3)[rows, :, rows, :]
@@ -97,7 +98,7 @@ def owners(returns: Returns) -> Integers:
 def _sightings(
     belief: Nested, owner: int, rows: Integers, seen: Seen, by_feature: Floats, config: NestedConfig
 ) -> list[Sighting]:
-    """Returns `rows` as likelihoods for the clouds of one landmark, sorted by kind, so that kernels recur."""
+    """Returns `rows` that weigh the cloud of one landmark as likelihoods, sorted by kind, so that kernels recur."""
     # Other features' errors, given the trajectory, are the same every cycle, and their share must not average out: what
     # the n-th measurement of the owner carries of it counts n times.
     poses = poses_of(belief.position, belief.heading, seen.body)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rislam_rt.slam.input_checks import check_counts, check_inside
 from rislam_rt.slam.schemes.shared.delay_config import DelayConfig
-from rislam_rt.slam.setting_checks import check_counts, check_inside
 
 
 @dataclass(frozen=True, slots=True)

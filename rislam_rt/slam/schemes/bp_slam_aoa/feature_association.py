@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import SensorModel
-from rislam_rt.model.sensor import merged_pull
+from rislam_rt.model.sensor_model import merged_pull
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, log_normal
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import GaussianFeatures, PredictedReturns, spread_over
@@ -82,12 +82,13 @@ def expect_scan(
 
 
 def spread_of(predicted: PredictedReturns, course: AgentTrajectory) -> Floats:
-    """Covariance (C, 3, 3) of returns predicted for association."""
+    """Covariance (C, 3, 3) of the features' returns predicted for association, in BP-SLAM with angles."""
     return predicted.own + spread_over(predicted.by_course, course)
 
 
 def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | None = None) -> Floats:
-    """Likelihoods (N,) of candidate pairs, times detection; `more` (3, 3) [m^2] is added to the agent's covariance."""
+    """Likelihoods (N,) of candidate pairs of association, times detection; `more` (3, 3) [m^2] is added to the agent's
+    covariance."""
     gaussian, component, noise, _, log_loudness = view.pairs
     total = (spread + view.disturbance)[gaussian]
     if more is not None:
@@ -99,7 +100,8 @@ def likelihoods(view: View, spread: Floats, scan: ComponentScan, more: Floats | 
 
 
 def log_density(miss: Floats, precision: Floats) -> Floats:
-    """Log normal densities (N,) of pairs' innovations (N, 3) with precisions (N, 3, 3); -inf beyond the gate."""
+    """Log normal densities (N,) of association pairs' innovations (N, 3), precisions (N, 3, 3); -inf beyond the
+    gate."""
     square = np.einsum("ni,nij,nj->n", miss, precision, miss)
     log = 0.5 * (np.log(np.maximum(np.linalg.det(precision), 1e-300)) - square - 3.0 * np.log(2.0 * np.pi))
     return np.asarray(np.where(square < GATE, log, -np.inf), dtype=np.float64)
@@ -128,7 +130,8 @@ def claims(features: GaussianFeatures, view: View, density: Floats, fresh: Float
 def unresolved_neighbours(
     features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
 ) -> tuple[Floats, ...]:
-    """Probability (C,) that a return merges into a louder one; mean (C, 3) and covariance of neighbours' pull."""
+    """For association: probability (C,) that a return merges into a louder one; mean (C, 3) and covariance of
+    neighbours' pull."""
     weight = features.existence[features.owner] * features.share * detection
     sure = np.flatnonzero(weight > 0.1)
     weight = weight[sure]

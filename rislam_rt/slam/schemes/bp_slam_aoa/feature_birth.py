@@ -54,7 +54,7 @@ class BirthHypotheses(NamedTuple):
 
 
 def log_normal(miss: Floats, variance: Floats) -> Floats:
-    """Log density of a scalar normal, from the deviation from the mean and the variance."""
+    """Log density of a scalar normal for a feature's birth, from the deviation from the mean and the variance."""
     return -0.5 * (miss**2 / variance + np.log(2.0 * np.pi * variance))
 
 

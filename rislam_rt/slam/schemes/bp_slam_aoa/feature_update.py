@@ -130,7 +130,7 @@ def learn(
 
 
 def _sum(row: Integers, values: Floats, count: int) -> Floats:
-    """Sums (count, ...) of the values (N, ...) of each row (N,)."""
+    """Sums (count, ...) for an update of features of the values (N, ...) of each row (N,)."""
     total = np.zeros((count, *values.shape[1:]))
     np.add.at(total, row, values)
     return total

@@ -8,6 +8,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.observations import free_space, is_los, observations_of
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, claims, expect_scan, likelihoods, spread_of
@@ -29,7 +30,6 @@ from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.report import ahead_of, outcome_of, position_errors
 from rislam_rt.slam.schemes.shared.sum_correction import is_strong
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 LIVELY_STRIDE = 5
@@ -159,14 +159,14 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
 
 
 def _levels(config: BpSlamAoaConfig) -> Floats:
-    """Acceleration deviations (4, 3) [m/s^2] of BP-SLAM's motion modes: calm, lively, fast, climbing."""
+    """Acceleration deviations (4, 3) [m/s^2] of motion modes in BP-SLAM with angles: calm, lively, fast, climbing."""
     calm, lively, fast = config.sigma_a, config.lively_std, FAST * config.lively_std
     up = min(VERTICAL_STD, calm)
     return np.array([[calm, calm, up], [lively, lively, up], [fast, fast, up], [calm, calm, lively]])
 
 
 def _mode_changes(config: BpSlamAoaConfig) -> Floats:
-    """Transition probabilities (4, 4) from BP-SLAM's motion mode of a step to that of the next."""
+    """Transition probabilities (4, 4) from a step's motion mode to the next one's in BP-SLAM with angles."""
     calm = config.calm_again
     move = np.full((4, 4), CHANGE * (1.0 - calm))
     move[0], move[:, 0] = CALM_ENDS * calm / 3.0, calm
@@ -178,7 +178,7 @@ def _mode_changes(config: BpSlamAoaConfig) -> Floats:
 def _predict(
     state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
 ) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
-    """Predict BP-SLAM's agent and features to this cycle, by the motion mode that explains its components best."""
+    """Predict agent and features of BP-SLAM with angles to this cycle, by the motion mode that explains it best."""
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
     ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
@@ -219,7 +219,7 @@ def _predict(
 def _claimed(
     state: BpSlamAoaState, view: View, scan: ComponentScan, found: Association, config: BpSlamAoaConfig
 ) -> tuple[Integers, float]:
-    """BP-SLAM's feature number (M,) of each component, `UNUSED` for none, and the NIS over components so claimed."""
+    """BP-SLAM with angles: feature (M,) of each component, `UNUSED` for none, and the NIS over those so claimed."""
     features, numbers, nis = state.features, np.full(len(scan.seen), UNUSED), 0.0
     sure = (features.existence > config.detection_threshold)[:, None]
     for row, shown in zip(*np.nonzero((found.feature[:, :-1] > 0.5) & sure), strict=True):
@@ -235,12 +235,14 @@ def _claimed(
 
 
 def start_variance(start: StartPrior) -> Floats:
-    """Covariance (3, 3) [m^2] of the start that was told, which a report adds to the pose; its height is exact."""
+    """Covariance (3, 3) [m^2] of the start told to BP-SLAM with angles, which a report adds to the pose; its height is
+    exact."""
     return start.position_std**2 * np.diag([1.0, 1.0, 0.0])
 
 
 def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Reported position (3,), velocity (3,), their covariance (6, 6), and `count` equally likely positions."""
+    """Pose reported by BP-SLAM with angles: position (3,), velocity (3,), their covariance (6, 6), and `count` equally
+    likely positions."""
     covariance = course.covariance[:6, :6].copy()
     covariance[:3, :3] += start_variance(start)
     covariance = 0.5 * (covariance + covariance.T)
@@ -249,7 +251,8 @@ def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tupl
 
 
 def known_map(features: GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float) -> MapEstimate:
-    """Reported map of the features that exist, each by its likeliest Gaussian, as points and walls; no wanderers."""
+    """Reported map of BP-SLAM with angles: the features that exist, each by its likeliest Gaussian, as points and
+    walls; no wanderers."""
     total = features.covariance + spread_over(features.slope, course)
     best = np.zeros(len(features.ident))
     np.maximum.at(best, features.owner, features.share)

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rislam_rt.slam.input_checks import check_counts, check_inside
 from rislam_rt.slam.schemes.shared.delay_config import DelayConfig
 from rislam_rt.slam.schemes.shared.ranges import Odds
-from rislam_rt.slam.setting_checks import check_counts, check_inside
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,5 +41,6 @@ class ChannelSlamConfig(DelayConfig):
 
     @property
     def odds(self) -> Odds:
-        """Odds that a tracked range belongs to its virtual transmitter, by `outlier_probability`, over a metre."""
+        """Configured odds of Channel-SLAM that a tracked range belongs to its virtual transmitter, by
+        `outlier_probability`, over a metre."""
         return Odds(0.5, self.outlier_probability / (1.0 - self.outlier_probability), 1.0)

@@ -14,6 +14,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
+from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
@@ -34,7 +35,6 @@ from rislam_rt.slam.schemes.shared.ranges import Bistatic, Scan
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
 from rislam_rt.slam.schemes.shared.sum_correction import absorb
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_checks import check_step
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepInfo
 
 STRAIN_RATE = 0.1

@@ -31,7 +31,8 @@ class AgentTrajectory(NamedTuple):
     """Variance [m^2] per axis of the position that was told at the start."""
 
     def turn(self) -> Floats:
-        """Unit vector (2A W,) along which the trajectory's states change as all turn about the start, before any range.
+        """Unit vector (2A W,) along which the agent's trajectory changes as all of it turns about the start, before any
+        range.
 
         Ranges to unknown places tell nothing of such a turn. Linearised now here and now there, they seem to (Huang,
         Mourikis and Roumeliotis, 2010): whatever a range seems to tell of this one direction is taken off it.
@@ -45,7 +46,7 @@ class AgentTrajectory(NamedTuple):
 
     @property
     def width(self) -> int:
-        """Number 2A of coordinates of one state."""
+        """Number 2A of coordinates of one state of the agent's trajectory."""
         return 2 * self.axes
 
 
@@ -108,7 +109,8 @@ def _regress(course: AgentTrajectory, move: Floats, noise: Floats) -> Step:
 
 
 def _inverse(matrix: Floats) -> Floats:
-    """Pseudo-inverse of a positive semidefinite matrix (D, D), directions of mere rounding left out."""
+    """Pseudo-inverse of a positive semidefinite matrix (D, D) for the agent's trajectory, directions of mere rounding
+    left out."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-24))
     unit = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(matrix / unit, rcond=1e-9, hermitian=True)) / unit

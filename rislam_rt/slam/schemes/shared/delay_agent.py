@@ -63,7 +63,8 @@ def move_agent(agent: DelayAgent, dt: float, sigma_a: float, stride: int) -> tup
 def hear_ranges(
     agent: DelayAgent, measurement: Measurement, config: DelayConfig
 ) -> tuple[Integers, Scan, Booleans, Bistatic]:
-    """Rows (M,) of the components that the agent uses, their ranges, which are wall returns, and the range model.
+    """Rows (M,) of the components that an agent uses by delay alone, their ranges, which are wall returns, and the
+    range model.
 
     The direct path is left out; wall returns too, with `config.planes` False.
     """
@@ -88,7 +89,7 @@ def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimat
 
 
 def _map(points: Points) -> MapEstimate:
-    """Map of a SLAM estimate that holds points alone, none of them a panel, and no walls."""
+    """Map of an agent that filters by delay alone: points alone, none of them a panel, and no walls."""
     count = len(points.ident)
     return MapEstimate(
         points.ident, points.mean, points.covariance, np.full(count, -1), np.zeros(count), np.zeros(count),

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
-from rislam_rt.slam.setting_checks import check_counts, check_inside, check_named, check_not_negative
+from rislam_rt.slam.input_checks import check_counts, check_inside, check_named, check_not_negative
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +52,11 @@ class DelayConfig:
 
     @property
     def axes(self) -> Floats:
-        """Ones (3,) for the position's axes that are estimated, zero for a known height."""
+        """Ones (3,) for the position's axes that filters by delay alone estimate, zero for a known height."""
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
     @property
     def wander(self) -> Floats:
-        """Standard deviations (3,) by which a wandering feature's distance, cosine and turn walk in one step."""
+        """Configured deviations (3,) by which a wandering feature's distance, cosine and turn walk in one step, by
+        delay alone."""
         return np.array([self.drift_length_std, self.drift_angle_std, 0.0])

@@ -64,14 +64,16 @@ def over_all_turns(course: AgentTrajectory) -> Reported:
 
 
 def _frame(ahead: Floats, axes: int) -> Floats:
-    """Rotation (2A, 2A) of position and velocity from room axes to along and across the direction `ahead` (and up)."""
+    """Rotation (2A, 2A) from room axes to those of the gauge, along and across the direction `ahead` (and up), of
+    position and velocity."""
     turn = np.eye(axes)
     turn[:2, :2] = [[ahead[0], ahead[1]], [-ahead[1], ahead[0]]]
     return np.asarray(np.kron(np.eye(2), turn), dtype=np.float64)
 
 
 def _of_shape(course: AgentTrajectory, along: Floats, ahead: Floats) -> Floats:
-    """Covariance (2A, 2A) of what ranges tell: distance and speed in the places of "along", heights; zeros across."""
+    """Covariance (2A, 2A) of what ranges tell, free of gauge: distance and speed in the places of "along", heights;
+    zeros across."""
     axes, width = course.axes, course.width
     rows = np.zeros((width, len(course.mean)))
     rows[0, :2] = along

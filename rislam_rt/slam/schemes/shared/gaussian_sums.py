@@ -30,7 +30,8 @@ point."""
 
 
 def kinds_of(strong: Booleans, wanderers: float) -> Floats:
-    """Prior probabilities (M, 3) of point, wall and wanderer for new features, by whether paths are strong (M,)."""
+    """Prior probabilities (M, 3) of point, wall and wanderer for a new feature's Gaussian sum, by whether paths are
+    strong (M,)."""
     return np.where(strong[:, None], STRONG_KINDS, np.array([1.0 - wanderers, 0.0, wanderers]))
 
 
@@ -109,7 +110,8 @@ def carry(sums: Sums, step: Step, wander: Floats) -> Sums:
 
 
 def axes_of(walk: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors (..., 2, 3) along velocities (..., 3) and level across them, and horizontal speeds (...,) [m/s]."""
+    """Axes (..., 2, 3) of features' Gaussian sums, along velocities (..., 3) and level across them, and horizontal
+    speeds (...,) [m/s]."""
     speed = np.sqrt(walk[..., 0] ** 2 + walk[..., 1] ** 2 + LEAST_SPEED**2)
     ahead = np.stack([walk[..., 0], walk[..., 1], np.zeros_like(speed)], axis=-1) / speed[..., None]
     aside = np.stack([-ahead[..., 1], ahead[..., 0], np.zeros_like(speed)], axis=-1)
@@ -117,7 +119,8 @@ def axes_of(walk: Floats) -> tuple[Floats, Floats]:
 
 
 def unit_of(mean: Floats, walk: Floats, usual: Floats) -> Floats:
-    """Directions (..., 3) of features from the agent's place at birth; unit length where the cosine is an angle's."""
+    """Directions (..., 3) of a Gaussian sum's features from the agent's place at birth; unit length where the cosine is
+    an angle's."""
     axes, speed = axes_of(walk)
     cosine = mean[..., 1] * usual / speed
     across = np.sqrt(np.maximum(1.0 - cosine**2, LEAST_ACROSS))
@@ -139,7 +142,7 @@ def lengths(kind: Integers, mean: Floats, walk: Floats, usual: Floats, moved: Fl
 
 
 def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
-    """Lengths (..., C) [m] from a feature to an end of the agent, by the law of cosines."""
+    """Lengths (..., C) [m] from a feature of a Gaussian sum to an end of the agent, by the law of cosines."""
     square = distance**2 - 2.0 * distance * np.sum(unit * end, axis=-1) + np.sum(end**2, axis=-1)
     return np.asarray(np.sqrt(np.maximum(square, 1e-4)))
 

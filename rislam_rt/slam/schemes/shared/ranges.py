@@ -54,7 +54,7 @@ class Bistatic(NamedTuple):
 
 
 def length_of(vector: Floats) -> Floats:
-    """Euclidean lengths (...,) of vectors (..., 3), without the temporaries of a norm."""
+    """Euclidean lengths (...,) of vectors (..., 3), for ranges, without the temporaries of a norm."""
     square = vector[..., 0] ** 2
     for axis in range(1, vector.shape[-1]):
         square = square + vector[..., axis] ** 2

@@ -103,7 +103,7 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
 
 
 def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:
-    """Agent's trajectory corrected by one feature's message: moments over its Gaussians, the rest changing nothing."""
+    """Correction of the agent's trajectory by one feature's message: moments over Gaussians, the rest as before."""
     rows = np.flatnonzero(weight > 1e-4)
     if not len(rows):
         return course
@@ -116,12 +116,13 @@ def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, 
 
 
 def newborn(found: Association, fresh: Floats, birth_threshold: float) -> tuple[Integers, Floats]:
-    """Rows of a scan's ranges that no feature claims and that start new ones, and their existence probabilities."""
+    """Rows of a scan's ranges that no feature's sum claims and that start new ones, and existence probabilities."""
     alive = found.unclaimed * (fresh - 1.0) / fresh
     rows = np.flatnonzero(alive >= birth_threshold)
     return rows, alive[rows]
 
 
 def is_strong(ratio: Floats, specular_ratio: float | None) -> Booleans:
-    """Whether a component (M,) is as strong as only a wall return is, by its amplitude over that of free space."""
+    """Whether a component (M,) that corrects sums is as strong as only a wall return is, by its amplitude over that of
+    free space."""
     return ratio > (np.inf if specular_ratio is None else specular_ratio)

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.gaussian_draws import square_roots
 from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
+from rislam_rt.slam.sampling import square_roots
 from rislam_rt.slam.window.births.hypothesis_fits import Trials
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -66,8 +66,8 @@ class Hypotheses(NamedTuple):
 
 
 def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, middle: Floats) -> KnownFeatures:
-    """Places, covariance roots and reflections of the map's features (F, 3), walls as images of `middle`, from their
-    covariance (3F, 3F)."""
+    """Known features for hypotheses: places, covariance roots and reflections of the map's features (F, 3), walls as
+    images of `middle`, from their covariance (3F, 3F)."""
     place, count = mean.copy(), len(mean)
     blocks = covariance.reshape(count, 3, count, 3)[np.arange(count), :, np.arange(count)]
     turn, shift = np.tile(AXES, (count, 1, 1)), np.zeros((count, 3))

@@ -57,8 +57,8 @@ def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
 
 
 def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
-    """Log prior density (H,) [1/m^3] of the new features' places: points anywhere in a ball, the shift by two walls in
-    one twice as wide.
+    """Log prior density (H,) [1/m^3] of the places of hypotheses' new features: points anywhere in a ball, the shift by
+    two walls in one twice as wide.
 
     Walls at any distance up to the ball's radius, in any direction: their places are images of the agent's, `middle`.
     """
@@ -70,8 +70,8 @@ def log_place(table: Hypotheses, place: Floats, middle: Floats) -> Floats:
 
 
 def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, context: WindowState) -> Floats:
-    """Log probability (H,) that a new wall's return is resolved from the return over its edge with a known level or
-    upright wall, or is unresolved from it, as the hypothesis has it.
+    """Evidence (H,) of hypotheses, as log probability: a new wall's return is resolved from the return over its edge
+    with a known level or upright wall, or is unresolved from it, as the hypothesis has it.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
     so does its edge.
@@ -131,7 +131,8 @@ def log_shared(
 
 
 def concurrent(context: WindowState, track_rows: list[Integers]) -> Booleans:
-    """Whether each pair of T tracks (T, T), given as rows of the log, were detected in a common cycle."""
+    """Evidence against one cause: whether each pair of T tracks (T, T), given as rows of the log, were detected in a
+    common cycle."""
     cycle = context.log.cycle - context.log.cycle.min()
     heard = np.zeros((len(track_rows), cycle.max() + 1))
     for row, at in enumerate(track_rows):
@@ -142,7 +143,7 @@ def concurrent(context: WindowState, track_rows: list[Integers]) -> Booleans:
 def log_amplitudes(
     table: Hypotheses, fits: Fits, summary: TrackSummary, landmarks: WindowTable, scene: KnownEnvironment
 ) -> Floats:
-    """Log density (H,) of the tracks' mean amplitudes under their hypotheses, given walls' reflectivity and points'
+    """Evidence of hypotheses: log density (H,) of the tracks' mean amplitudes, given walls' reflectivity and points'
     strengths."""
     radio, track = scene.radio, table.trials.track
     level, seen, rx = summary.log_amplitude[track], summary.mean[0][track], summary.mean[2][track]
@@ -175,8 +176,8 @@ def log_amplitudes(
 def log_opacity(
     table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
 ) -> Floats:
-    """Log prior (H,) of occlusion: against new features behind known walls, and against new walls in front of known
-    features.
+    """Log prior (H,) of hypotheses by occlusion: against new features behind known walls, and against new walls in
+    front of known features.
 
     With wall returns a new wall that is heard over a known one stands where its path meets it.
     """
@@ -213,7 +214,7 @@ LEVEL_RISE = 0.9
 def direction_beliefs(
     place: Floats, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable
 ) -> DirectionPriors:
-    """Direction priors of a new wall at `place` (3,): upright, at right angles to a known wall, or level."""
+    """Direction priors of a hypothesis's wall at `place` (3,): upright, at right angles to a known one, or level."""
     span = place - summary.middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
@@ -252,8 +253,8 @@ def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
 
 
 def _log_square(reach: Floats) -> Floats:
-    """Prior log odds that a wall at distance `reach` [m] is at right angles to another, times the width [m] of the
-    prior if it is not."""
+    """Prior log odds that a hypothesis's wall at distance `reach` [m] is at right angles to another, times the width
+    [m] of the prior if it is not."""
     return np.asarray(np.log(CONSTANTS.square / (1.0 - CONSTANTS.square)) + np.log(np.pi / 2.0 * reach))
 
 
@@ -320,6 +321,6 @@ def log_upright(
 
 
 def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
-    """Posterior log odds that a direction prior holds of a wall, from the prior ones and the offset [m] of the wall's
-    image with its variance [m^2]."""
+    """Posterior log odds that a direction prior holds of a hypothesis's wall, from the prior ones and the offset [m] of
+    the wall's image with its variance [m^2]."""
     return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))

@@ -193,8 +193,8 @@ def _equations(
 
 
 def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
-    """Slopes (H, B, 3, 3) of predicted measurements by the errors of the known walls' affine maps before and behind the
-    new feature.
+    """Slopes (H, B, 3, 3) of a hypothesis's fit by the errors of the known walls' affine maps before and behind the new
+    feature.
 
     What is seen moves by `by_image` (H, B, 3, 3) with the image that the Rx hears, its length by `toward` (H, B, 3)
     with what the Tx sees; `flip` (H, 3, 3) mirrors.
@@ -244,7 +244,8 @@ def _mix(
 
 
 def _by_image(arrival: Floats, reach: Floats) -> Floats:
-    """Derivatives (..., 3, 3) of a path's length and cosines by the apparent place from which its ray arrives."""
+    """Derivatives (..., 3, 3), for a hypothesis's fit, of a path's length and cosines by the apparent place from which
+    its ray arrives."""
     found = np.empty((*reach.shape, 3, 3))
     found[..., 0, :] = arrival
     found[..., 1:, :] = (AXES[:2] - arrival[..., :2, None] * arrival[..., None, :]) / reach[..., None, None]
@@ -252,8 +253,8 @@ def _by_image(arrival: Floats, reach: Floats) -> Floats:
 
 
 def smooth_paths(summary: TrackSummary) -> tuple[Floats, Floats]:
-    """Log evidence (T,) and cost (T,) of tracks as paths of none of the listed kinds, whose length and cosines change
-    smoothly.
+    """Fits of no hypothesis: log evidence (T,) and cost (T,) of tracks as paths of no listed kind, whose length and
+    cosines change smoothly.
 
     Their first two derivatives are beforehand what the agent's own speed makes of things at rest or mirrored; the place
     counts with a density 1 over length and cosines.

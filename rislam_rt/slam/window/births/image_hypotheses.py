@@ -10,9 +10,9 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RadioConfig
 from rislam_rt.ris.path_gain import point_amplitude
-from rislam_rt.slam.gaussian_draws import square_roots
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
+from rislam_rt.slam.sampling import square_roots
 from rislam_rt.slam.window.births.hypotheses import (
     BOTH_LEGS,
     FAR,

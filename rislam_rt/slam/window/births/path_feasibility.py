@@ -61,7 +61,8 @@ def bounces(table: Hypotheses, place: Floats, summary: TrackSummary, known: Know
 
 
 def _met(start: Floats, stop: Floats, wall: Floats, middle: Floats) -> Floats:
-    """Points (N, 3) where segments between places (N, 3) meet walls (N, 3), given as mirror images of `middle`."""
+    """Points (N, 3) where paths between places (N, 3) meet walls (N, 3), given as mirror images of `middle`, to see
+    whether they are feasible."""
     normal, offset = planes(wall, middle)
     return crossing(start, stop, *(np.vecdot(spot, normal) - offset for spot in (start, stop)))
 

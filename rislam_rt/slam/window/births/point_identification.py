@@ -8,10 +8,10 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.ris.path_gain import point_amplitude
-from rislam_rt.slam.gaussian_draws import even_draws
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, UNTOLD
 from rislam_rt.slam.predicted_returns import AXES, poses_of
+from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -121,8 +121,8 @@ LOOKS = 60
 
 
 def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
-    """Cycles of the window from `first` on, in blocks of at most `most` cycles within which a phase code is told for
-    all or for none."""
+    """Cycles for the identification of points from `first` on, in blocks of at most `most` within which a phase code is
+    told for all or for none."""
     slots = list(range(first, len(told)))
     while slots:
         count = next((at for at, slot in enumerate(slots) if told[slot] != told[slots[0]]), len(slots))
@@ -131,14 +131,15 @@ def _blocks(first: int, told: list[bool], most: int) -> Iterator[list[int]]:
 
 
 def _codes(codes: list[RisCode | None], count: int) -> RisCode | None:
-    """Phase codes of some cycles as one `RisCode`, each repeated for so many places; None where none is told."""
+    """Phase codes of some cycles for the identification of points as one `RisCode`, each repeated for so many places;
+    None where none is told."""
     index = [code.index for code in codes if code is not None]
     levels = next((code.levels for code in codes if code is not None), 0)
     return RisCode(np.repeat(np.stack(index), count, axis=0)[:, None], levels) if index else None
 
 
 def _ratio(table: Hypotheses, landmarks: WindowTable, rows: Integers) -> Floats:
-    """Share (R,) of the amplitude that known walls on the paths of hypotheses `rows` leave."""
+    """Share (R,) of the amplitude that known walls leave on the paths of hypotheses `rows`, to identify points."""
     if not len(landmarks.ident):
         return np.ones(len(rows))
     known, bounces = table.known[rows], np.where(table.kind[rows] == OVER_SAME, 2.0, 1.0)

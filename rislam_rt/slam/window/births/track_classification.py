@@ -74,12 +74,12 @@ class TrackDecision(NamedTuple):
 
     @property
     def is_wall(self) -> bool:
-        """Whether the new feature is a wall."""
+        """Whether the new feature of a track that was classified is a wall."""
         return self.kind in WALLS
 
     @property
     def is_return(self) -> bool:
-        """Whether the track is a wall return, a path over walls alone."""
+        """Whether the track was classified as a wall return, a path over walls alone."""
         return self.kind >= 0 and _TEMPLATES[self.kind][0] == TX
 
 
@@ -203,7 +203,8 @@ def decide_tracks(
 
 
 def log_no_kind(seen: Floats, use_vt: bool) -> Floats:
-    """Log prior density (T,) that tracks are paths of none of the listed kinds, from length [m] and two cosines (T, 3).
+    """Log prior density (T,), to classify tracks, that they are paths of none of the listed kinds, from length [m] and
+    two cosines (T, 3).
 
     They seem to come from anywhere in the ball of places, half as far off as they are long. With wall returns they run
     over walls that the map lacks; without, where most walls stay unknown, they are as frequent as points.

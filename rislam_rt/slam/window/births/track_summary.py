@@ -81,7 +81,7 @@ class TrackSummary(_Points):
 
     @cached_property
     def mean(self) -> tuple[Floats, Floats, Floats]:
-        """Mean measurement, Tx and Rx position, (T, 3) each, of every track."""
+        """Mean measurement, Tx and Rx position, (T, 3) each, in every track's summary."""
         weight = self.weight[..., :1] ** 2
         weight = weight / weight.sum(axis=1, keepdims=True)
         seen, tx, rx = ((weight * field).sum(axis=1) for field in (self.seen, self.tx, self.rx))
@@ -89,7 +89,7 @@ class TrackSummary(_Points):
 
     @cached_property
     def direction(self) -> Floats:
-        """Mean directions of arrival (T, 3) in the room's axes."""
+        """Mean directions of arrival (T, 3) in the tracks' summaries, in the room's axes."""
         return rays(self.mean[0], 0.0)
 
 
@@ -147,8 +147,8 @@ def summarise_tracks(state: WindowState, rows: list[Integers]) -> TrackSummary:
 
 
 def heading_roots(window: Window) -> Floats:
-    """Square root (K, H) of the covariance of the window's headings, in its three strongest directions; H = 0 if they
-    are known."""
+    """Square root (K, H) of the covariance of the window's headings for track summaries, in its three strongest
+    directions; H = 0 if they are known."""
     if not window.turns:
         return np.zeros((window.num_poses, 0))
     value, vector = np.linalg.eigh(pose_covariance(window, TURN))
@@ -156,8 +156,8 @@ def heading_roots(window: Window) -> Floats:
 
 
 def _turned(seen: Floats, heading: Floats) -> Floats:
-    """Lengths and cosines (K, 3) with the cosines rotated into the room's axes by headings (K,): a body that turns does
-    not bend the history."""
+    """Lengths and cosines (K, 3) to summarise, the cosines rotated into the room's axes by headings (K,): a body that
+    turns does not bend the history."""
     cos, sin = np.cos(heading), np.sin(heading)
     return np.stack([seen[:, 0], cos * seen[:, 1] - sin * seen[:, 2], sin * seen[:, 1] + cos * seen[:, 2]], axis=1)
 
@@ -182,8 +182,7 @@ def expected_scatter(shown: Floats, free: Floats, snr: Floats) -> Floats:
 
 
 def _terms(number: Integers | int) -> Integers:
-    """Number of polynomial terms of a smooth path through so many measurements: a line's, or a quadratic's from nine
-    on."""
+    """Number of polynomial terms in a track's summary of so many measurements: a line, a quadratic from nine on."""
     return np.where(np.asarray(number) >= 9, 3, 2)
 
 

@@ -62,7 +62,7 @@ def log_agreement(state: WindowState, after: Window) -> float:
 
 
 def _latest_rates(state: WindowState) -> egomotion.Rates | None:
-    """Rates of path lengths over the last `PAST` cycles, or as many as there are; None where they are too few."""
+    """Rates of path lengths over the last `PAST` cycles, with which motion must agree; None where they are too few."""
     cycles, time = _latest(state.window)
     if cycles < egomotion.MEASURED - 1:
         return None
@@ -96,6 +96,6 @@ def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
 
 
 def _latest(window: Window) -> tuple[int, float]:
-    """Number of the last `PAST` cycles, or as many as there are, and how long [s] they took."""
+    """Number of the last `PAST` cycles, or as many as there are, over which motion must agree, and their time [s]."""
     step = window.step[-PAST:]
     return len(step), float(step.sum()) or len(step) * CYCLE  # where the clock stands still, as usual

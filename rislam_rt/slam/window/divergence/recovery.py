@@ -70,8 +70,8 @@ def restart(state: WindowState) -> WindowState:
 
 
 def after_jump(state: WindowState, by: Floats) -> WindowState:
-    """State of the window filter after the agent's jump by `by` (3,) [m]: the last pose alone, with the map, and even
-    odds of being lost until the next cycle."""
+    """Recovery by the agent's jump by `by` (3,) [m]: the last pose alone, with the map, and even odds of being lost
+    until the next cycle."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
         window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level,

@@ -40,32 +40,32 @@ class WindowTable(NamedTuple):
 
     @property
     def points(self) -> Integers:
-        """Rows of the features that are points."""
+        """Rows of the landmark table's features that are points."""
         return (~self.is_wall).nonzero()[0]
 
     @property
     def walls(self) -> Integers:
-        """Rows of the features that are walls."""
+        """Rows of the landmark table's features that are walls."""
         return self.is_wall.nonzero()[0]
 
     @property
     def ris_probability(self) -> Floats:
-        """Probability (F, Q) that each feature is each of the panels; 0 for walls."""
+        """Probability (F, Q) that each feature of the landmark table is each of the panels; 0 for walls."""
         return ris_probabilities(self.log_ris, self.points)
 
     @property
     def identity(self) -> PanelIdentity:
-        """Panel identities (F,) of the features; of no meaning for walls."""
+        """Panel identities (F,) of the features in the landmark table; of no meaning for walls."""
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     @property
     def panels(self) -> tuple[int, ...]:
-        """Row (Q,) of the point that is held for each panel, -1 where there is none."""
+        """Row (Q,) in the landmark table of the point that is held for each panel, -1 where there is none."""
         return panel_rows(self.ris_probability)
 
     @property
     def log_strength(self) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (F,) of the log strength of points; 0 for walls."""
+        """Mean and standard deviation (F,) of the log strength of the landmark table's points; 0 for walls."""
         found, points = np.zeros((2, len(self.ident))), self.points
         found[:, points] = strength_moments(self.log_grid[points])
         return found[0], found[1]
@@ -103,14 +103,14 @@ def enter(
 
 
 def idents(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Forms (..., 5) of feature idents, from forms of feature rows."""
+    """Forms (..., 5) of the landmark table's idents, from forms of its rows."""
     if not len(landmarks.ident):
         return forms
     return np.where(forms >= 0, landmarks.ident[np.maximum(forms, 0)], forms)
 
 
 def image_ident(point: Integers, wall: Integers) -> Integers:
-    """Idents (...,) of the mirror images of points in walls, from the idents of both."""
+    """Idents (...,) of the mirror images of the landmark table's points in walls, from the idents of both."""
     return np.asarray(((point + 1) << 32) + wall)
 
 

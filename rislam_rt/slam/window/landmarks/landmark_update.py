@@ -37,12 +37,13 @@ class VisibilityObservations(NamedTuple):
 
 
 def no_observations() -> VisibilityObservations:
-    """Empty record of paths' occlusion and scatter."""
+    """Empty record of paths' occlusion and scatter, before any landmark update."""
     return VisibilityObservations(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0), nothing_heard(0))
 
 
 def pack(forms: Integers, landmarks: WindowTable) -> Integers:
-    """One integer (R,) that encodes each of the forms (R, 5) of feature rows, by idents."""
+    """One integer (R,) that encodes each of the forms (R, 5) of feature rows, by idents, in the record that landmark
+    updates keep."""
     return np.asarray((idents(landmarks, forms) + 1) @ DIGITS)
 
 
@@ -53,8 +54,8 @@ DIGITS = 4096 ** np.arange(4, -1, -1)
 def recall(
     visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable
 ) -> tuple[Floats, Floats]:
-    """Probability (R,) that nothing occludes each predicted return in this cycle, and the mean square (R,) of its past
-    residuals in reported deviations."""
+    """Record of landmark updates: probability (R,) that nothing occludes each predicted return in this cycle, and the
+    mean square (R,) of its past residuals in reported deviations."""
     return recall_forms(visibility, expected.forms, expected.bounces, landmarks)
 
 
@@ -74,7 +75,8 @@ def recall_forms(
 
 
 def recall_rises(visibility: VisibilityObservations, expected: ExpectedComponents, landmarks: WindowTable) -> Floats:
-    """Log likelihoods (R, Z) of the predicted returns' elevations, by what was heard of them so far."""
+    """Record of landmark updates: log likelihoods (R, Z) of the predicted returns' elevations, by what was heard of
+    them so far."""
     found = nothing_heard(len(expected.forms))
     if len(visibility.code):
         code = pack(expected.forms, landmarks)
@@ -98,14 +100,14 @@ def add_clear_paths(
 def _joined(
     visibility: VisibilityObservations, fresh: tuple[Integers, Floats, Floats, Floats]
 ) -> VisibilityObservations:
-    """Two records of paths' occlusion and scatter as one, sorted by code."""
+    """Two records of paths' occlusion and scatter, as landmark updates keep them, as one, sorted by code."""
     every = [np.concatenate(pair) for pair in zip(visibility, fresh, strict=True)]
     order = np.argsort(every[0], kind="stable")
     return VisibilityObservations._make(field[order] for field in every)
 
 
 def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Floats) -> Floats:
-    """Probability (C,) that each cluster of unresolved returns is detected, occlusion included."""
+    """Probability (C,) that each cluster of unresolved returns is detected, with occlusion, for the landmark update."""
     return np.asarray(CONSTANTS.shown * (expected.detection * clear)[groups.leader] * groups.by_itself).clip(
         1e-4, CONSTANTS.shown
     )

@@ -9,8 +9,8 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, RadioConfig, RisCode, RisSpec
-from rislam_rt.model.sensor import SensorModel
-from rislam_rt.model.sensor import detection_probability as detection_probability_of
+from rislam_rt.model.sensor_model import SensorModel
+from rislam_rt.model.sensor_model import detection_probability as detection_probability_of
 from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
@@ -44,7 +44,8 @@ class KnownEnvironment(NamedTuple):
 
     @property
     def num_panels(self) -> int:
-        """Number Q of panels that points may be; 1 where there is no panel, and no point is it."""
+        """Number Q of panels that points may be, as measurements are predicted; 1 where there is no panel, and no point
+        is it."""
         return 1 if self.ris is None else len(self.ris.panels)
 
 
@@ -156,8 +157,8 @@ def panel_gains(
     spec: RisSpec,
     code: RisCode,
 ) -> Floats:
-    """Magnitudes (R,) of the path gains of returns over one panel under its phase code, with walls that reflect without
-    loss."""
+    """Predicted magnitudes (R,) of the path gains of returns over one panel under its phase code, with walls that
+    reflect without loss."""
     legs, center = returns.legs, features[returns.legs[:, 0]]
     ends = np.repeat([[poses.tx], [poses.rx]], len(legs), axis=1)
     for column in (2, 1):
@@ -169,8 +170,8 @@ def panel_gains(
 
 
 def detection_probability(log_amplitude: Floats, spread: Floats, sensor: SensorModel) -> Floats:
-    """Detection probability (R,) averaged over a log amplitude of standard deviation `spread`: three points carry its
-    mean and variance."""
+    """Predicted detection probability (R,) averaged over a log amplitude of standard deviation `spread`: three points
+    carry its mean and variance."""
     level = log_amplitude[..., None] + spread[..., None] * np.sqrt(3.0) * np.array([-1.0, 0.0, 1.0])
     snr = sensor.radio.integrated_snr(np.exp(np.minimum(level, 10.0)))
     curve = _detection_curve(sensor.threshold)
@@ -186,7 +187,8 @@ ROOT_STEP = 2e-3
 
 @lru_cache(maxsize=4)
 def _detection_curve(threshold: float) -> Floats:
-    """Table of the detection probability at square roots of the SNR from 0 on, close enough for 1e-6 in between."""
+    """Table for the prediction of measurements: detection probability at square roots of the SNR from 0 on, close
+    enough for 1e-6 in between."""
     return detection_probability_of(np.arange(0.0, np.sqrt(threshold) + 7.0, ROOT_STEP) ** 2, threshold)
 
 
@@ -311,12 +313,12 @@ TWIN_STD = 0.03
 
 
 def reciprocal(forms: Integers) -> Integers:
-    """Forms (R, 5) of the reciprocal paths, with Tx and Rx legs exchanged."""
+    """Forms (R, 5) of the reciprocal paths, predicted with Tx and Rx legs exchanged."""
     return forms[:, [0, 3, 4, 1, 2]]
 
 
 def _above(z: Floats) -> Floats:
-    """Probability that a standard normal variable is below z, by a logistic approximation."""
+    """Probability that a standard normal variable is below z, for predicted measurements, by a logistic curve."""
     return np.asarray(1.0 / (1.0 + np.exp(-1.7 * np.clip(z, -20.0, 20.0))))
 
 

@@ -61,8 +61,8 @@ def enumerate_forms(points: tuple[int, ...], walls: tuple[int, ...], max_bounces
 
 
 def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: Floats, poses: Poses) -> Booleans:
-    """Whether each leg (G, 3) of a path is geometrically possible: every bounce has both its neighbours on one side of
-    its wall, at the poses of one cycle.
+    """Whether each leg (G, 3) of a path's form is geometrically possible: every bounce has both its neighbours on one
+    side of its wall, at the poses of one cycle.
 
     Two walls at right angles throw a path back in one order or the other: the ray meets both near their edge, and which
     comes first hangs on the baseline between Tx and Rx, and on angles of which the features (F, 3) know no more than
@@ -130,7 +130,7 @@ def _margin_std(
 
 
 def _swapped(legs: Integers, two: Integers) -> Integers:
-    """Rows of the legs that run over the same two walls as the legs `two`, in the other order."""
+    """Rows of the legs of paths' forms that run over the same two walls as the legs `two`, in the other order."""
     base = int(legs.max(initial=0)) + 3
     code, other = (
         ((row[:, 0] + 1) * base + row[:, 1] + 1) * base + row[:, 2] + 1 for row in (legs, legs[two][:, [0, 2, 1]])
@@ -139,8 +139,8 @@ def _swapped(legs: Integers, two: Integers) -> Integers:
 
 
 def planes(wall: Floats, anchor: Floats) -> tuple[Floats, Floats]:
-    """Unit normals (..., 3) and offsets (...,) of walls' planes, `n . x = offset`, from the mirror images (..., 3) of
-    anchors in them."""
+    """Unit normals (..., 3) and offsets (...,) of the planes of walls in paths' forms, `n . x = offset`, from the
+    mirror images (..., 3) of anchors in them."""
     span = wall - anchor
     normal = np.asarray(span / np.sqrt(np.vecdot(span, span))[..., None])
     return normal, 0.5 * np.vecdot(wall + anchor, normal)

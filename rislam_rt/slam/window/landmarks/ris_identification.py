@@ -16,7 +16,6 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.information import amplitude_std
 from rislam_rt.model import DataSheet, RadioConfig, RisCode, SensorModel
 from rislam_rt.ris.path_gain import panel_path_gain
-from rislam_rt.slam.gaussian_draws import even_draws, square_roots
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, UNTOLD
 from rislam_rt.slam.panel_evidence import (
@@ -28,6 +27,7 @@ from rislam_rt.slam.panel_evidence import (
     log_scatterer_missed,
     weigh_silence,
 )
+from rislam_rt.slam.sampling import even_draws, square_roots
 from rislam_rt.slam.window.solver_limits import CERTAIN, DRAWS
 
 
@@ -42,34 +42,34 @@ class PanelIdentity(NamedTuple):
     """(N, Q + 1) probability of being occluded, were it each of the panels, and a scatterer."""
 
     def take(self, rows: Integers | Booleans) -> "PanelIdentity":
-        """Panel identities of only some of the points."""
+        """RIS identities of only some of the points."""
         return PanelIdentity(*(field[rows] for field in self))
 
     def put(self, rows: Integers, fresh: "PanelIdentity") -> "PanelIdentity":
-        """Panel identities with those of some points replaced."""
+        """RIS identities with those of some points replaced."""
         fields = [field.copy() for field in self]
         for field, value in zip(fields, fresh, strict=True):
             field[rows] = value
         return PanelIdentity(*fields)
 
     def clipped(self) -> "PanelIdentity":
-        """Panel identities with log odds clipped (`CERTAIN`), so that new evidence can still turn them."""
+        """RIS identities with log odds clipped (`CERTAIN`), so that new evidence can still turn them."""
         return self._replace(log_ris=np.clip(self.log_ris, -CERTAIN, CERTAIN))
 
     def join(self, other: "PanelIdentity") -> "PanelIdentity":
-        """Two sets of panel identities, one after the other."""
+        """RIS identities of two sets of points, one after the other."""
         return PanelIdentity(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
 
 @lru_cache(maxsize=1)
 def _strength_prior(middle: float, spread: float) -> Floats:
-    """Prior log probabilities (G,) of a scatterer's strength on its grid, log-normal about `middle`."""
+    """Prior log probabilities (G,), for RIS identification, of scatterers' strengths, log-normal about `middle`."""
     log = -0.5 * ((STRENGTHS - np.log(middle)) / spread) ** 2
     return np.asarray(log - np.logaddexp.reduce(log))
 
 
 def unknown(count: int, panels: int = 1) -> PanelIdentity:
-    """Prior panel identities of so many points: nothing is known but that panels are fewer than scatterers."""
+    """RIS identities of so many points beforehand: nothing is known but that panels are fewer than scatterers."""
     return PanelIdentity(
         np.tile(_strength_prior(CONSTANTS.strength, CONSTANTS.strength_std), (count, 1)),
         np.full((count, panels), np.log(CONSTANTS.panels)),
@@ -97,13 +97,13 @@ class PanelObservation(NamedTuple):
 
 
 def spread_places(mean: Floats, covariance: Floats) -> Floats:
-    """Equally likely samples (N, S, 3) of Gaussian places of means (N, 3) and covariances (N, 3, 3)."""
+    """Equally likely samples (N, S, 3), for RIS identification, of Gaussian means (N, 3), covariances (N, 3, 3)."""
     return np.asarray(mean[:, None] + even_draws(DRAWS, mean.shape[1]) @ np.swapaxes(square_roots(covariance), 1, 2))
 
 
 def gains(sight: PanelObservation, ris: DataSheet | None, code: RisCode | None, radio: RadioConfig) -> Complexes | None:
-    """Path gains (Q, N, S) of each panel under the phase code, were it at each of the sampled places; None without a
-    panel or a code.
+    """Path gains (Q, N, S), for RIS identification, of each panel under the phase code, were it at each of the sampled
+    places; None without a panel or a code.
 
     The code is the same for all places, or one for each of them, (N, 1, ...).
     """

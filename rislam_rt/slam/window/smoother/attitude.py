@@ -27,13 +27,13 @@ def levels() -> Floats:
 
 @lru_cache(maxsize=4)
 def _levels(largest: float) -> Floats:
-    """`levels` up to a given one [rad], cached."""
+    """Levels of attitude up to a given one [rad], cached."""
     return np.asarray(largest * 10.0 ** (-0.5 * np.arange(SWAYS)[::-1]))
 
 
 def first_levels(*, compass: bool) -> Floats:
-    """Initial probabilities (2, L) of the levels of tilt and yaw; without a `compass` in use there is no yaw beside the
-    heading's random walk: (1, L)."""
+    """Initial probabilities (2, L) of the levels of attitude, tilt and yaw; without a `compass` in use there is no yaw
+    beside the heading's random walk: (1, L)."""
     weight = 3.0 ** -np.arange(SWAYS, dtype=np.float64)
     return np.tile(weight / weight.sum(), (1 + compass, 1))
 
@@ -44,7 +44,8 @@ def held_level(probability: Floats) -> Floats:
 
 
 def variance(probability: Floats) -> Floats:
-    """Expected variance (A,) [rad^2] of roll, pitch and, where there is a compass, yaw, from level probabilities."""
+    """Expected variance (A,) [rad^2] of the attitude's roll, pitch and, where there is a compass, yaw, from level
+    probabilities."""
     return np.asarray((probability @ levels() ** 2)[AXES[: len(probability) + 1]])
 
 
@@ -87,7 +88,7 @@ class Attitude(NamedTuple):
 
 
 def foreseen(before: Floats) -> Floats:
-    """Level probabilities (C, L) one cycle on, before it is heard."""
+    """Level probabilities (C, L) of the attitude one cycle on, before it is heard."""
     move = np.full((SWAYS, SWAYS), CONSTANTS.rare / (SWAYS - 1.0))
     np.fill_diagonal(move, CONSTANTS.stay)
     return np.asarray(before @ move)
@@ -137,7 +138,7 @@ LEVEL_BODY = Tilts(np.zeros((SWAYS, 1, 2)), np.full((SWAYS, 1), 1.0 / SWAYS))
 
 
 def tilts(probability: Floats, told: Attitude | None) -> Tilts:
-    """Tilts of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if anything."""
+    """Tilts (attitude) of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if any."""
     every = _variances(probability)[0]
     precision = np.eye(every.shape[1]) / every[:, None, :] if told is None else _precision(every, told)
     covariance = np.linalg.inv(precision)
@@ -148,8 +149,8 @@ def tilts(probability: Floats, told: Attitude | None) -> Tilts:
 
 
 def _unit_tilts(rings: int, spokes: int) -> Floats:
-    """Pairs (N, 2) that stand for two independent standard normal numbers: rings of equal probability, turned against
-    each other."""
+    """Pairs (N, 2) for attitudes that stand for two independent standard normal numbers: rings of equal probability,
+    turned against each other."""
     radius = np.sqrt(-2.0 * np.log1p(-(np.arange(rings) + 0.5) / rings))
     angle = 2.0 * np.pi / spokes * (np.arange(spokes) + np.arange(rings)[:, None] / rings)
     return np.stack([radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)], axis=2).reshape(-1, 2)

@@ -8,8 +8,8 @@ from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 
 def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Floats:
-    """Variance (N, 3) of predictions for poses in slots (N,), by slopes (N, 3, 4 + 3F) with respect to pose and
-    features."""
+    """Marginal variance (N, 3) of predictions for poses in slots (N,), by slopes (N, 3, 4 + 3F) with respect to pose
+    and features."""
     size, free, first = len(window.head), window.accel.shape[1], int(slot.min(initial=window.num_poses - 1))
     design = np.zeros((window.num_poses - first, POSE, len(window.covariance)))
     design[:, TURN, 6] = 1.0

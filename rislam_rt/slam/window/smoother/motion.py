@@ -23,7 +23,7 @@ def ladder() -> Floats:
 
 @lru_cache(maxsize=4)
 def _ladder(calmest: float, liveliest: float) -> Floats:
-    """`ladder` between given ends [m/s^2], cached."""
+    """`ladder` of motion modes between given ends [m/s^2], cached."""
     return np.geomspace(calmest, liveliest, MODES)
 
 

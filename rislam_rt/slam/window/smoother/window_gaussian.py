@@ -50,7 +50,7 @@ class Quadratic(NamedTuple):
     """(..., D) `m`, where it was linearised."""
 
     def slope(self, x: Floats) -> Floats:
-        """Gradient (..., D) of the cost at x (..., D)."""
+        """Gradient (..., D) at x (..., D) of a cost in the window's Gaussian."""
         return self.gradient + (self.hessian @ (x - self.middle)[..., None])[..., 0]
 
 
@@ -90,12 +90,12 @@ class Window(NamedTuple):
 
     @property
     def features(self) -> Floats:
-        """Features (F, 3) [m] of the map: places of points, and for walls the mirror images of their anchors."""
+        """Features (F, 3) [m] of the window: places of points, and for walls the mirror images of their anchors."""
         return self.head[HEAD:].reshape(-1, 3)
 
     @property
     def turns(self) -> bool:
-        """Whether each step has a rate of turn, the heading being estimated: A is then 4, and else 3."""
+        """Whether each step of the window has a rate of turn, the heading being estimated: A is then 4, and else 3."""
         return self.accel.shape[1] > TURN
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from rislam_rt.measurement.components import merge, path_std
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.received import Received
-from rislam_rt.measurement.sensor_model import build_sensor
+from rislam_rt.measurement.detection_threshold import build_sensor
+from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL

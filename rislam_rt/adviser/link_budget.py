@@ -1,0 +1,109 @@
+"""Link budget of each landmark along the trajectory: SNR margin, detection probability, why it is not detected."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.adviser.detection_forecast import DetectionForecast, forecast_detection
+from rislam_rt.adviser.forecast_codes import codes_of, paths_under_codes
+from rislam_rt.adviser.reasons import Reasons, build_reasons
+from rislam_rt.arrays import Floats
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.model import Paths, Scene
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
+
+PLACES = 15
+"""Number of positions of a link budget, evenly along the trajectory; first, middle and last are its columns."""
+DEPTHS = ((500, 2), (2000, 1))
+"""Most triangles of a room, and the wall bounces that its link budget then counts; with more triangles direct paths
+alone: the check is to take seconds. More bounces are seldom the strongest; they cover weaker paths."""
+NOTHING_DB = -400.0
+"""Margin [dB] over the detection threshold that stands for no path."""
+
+
+class LandmarkLink(NamedTuple):
+    """Link budget of one landmark under one kind of RIS codes, at K positions along the trajectory."""
+
+    landmark: str
+    """Name of the scatterer or RIS panel."""
+    code: str
+    """Kind of codes of a RIS panel, `aimed`, `swept` or `random`; empty for a scatterer."""
+    margin_db: Floats
+    """(K,) SNR of the landmark's strongest path over the detection threshold; of swept codes that of the best beam, of
+    random ones that of the mean power."""
+    probability: Floats
+    """(K,) probability that the receiver reports at least one component of the landmark."""
+    reason: tuple[str, ...]
+    """(K,) why the landmark is not detected there; empty where it is."""
+
+    @property
+    def share(self) -> float:
+        """Share of the trajectory on which a landmark is detected: the mean of its detection probability."""
+        return float(np.mean(self.probability))
+
+    @property
+    def three(self) -> tuple[int, int, int]:
+        """Indices of the first, the middle and the last position of a link budget."""
+        last = len(self.margin_db) - 1
+        return 0, last // 2, last
+
+
+class Survey(NamedTuple):
+    """Propagation paths of a room at positions along the trajectory, from which its link budget is worked out."""
+
+    scene: Scene
+    """The room, its trajectory cut to those positions."""
+    paths: Paths
+    settings: Settings
+    depth: int
+    """Most wall bounces of these paths."""
+
+
+def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
+    """Find the paths at `places` positions along a scene's trajectory, by image sources, for its link budget."""
+    rows = np.unique(np.linspace(0, len(scene.agent) - 1, places).round().astype(np.int64))
+    scene = replace(scene, agent=scene.agent[rows])
+    faces = sum(len(reflector.faces) for reflector in scene.reflectors)
+    channel = ImageSourceChannel(scene, settings.radio, next((depth for most, depth in DEPTHS if faces <= most), 0))
+    receiver = replace(settings.receiver, panels=max(len(scene.panels), 1))
+    return Survey(scene, channel.paths(scene.agent), settings._replace(receiver=receiver), channel.depth)
+
+
+def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:
+    """Link budgets of scatterers, and of each RIS panel under each kind of codes (`rng` draws the random ones)."""
+    scene, paths, settings = looked.scene, looked.paths, looked.settings
+    reasons = build_reasons(scene, paths, settings)
+    if scene.ris is None:
+        return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
+    links: list[LandmarkLink] = []
+    for codes in codes_of(paths, scene.ris.spec, settings.radio, rng=rng):
+        heard = [_all_places(paths_under_codes(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
+        if codes.name == "aimed":
+            links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
+        links += [
+            _link(panel.name, codes.name, heard, reasons, len(scene.scatterers) + number)
+            for number, panel in enumerate(scene.panels)
+        ]
+    return links
+
+
+def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
+    """Detection forecast of all landmarks under one RIS code, at each position of the link budget."""
+    heading = looked.scene.agent.heading
+    places = range(paths.num_cycles)
+    return [forecast_detection(paths, place, float(heading[place]), looked.settings) for place in places]
+
+
+def _link(name: str, code: str, heard: list[list[DetectionForecast]], reasons: Reasons, number: int) -> LandmarkLink:
+    """Link budget of a landmark over C RIS codes: mean probability and SNR, but the best beam's of swept ones."""
+    snr = np.array([[place.snr[number] for place in places] for places in heard])
+    chance = np.array([[place.probability[number] for place in places] for places in heard]).mean(axis=0)
+    level = snr.max(axis=0) if code == "swept" else snr.mean(axis=0)
+    margin = 10.0 * np.log10(np.maximum(level / reasons.settings.sensor.threshold, 10.0 ** (NOTHING_DB / 10.0)))
+    covered = np.array([place.covered[number] for place in heard[0]])
+    said = tuple(
+        "" if chance[place] > 0.5 else reasons.why(number, place, float(margin[place]), int(covered[place]))
+        for place in range(len(margin))
+    )
+    return LandmarkLink(name, code, margin, chance, said)

@@ -1,0 +1,56 @@
+"""Files of a scene folder: reading those that a scene names, none outside and none too large, and the file names of its
+meshes, which walls and scatterers give.
+"""
+
+import hashlib
+import re
+import unicodedata
+from pathlib import Path, PurePosixPath
+
+from rislam_rt.scene.findings import Fault, one_line
+
+
+def read_inside(folder: Path, name: str, limit: int) -> bytes:
+    """Read a file that a scene names, which must lie inside the scene's folder, links followed.
+
+    Raises
+    ------
+    Fault
+        The name leaves the folder, or the file is missing, too large or unreadable.
+    """
+    relative = PurePosixPath(name)
+    if not name or relative.is_absolute() or ".." in relative.parts or "\\" in name or not name.isprintable():
+        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", "give a relative path below it")
+    path = folder / relative
+    try:
+        if not path.resolve().is_relative_to(folder.resolve()):
+            raise Fault(f"'{name[:80]}' leads out of the scene's folder by a link", "copy the file into the folder")
+        if not path.is_file():
+            kind = "is not a file" if path.exists() else "does not exist"
+            raise Fault(f"'{name[:80]}' {kind}", "put the file there or mend the path")
+        with path.open("rb") as file:
+            content = file.read(limit + 1)
+    except (OSError, ValueError, RuntimeError) as error:
+        cause = one_line(getattr(error, "strerror", None) or str(error))[:60]
+        raise Fault(f"'{name[:80]}' cannot be read ({cause})", "check the file and its permissions") from None
+    if len(content) > limit:
+        raise Fault(f"'{name[:80]}' is larger than {limit} bytes", "give a smaller file")
+    return content
+
+
+PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]*")
+"""Names that every file system takes."""
+
+
+def safe_name(name: str) -> str:
+    """File name for a name in any script: the name itself if every file system takes it, else its plain letters with a
+    hash that tells it from others.
+
+    >>> safe_name("wall_x0"), safe_name("Wände")
+    ('wall_x0', 'Wande-8cc563f3')
+    """
+    if PLAIN.fullmatch(name) and not name.endswith("."):
+        return name
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    plain = re.sub(r"[^A-Za-z0-9_]+", "_", plain).strip("_")
+    return f"{plain or 'name'}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
