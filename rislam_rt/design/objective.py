@@ -51,7 +51,7 @@ class Objective:
 
     def of_index(self, index: Integers) -> Floats:
         """Objective, the expected CRLB (...,) [m^2], of codes (..., N M) given as levels."""
-        return self.value(self.gains(self.table[index]))
+        return self.value(self.gains(self.table.take(index)))
 
     def _inverse_trace(self, information: Floats) -> Floats:
         """Objective from information matrices (..., 3): the trace (...,) of the inverse; 1 / trace of them where

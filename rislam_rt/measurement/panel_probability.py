@@ -6,6 +6,8 @@ complex amplitude times a factor that its Doppler shift sets, within the speed t
 has any. The captures change their roles for components in the sum.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
@@ -25,6 +27,9 @@ MIXTURE = 0.3
 """Relative error of a leak's factor: unresolved paths have not one Doppler shift."""
 BLUR = 0.1
 """Standard deviation [cells] of a leak's delay and cosines about its source's, for the same reason."""
+NOWHERE = 1e-25
+"""Density per cell below which a component is not another's leak: at any SNR that leaves its odds far below
+`SUREST`."""
 SUREST = 1e-6
 """Least distance of the probability from 0 and 1: the model has its own errors."""
 
@@ -53,6 +58,7 @@ def panel_probability(
     return probability, np.argmax(over[:, 1:], axis=1) if config.panels > 1 else None
 
 
+@lru_cache(maxsize=64)
 def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
     """Amplitude ratios (`SHIFTS`,) at which moving paths leak from capture `of` into capture `into`, for the panel's
     probability.
@@ -61,7 +67,9 @@ def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: 
     """
     shift = np.linspace(-1.0, 1.0, SHIFTS) * 2.0 * config.top_speed / radio.wavelength
     signs = code_signs(config.order, config.panels)
-    return np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
+    factors = np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
+    factors.flags.writeable = False
+    return factors
 
 
 def _leak_odds(
@@ -74,13 +82,15 @@ def _leak_odds(
     gap = found.points[:, None] - sources.points
     variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2
     place = np.prod(np.exp(-0.5 * gap**2 / variance) / np.sqrt(2.0 * np.pi * variance) * cell, axis=-1)
+    row, source = np.nonzero(place > NOWHERE)
     expected = sources.gain[:, None] * factors
     spacing = np.abs(np.gradient(expected, axis=1))
-    spread = found.gain_std[:, None, None] ** 2 + (MIXTURE * np.abs(expected)) ** 2 + spacing**2 / 6.0
-    miss = np.abs(found.gain[:, None, None] - expected) ** 2
+    width = (MIXTURE * np.abs(expected)) ** 2 + spacing**2 / 6.0
+    spread = found.gain_std[row, None] ** 2 + width[source]
+    miss = np.abs(found.gain[row, None] - expected[source]) ** 2
     leak = np.mean(np.exp(-miss / spread) / (np.pi * spread), axis=-1)
     own = DENSITY / (2.0 * np.pi * DYNAMIC_RANGE * np.abs(found.gain) ** 2)
-    return np.asarray(np.sum(place * leak, axis=1) / own)
+    return np.bincount(row, place[row, source] * leak, minlength=len(place)) / own
 
 
 def _pick(found: ReportedComponents, rows: Booleans) -> ReportedComponents:

@@ -29,9 +29,12 @@ def code_signs(order: str, panels: int) -> Floats:
     return signs
 
 
+@lru_cache(maxsize=64)
 def codes_in_turn(panels: int) -> Floats:
     """Hadamard matrix (C, C) of the signs of the codes in a slot: two codes for one panel, four for two."""
-    return scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
+    signs = scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
+    signs.flags.writeable = False
+    return signs
 
 
 def slot_mean(doppler: Floats, signs: Floats, config: ReceiverConfig) -> Complexes:
@@ -66,10 +69,14 @@ def split_by_code(received: Received, config: ReceiverConfig) -> list[Received]:
         return [received._replace(gain=received.gain * slot_weights(received.doppler, config)[0])]
     signs = code_signs(config.order, config.panels)
     kind = np.minimum(received.panel, config.panels - 1) + 1
-    captures = []
+    captures, means = [], dict[bytes, Complexes]()  # products of rows are few: the sum's and a panel's own are the same
     for own in signs:
         weight = np.zeros(len(kind), dtype=np.complex128)
         for number in np.unique(kind):
-            weight = np.where(kind == number, slot_mean(received.doppler, own * signs[number], config), weight)
+            product = own * signs[number]
+            name = product.tobytes()
+            if name not in means:
+                means[name] = slot_mean(received.doppler, product, config)
+            weight = np.where(kind == number, means[name], weight)
         captures.append(received._replace(gain=received.gain * weight))
     return captures

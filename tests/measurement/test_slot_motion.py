@@ -8,9 +8,9 @@ import pytest
 
 from rislam_rt.channel.doppler import doppler_shift, turn_rate
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.measurement import ReceiverConfig, measure
+from rislam_rt.measurement import ReceiverConfig, measure, receive, slot_motion
 from rislam_rt.measurement.config import ORDERS
-from rislam_rt.measurement.slot_motion import code_signs, slot_weights
+from rislam_rt.measurement.slot_motion import code_signs, slot_mean, slot_weights, split_by_code
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
 
@@ -103,3 +103,23 @@ def test_a_moving_wall_leaks_into_the_difference_and_is_told_from_the_panel(
     config = replace(config, order="ABBA", false_alarm_rate=1e-3)
     measurement, _ = measure(paths, 0, 0.0, RADIO, config, None, np.array([FASTEST]), rng=rng)
     assert len(measurement) == 1
+
+
+def test_a_mean_over_the_slot_is_taken_once_for_paths_and_captures_that_share_it(monkeypatch, make_paths, make_gain):
+    """The sum weighs walls as a panel's difference weighs the panel: two means for four pairs."""
+    asked = []
+
+    def counted(doppler, signs, config):
+        asked.append(signs)
+        return slot_mean(doppler, signs, config)
+
+    monkeypatch.setattr(slot_motion, "slot_mean", counted)
+    paths = make_paths(
+        [(PathKind.VT, 7.0, UP, make_gain(20.0, RADIO)), (PathKind.RIS, 6.0, UP, make_gain(20.0, RADIO))]
+    )
+    heard = receive(paths, 0, 0.0, RADIO, SPLIT, np.array([FASTEST, FASTEST]))
+    common, difference = split_by_code(heard, SPLIT)
+    assert len(asked) == 2
+    plain, signed = slot_weights(np.array([FASTEST]), SPLIT)
+    np.testing.assert_allclose(common.gain / heard.gain, [plain[0], signed[0]])
+    np.testing.assert_allclose(difference.gain / heard.gain, [signed[0], plain[0]])

@@ -129,6 +129,18 @@ def test_existence_after_a_cycle(existence: float, ranges: int) -> None:
     assert after.existence[0] == pytest.approx(there / (there + (1.0 - existence) * np.prod(fresh)), rel=1e-9)
 
 
+def test_a_feature_that_made_no_range_pulls_nothing() -> None:
+    """To the last bit: what is missed tells neither of the agent nor which of the Gaussians it is."""
+    odds, course = Odds(0.7, 1.0, 30.0), course_after(4, 2)
+    sums = one_feature(course)
+    sight = predict_ranges(sums, course, PLACE, MODEL)
+    scan, none = Scan(np.zeros(0), np.zeros(0)), np.zeros(0)
+    after, moved = absorb(sums, sight, course, scan, claims(sums, sight, course, scan, none, odds), odds)
+    np.testing.assert_array_equal(moved.mean, course.mean)
+    np.testing.assert_array_equal(moved.covariance, 0.5 * (course.covariance + course.covariance.T))
+    np.testing.assert_array_equal(after.share, sums.share)
+
+
 def test_birth_ratio_integrates_to_the_undetected() -> None:
     """Over all ranges the density of first detections holds `p_d` times the undetected; trapezoids, to 1e-4."""
     odds, length = Odds(0.7, 1.0, 30.0), np.linspace(1e-6, 30.0, 4001)

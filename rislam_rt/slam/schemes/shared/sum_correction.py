@@ -56,14 +56,19 @@ def absorb(
     """Correct features' Gaussian sums and the agent's trajectory by a scan of ranges, one by one, the surest first."""
     ref, edges = course.mean.copy(), np.searchsorted(sums.owner, np.arange(len(sums.ident) + 1))
     existence, share = sums.existence.copy(), sums.share.copy()
-    pulls = np.zeros((2, len(sums.owner)))
+    pulls = np.stack([np.zeros(len(sums.owner)), np.full(len(sums.owner), NO_VARIANCE)])
+    missed = 1.0 - odds.detection_probability
+    claimed = found.feature[:, :-1] > 1e-4
     for row in np.argsort(-existence, kind="stable"):
+        near = claimed[row].nonzero()[0]
+        if not len(near):  # all its Gaussians missed alike, and the agent learns nothing of it
+            existence[row] *= missed / (existence[row] * missed + 1.0 - existence[row])
+            continue
         part = slice(edges[row], edges[row + 1])
         by_course, own = sight.by_course[part], sight.own[part]
         gain = by_course @ course.covariance
         spread = own + np.einsum("cn,cn->c", gain, by_course)
         seen = sight.length[part] + by_course @ (course.mean - ref)
-        near = (found.feature[row, :-1] > 1e-4).nonzero()[0]
         pull = _pull(seen, spread, Scan(scan.length[near], scan.std[near]), found.to_feature[row, near], odds)
         weight = share[part] * np.exp(pull.log_factor)
         total = weight.sum()

@@ -140,12 +140,12 @@ LEVEL_BODY = Tilts(np.zeros((SWAYS, 1, 2)), np.full((SWAYS, 1), 1.0 / SWAYS))
 def tilts(probability: Floats, told: Attitude | None) -> Tilts:
     """Tilts (attitude) of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if any."""
     every = _variances(probability)[0]
-    precision = np.eye(every.shape[1]) / every[:, None, :] if told is None else _precision(every, told)
-    covariance = np.linalg.inv(precision)
-    mean = np.zeros((SWAYS, 2)) if told is None else (covariance @ told.slope[0])[:, :2]
-    root = np.linalg.cholesky(covariance[:, :2, :2])
-    point = mean[:, None] + UNIT_TILTS @ np.swapaxes(root, 1, 2)
-    return Tilts(point, np.tile(probability[0][:, None] / len(UNIT_TILTS), len(UNIT_TILTS)))
+    weight = np.repeat(probability[0][:, None] / len(UNIT_TILTS), len(UNIT_TILTS), axis=1)
+    if told is None:  # the axes are independent
+        return Tilts(UNIT_TILTS * np.sqrt(every[:, None, :2]), weight)
+    covariance = np.linalg.inv(_precision(every, told))
+    mean, root = (covariance @ told.slope[0])[:, :2], np.linalg.cholesky(covariance[:, :2, :2])
+    return Tilts(mean[:, None] + UNIT_TILTS @ np.swapaxes(root, 1, 2), weight)
 
 
 def _unit_tilts(rings: int, spokes: int) -> Floats:
