@@ -61,7 +61,7 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
 
 
 def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """Margin (panels, N) [dB] of each RIS panel's direct path under the best code, for agents (N, 3) [m]."""
+    """Coverage (panels, N): margin [dB] of each RIS panel's direct path under the best code, at places (N, 3) [m]."""
     assert scene.ris is not None
     count = len(points)
     time = np.arange(count, dtype=np.float64)

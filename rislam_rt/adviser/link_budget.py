@@ -89,7 +89,7 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
 
 
 def _all_places(paths: Paths, looked: Survey) -> list[DetectionForecast]:
-    """Detection forecast of all landmarks under one RIS code, at each position of the link budget."""
+    """Link budget of a way: detection forecast of all landmarks under one RIS code, at each of its positions."""
     heading = looked.scene.agent.heading
     places = range(paths.num_cycles)
     return [forecast_detection(paths, place, float(heading[place]), looked.settings) for place in places]

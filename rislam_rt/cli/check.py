@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, settings_of, write_json
-from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, settings_of
+from rislam_rt.cli.output_files import OUTPUT, write_json
 from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:

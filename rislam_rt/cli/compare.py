@@ -4,7 +4,8 @@ from typing import Annotated
 
 import typer
 
-from rislam_rt.cli.options import Depth, JsonFile, RadioSettings, SceneFolder, Seed, write_json
+from rislam_rt.cli.options import Depth, JsonFile, RadioSettings, SceneFolder, Seed
+from rislam_rt.cli.output_files import write_json
 
 
 def command(

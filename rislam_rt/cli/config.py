@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings
+from rislam_rt.cli.output_files import write_json
 from rislam_rt.shipped import name_from_here, room_beside
 
 if TYPE_CHECKING:

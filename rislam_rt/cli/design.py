@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from rislam_rt.cli.options import ChannelName, Depth, JsonFile, RadioSettings, SceneFolder, Seed, write_json
-from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.cli.options import ChannelName, Depth, JsonFile, RadioSettings, SceneFolder, Seed
+from rislam_rt.cli.output_files import OUTPUT, write_json
 
 
 def command(

@@ -2,7 +2,8 @@
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, write_json
+from rislam_rt.cli.options import JsonFile
+from rislam_rt.cli.output_files import write_json
 
 
 def command(json: JsonFile = None) -> None:

@@ -1,10 +1,10 @@
-"""Command line options that several commands share, their parsing, and the JSON file of the option `--json`."""
+"""Command line options that several commands share, and their parsing."""
 
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -120,18 +120,3 @@ def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
     from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
     return build_settings(load_spec(pipeline, changed))
-
-
-def write_json(file: Path | None, content: dict[str, Any]) -> None:
-    """Write the JSON file of the option `--json` whole or not at all; nothing if it was not asked for.
-
-    Raises
-    ------
-    StoreError
-        The disk refused.
-    """
-    if file is None:
-        return
-    from rislam_rt.storage.files import MARK, json_file, write_atomic
-
-    write_atomic(file, json_file({**content, "origin": MARK}, indent=2))

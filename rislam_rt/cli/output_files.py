@@ -109,3 +109,18 @@ def _is_page(file: Path) -> bool:
         return PAGE_MARK.search(file.read_bytes()) is not None
     except OSError:
         return False
+
+
+def write_json(file: Path | None, content: dict[str, Any]) -> None:
+    """Write the JSON file of the option `--json` whole or not at all; nothing if it was not asked for.
+
+    Raises
+    ------
+    StoreError
+        The disk refused.
+    """
+    if file is None:
+        return
+    from rislam_rt.storage.files import MARK, json_file, write_atomic
+
+    write_atomic(file, json_file({**content, "origin": MARK}, indent=2))

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import JsonFile, write_json
-from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.cli.options import JsonFile
+from rislam_rt.cli.output_files import OUTPUT, write_json
 from rislam_rt.cli.run import show_scores
 
 if TYPE_CHECKING:

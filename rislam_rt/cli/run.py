@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions
+from rislam_rt.cli.output_files import write_json
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.input_messages import counted
 

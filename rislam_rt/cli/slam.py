@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pipeline_file, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pipeline_file
+from rislam_rt.cli.output_files import write_json
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats

@@ -10,8 +10,8 @@ import numpy as np
 import typer
 
 from rislam_rt.cli.interrupts import Interrupted
-from rislam_rt.cli.options import StudyOptions, write_json
-from rislam_rt.cli.output_files import page_files, study_folder
+from rislam_rt.cli.options import StudyOptions
+from rislam_rt.cli.output_files import page_files, study_folder, write_json
 from rislam_rt.cli.progress_bars import show_progress, show_sweep
 from rislam_rt.cli.scene_arguments import open_scene, scene_of
 from rislam_rt.errors import ConfigError

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, write_json
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings
+from rislam_rt.cli.output_files import write_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder, write_json
-from rislam_rt.cli.output_files import OUTPUT, check_output
+from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder
+from rislam_rt.cli.output_files import OUTPUT, check_output, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.model import Paths, RadioConfig, Scene

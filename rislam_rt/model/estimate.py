@@ -60,7 +60,7 @@ class MapEstimate:
 
     @property
     def ris(self) -> int:
-        """Row of the landmark identified as the (first) RIS panel; -1 if none is. See `panel_row`."""
+        """Row of an estimated map's landmark that is identified as the (first) RIS panel; -1 if none is."""
         return self.panel_row(0)
 
     def panel_row(self, panel: int) -> int:

@@ -66,7 +66,7 @@ class TracedChannel:
         self.tracer_scene = build_tracer_scene(self.walls, radio.carrier, room_center(scene), occluders)
 
     def paths(self, trajectory: Trajectory) -> Paths:
-        """Ray-traced paths of every cycle of a trajectory, with the panel's code at level 0."""
+        """Paths of every cycle of a trajectory through the traced channel, with the panel's code at level 0."""
         expect("trajectory", trajectory, Trajectory)
         tx, rx, heading = trajectory.tx, trajectory.rx, trajectory.heading
         queries = [LegQuery(tx, rx, heading, to_rx=True)]

@@ -28,7 +28,7 @@ BOUND_OF = {
 
 
 def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
-    """Scores of the study in many rooms as plain data: an entry for each room, variant and scheme, and missed aims."""
+    """Scores of the study of the shipped rooms as plain data: an entry a room, variant and scheme, and missed aims."""
     entries = []
     usual = groups[0].point.get("variant", "") if groups else ""
     for group in groups:

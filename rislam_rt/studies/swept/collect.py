@@ -45,7 +45,7 @@ class Group(NamedTuple):
 
     @property
     def reasons(self) -> list[str]:
-        """Error messages collected from the schemes that failed, each once."""
+        """Error messages collected from all cells of a group in a sweep, of the schemes that failed, each once."""
         entries = [(name, entry) for result in self.results if result for name, entry in result["schemes"].items()]
         return list(dict.fromkeys(f"{name}: {entry['failed']}" for name, entry in entries if "failed" in entry))
 

@@ -9,11 +9,12 @@ import numpy as np
 import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.planes import crossing
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.landmarks.path_forms import crossing, margins, planes
+from rislam_rt.slam.window.landmarks.path_forms import margins, planes
 from rislam_rt.slam.window.solver_limits import STEP
 
 

@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.planes import crossing
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns
 from rislam_rt.slam.window.solver_limits import STEP
@@ -107,13 +108,6 @@ def margins(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tupl
     mirrored = image - 2.0 * outer[:, None] * normal[:, 1]
     edge = crossing(device, mirrored, own, -outer)
     return np.sign(near) * (np.vecdot(edge, normal[:, 0]) - offset[:, 0]), near, outer, own
-
-
-def crossing(start: Floats, stop: Floats, own: Floats, far: Floats) -> Floats:
-    """Points (N, 3) where the segments between places (N, 3) cross a wall, before which their ends lie at signed depths
-    (N,); one of the ends where they do not cross it."""
-    share = np.clip(own / np.where(np.abs(own - far) > 1e-9, own - far, 1e-9), 0.0, 1.0)
-    return np.asarray(start + share[:, None] * (stop - start))
 
 
 def _margin_std(
