@@ -142,7 +142,8 @@ def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mo
     if mode == "appendix":
         return last
     total = np.zeros_like(last)
-    for seen, way in ((paths.tx_point, unit(points[paths.tx_point] - tx)), (paths.rx_point, last)):
+    sense = -1.0 if mode == "paper_legs" else 1.0
+    for seen, way in ((paths.tx_point, sense * unit(points[paths.tx_point] - tx)), (paths.rx_point, last)):
         inner = mirror_direction(way, unit(points[seen] - points[paths.source]))
         total = total + way + np.where((seen != paths.source)[:, None], inner, 0.0)
     return total

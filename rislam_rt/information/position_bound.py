@@ -78,13 +78,14 @@ def position_bound(information: Floats, prior: Floats | float = 0.0) -> Position
     return PositionBound(variance, outcome)
 
 
-GradientMode = Literal["exact", "paper", "appendix"]
+GradientMode = Literal["exact", "paper", "paper_legs", "appendix"]
 """Forms of a path length's gradient by the agent's position (see `vertex_gradient`)."""
 
 
 def vertex_gradient(
-    tx: Floats, rx: Floats, vertices: Floats, num_vertices: Integers, *, mode: GradientMode = "exact"
-) -> Floats:
+    tx: Floats, rx: Floats, vertices: Floats, num_vertices: Integers, *, mode: GradientMode = "exact",
+    landmark: Integers | int = 0,
+) -> Floats:  # fmt: skip
     """Gradients (..., P, 3) of path lengths by the agent's position, from the paths' interaction points.
 
     Parameters
@@ -97,7 +98,10 @@ def vertex_gradient(
         (P,) number of vertices of each path; 0 is the line of sight.
     mode
         `exact`; `paper`: sum of all segments' unit vectors in the sense of travel (nu, kappa of eq. `derived`);
-        `appendix`: the last segment alone (H of Appendix B).
+        `paper_legs`: the same sum, the segments of both legs pointing from the landmark to the agent, as eq. `derived`
+        names no sense; `appendix`: the last segment alone (H of Appendix B).
+    landmark
+        (P,) position of the landmark among each path's vertices, for `paper_legs`: the number of walls on its Tx leg.
     """
     tx, rx = (np.broadcast_to(end[..., None, :], (*vertices.shape[:-2], 3)) for end in (tx, rx))
     points = np.concatenate([tx[..., None, :], vertices, rx[..., None, :]], axis=-2)
@@ -108,6 +112,9 @@ def vertex_gradient(
     segment = unit(np.diff(points, axis=-2))
     if mode == "paper":
         return segment.sum(axis=-2)
+    if mode == "paper_legs":
+        before = step[:-1] <= np.broadcast_to(landmark, count.shape)[:, None]
+        return np.where(before[..., None], -segment, segment).sum(axis=-2)
     last = np.take_along_axis(segment, np.broadcast_to(count[:, None, None], (*vertices.shape[:-2], 1, 3)), axis=-2)
     if mode == "appendix":
         return last[..., 0, :]

@@ -111,7 +111,7 @@ def test_gradients_as_the_paper_has_them_equal_those_of_the_bounced_paths(make_b
     chains = [(p, p, p) for p in points] + [(found.parent[i], found.parent[i], i) for i in images]
     chains += [(found.parent[i], i, found.parent[i]) for i in images]
     over_panel = [chain for chain in chains if chain[0] == found.ris]
-    for mode in ("paper", "appendix"):
+    for mode in ("paper", "paper_legs", "appendix"):
         problem = problem_from_belief(belief, make_spec(), radio, samples=1, gradient=mode)
         ordered = over_panel + [chain for chain in chains if chain[0] != found.ris]
         for number, (source, first, last) in enumerate(ordered):
@@ -122,7 +122,8 @@ def test_gradients_as_the_paper_has_them_equal_those_of_the_bounced_paths(make_b
                         at if at == 0 else len(corners), _bounce(end, found.position[source], found.position[seen])
                     )
             vertices = np.array([corners + [corners[-1]] * (3 - len(corners))])
-            expected = vertex_gradient(tx, rx, vertices, np.array([len(corners)]), mode=mode)[0, :2]
+            walls = int(first != source)
+            expected = vertex_gradient(tx, rx, vertices, np.array([len(corners)]), mode=mode, landmark=walls)[0, :2]
             np.testing.assert_allclose(problem.gradient[0, number], expected, atol=1e-12)
 
 

@@ -79,6 +79,12 @@ def test_paper_and_appendix_modes_are_the_sums_they_claim_to_be():
     paper = vertex_gradient(tx, rx, vertices, count, mode="paper")[0]
     np.testing.assert_allclose(paper[0], [1 - s2, 1 - s2, 0], atol=1e-15)  # up, right, back to the Rx
     np.testing.assert_allclose(paper[1], [1 / np.sqrt(17), 0, 1 - 4 / np.sqrt(17)], atol=1e-15)
+    legs = vertex_gradient(tx, rx, vertices, count, mode="paper_legs")[0]
+    np.testing.assert_allclose(legs[0], [1 - s2, -1 - s2, 0], atol=1e-15)  # the wall on the Rx leg
+    np.testing.assert_allclose(legs[1], [1 / np.sqrt(17), 0, -1 - 4 / np.sqrt(17)], rtol=0, atol=1e-15)
+    behind = vertex_gradient(tx, rx, vertices, count, mode="paper_legs", landmark=np.array([1, 0]))[0]
+    np.testing.assert_allclose(behind[0], [-1 - s2, -1 - s2, 0], atol=1e-15)  # the wall on the Tx leg
+    np.testing.assert_array_equal(behind[1], legs[1])
     appendix = vertex_gradient(tx, rx, vertices, count, mode="appendix")[0]
     np.testing.assert_allclose(appendix[0], [-s2, -s2, 0], atol=1e-15)
     exact = vertex_gradient(tx, rx, vertices, count)[0]
@@ -92,3 +98,15 @@ def test_paper_mode_vanishes_for_a_monostatic_landmark():
     np.testing.assert_allclose(vertex_gradient(agent, agent, vertices, one, mode="paper"), 0.0, atol=1e-15)
     exact = vertex_gradient(agent, agent, vertices, one)[0, 0]
     np.testing.assert_allclose(np.linalg.norm(exact), 2.0, atol=1e-15)
+
+
+def test_legs_that_point_at_the_agent_have_the_exact_gradient_unless_a_wall_comes_between(channel):
+    paths = every_class(channel)
+    motion = trajectory(channel)
+    walls = (paths.tx_walls >= 0).sum(axis=1)
+    legs = vertex_gradient(motion.tx, motion.rx, paths.vertices, paths.num_vertices, mode="paper_legs", landmark=walls)
+    exact = vertex_gradient(motion.tx, motion.rx, paths.vertices, paths.num_vertices)
+    direct = np.isin(paths.kind, (PathKind.PS, PathKind.RIS))
+    over_walls = np.isin(paths.kind, (PathKind.VS, PathKind.VRIS))
+    np.testing.assert_allclose(legs[:, direct], exact[:, direct], rtol=0, atol=1e-14)
+    assert np.abs(legs - exact)[paths.valid & over_walls].max(axis=-1).min() > 1e-3

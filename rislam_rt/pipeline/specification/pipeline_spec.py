@@ -1,13 +1,14 @@
 """Specification of an experiment: all tables of a pipeline file, and their conversion to settings in SI units."""
 
 from dataclasses import fields
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import AfterValidator, Field, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.errors import ConfigError
+from rislam_rt.information import GradientMode
 from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.own_methods import is_own
@@ -117,8 +118,8 @@ class DesignSection(DesignerSection):
     """Positions drawn from the belief over which the objective is averaged; 1 designs on the mean."""
     landmark_uncertainty: bool = False
     """Whether a landmark's covariance reduces the information of its path."""
-    gradient: Literal["exact", "paper", "appendix"] = "exact"
-    """Gradient of a path's length with the agent's position in the design; the last two are the paper's."""
+    gradient: Literal[get_args(GradientMode)] = "exact"  # type: ignore[valid-type]
+    """Gradient of a path's length with the agent's position in the design; the other three are the paper's."""
     least_snr_db: Decibel | None = None
     """SNR over all antennas at which the receiver detects a path every other time, for a design that weights paths by
     their detection probability; without it every path counts in full, as in the paper."""
