@@ -35,6 +35,7 @@ CASES = (
     ("coordinate", THOROUGH, 4), ("exact", THOROUGH, 4), ("coordinate", THOROUGH, 2), ("coordinate", THOROUGH, 16),
 )  # fmt: skip
 HEARD_DB = 10.0
+"""SNR over all antennas at which a receiver hears a path every other time."""
 HEAD = (
     "gradient", "design", "levels", "own objective above the best of 11 descents [%]", "exact CRLB above the best [%]",
     "direct path below its optimum [dB]", "heard [%]",

@@ -169,9 +169,12 @@ def _fig4c(content: Mapping[str, Any] | None) -> list[Claim]:
             continue
         text = f"lower by {100 * fall:.0f} % ({100 * low:.0f} to {100 * high:.0f}) with {sizes[-1]} x {sizes[-1]} than "
         text += f"with {sizes[0]} x {sizes[0]} elements"
-        verdict = "reproduced" if low > 0.0 else "not reproduced"
         column = "rmse_m" if name == "agent" else "panel_m"
-        course = [(e["size"], e[column]) for e in content["entries"] if e["scheme"] == OURS and e[column] is not None]
+        course = sorted(
+            (e["size"], e[column]) for e in content["entries"] if e["scheme"] == OURS and e[column] is not None
+        )
+        steps = [after <= before for (_, before), (_, after) in pairwise(course)]
+        verdict = _judgement([low > 0.0, *steps], low > 0.0)
         reason = "By size: " + ", ".join(f"{size} x {size} {value:.3f} m" for size, value in course) + "."
         found.append(Claim(claim, where, text, verdict, reason))
     return found

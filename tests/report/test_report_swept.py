@@ -237,6 +237,23 @@ def test_claims_follow_the_numbers(fig4b, tmp_path):
     assert len(json.loads((tmp_path / "out" / "claims.json").read_text())["claims"]) == len(found)
 
 
+@pytest.mark.parametrize(
+    ("middle", "low", "verdict"),
+    [(0.03, 0.1, "reproduced"), (0.2, 0.1, "reproduced in part"), (0.03, -0.1, "not reproduced")],
+)
+def test_an_error_that_falls_with_the_panel_falls_at_every_size(middle, low, verdict):
+    course = {16: 0.02, 4: 0.04, 8: middle}  # in any order
+    content = {
+        "cases": [], "entries": [
+            {"scheme": "optimized", "size": size, "rmse_m": value, "panel_m": 0.02} for size, value in course.items()
+        ],
+        "falls": [{"scheme": "optimized", **{f"{name}{end}": value for name in ("agent", "panel")
+                   for end, value in (("", 0.5), ("_low", low), ("_high", 0.6))}}],
+    }  # fmt: skip
+    found = {claim.claim: claim.verdict for claim in judge({"fig4c": content})}
+    assert found["agent's error falls with the panel's size"] == verdict
+
+
 def test_a_claim_that_fails_is_not_called_reproduced():
     gains = [
         {"case": "calm", "snr_db": 0.0, "over": over, "gain": value, "gain_low": value - 0.1, "gain_high": value + 0.1,

@@ -1,7 +1,7 @@
 """Specification of an experiment: all tables of a pipeline file, and their conversion to settings in SI units."""
 
 from dataclasses import fields
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, Field, create_model, model_validator
@@ -118,7 +118,7 @@ class DesignSection(DesignerSection):
     """Positions drawn from the belief over which the objective is averaged; 1 designs on the mean."""
     landmark_uncertainty: bool = False
     """Whether a landmark's covariance reduces the information of its path."""
-    gradient: Literal[get_args(GradientMode)] = "exact"  # type: ignore[valid-type]
+    gradient: GradientMode = "exact"
     """Gradient of a path's length with the agent's position in the design; the other three are the paper's."""
     least_snr_db: Decibel | None = None
     """SNR over all antennas at which the receiver detects a path every other time, for a design that weights paths by
