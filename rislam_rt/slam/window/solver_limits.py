@@ -15,8 +15,6 @@ STEPS = 4
 """Gauss-Newton steps of a hypothesis's fit: initial values are within the linear range of the truth."""
 HOPELESS = 30.0
 """Log likelihood behind the best hypothesis of a track from which on another is not fitted any further."""
-RIDGE = 1e-3
-"""Information [1/m^2] that keeps unobservable directions of a fit finite: (30 m)^-2."""
 POINTS = 8
 """Most normal points to which a track's history is condensed."""
 NEAR = np.array([0.3, 0.15, 0.15])
