@@ -35,8 +35,6 @@ CERTAIN = 30.0
 """Log odds to which those of a panel's identity are clipped."""
 FEWEST = 15
 """Measurements of a feature within the window from which on their residuals may remove it."""
-RECENT = 5
-"""Cycles within which a removed feature's path must have been detected for its measurements to go on as a track."""
 FAINT = 0.5
 """Integrated SNR below which a return is not predicted: it moves nothing in its cell by more than the noise does."""
 EDGE = 1.15
