@@ -13,8 +13,6 @@ DAMPING = 0.3
 """Weight of the new value in each update of a step's log acceleration precision."""
 STEPS = 4
 """Gauss-Newton steps of a hypothesis's fit: initial values are within the linear range of the truth."""
-HOPELESS = 30.0
-"""Log likelihood behind the best hypothesis of a track from which on another is not fitted any further."""
 POINTS = 8
 """Most normal points to which a track's history is condensed."""
 NEAR = np.array([0.3, 0.15, 0.15])
@@ -30,7 +28,8 @@ MISSED = 1.5
 DRAWS = 12
 """Samples of a place over which a panel's predicted gain is averaged."""
 CERTAIN = 30.0
-"""Log odds to which those of a panel's identity are clipped."""
+"""Log odds beyond which nothing is in doubt, at a probability of 1e-13: those of identities and direction priors are
+clipped to it, and what is as far behind a track's best hypothesis is not fitted any further."""
 FEWEST = 15
 """Measurements of a feature within the window from which on their residuals may remove it."""
 FAINT = 0.5

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.solver_limits import ASTRAY, HOPELESS, STEPS
+from rislam_rt.slam.window.solver_limits import ASTRAY, CERTAIN, STEPS
 
 
 class Trials(NamedTuple):
@@ -101,7 +101,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         if turn == 1:
             best = np.full(len(summary.seen), np.inf)
             np.minimum.at(best, trials.track, cost)
-            active = (cost < best[trials.track] + 2.0 * HOPELESS).nonzero()[0]
+            active = (cost < best[trials.track] + 2.0 * CERTAIN).nonzero()[0]
             lost = np.ones(count, dtype=np.bool_)
             lost[active] = False
             cost[lost] = np.inf

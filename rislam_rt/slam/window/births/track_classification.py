@@ -37,7 +37,7 @@ from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.births.unheard_returns import log_unheard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.solver_limits import HOPELESS
+from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -129,7 +129,7 @@ def _weigh(
     best = np.full(near, -np.inf)
     np.maximum.at(best, owner[track], np.where(np.isfinite(fits.cost), evidence, -np.inf))
     # so far behind nothing counts any more, whatever else speaks for it
-    fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * HOPELESS, np.inf, fits.cost))
+    fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * CERTAIN, np.inf, fits.cost))
     held = log_upright(table, fits, summary, known, landmarks, scene.use_vt)
     evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
     if scene.use_vt:
