@@ -38,10 +38,6 @@ the paths that are heard. Over known walls, of all walls together; of known poin
 MORE_UNKNOWN = 2
 """The same of a path of none of these kinds: over walls that the map lacks. Without wall returns most walls stay
 unknown: such paths are as frequent as points at least, and it counts none."""
-CLOSE = 0.8
-"""Gap in resolution cells below which two paths come out as one component beyond doubt."""
-LOG_APART = np.log(1e-4)
-"""Log probability that two paths more than a cell apart come out as one component."""
 ASIDE = 10.0
 """Log evidence behind a track's best hypothesis from which on another does not speak for other tracks, nor is asked for
 more."""
@@ -74,7 +70,7 @@ def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, c
     with a known level or upright wall, or is unresolved from it, as the hypothesis has it.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
-    so does its edge.
+    so does its edge. To come out as one more than a cell apart takes two rare events.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
@@ -85,9 +81,9 @@ def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, c
     for wall, clear in zip(aligned, heard, strict=True):
         rise = float(np.linalg.norm(known.place[wall] - summary.middle))
         gap = np.hypot(length, rise) - length
-        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
+        found += np.where((table.kind == WALL) & (gap < cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
-        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), LOG_APART, 0.0)
+        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), CONSTANTS.log_lost, 0.0)
     return found
 
 
