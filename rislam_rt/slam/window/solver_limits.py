@@ -1,6 +1,6 @@
 """Numerical limits of the window filter: solver steps, gates, and bounds beyond which an alternative is not examined.
 
-Some belong to the model and are not in its table: `EDGE`, `ALIGNED`, `LATELY`, `MISSED`.
+Some belong to the model and are not in its table: `EDGE`, `ALIGNED`, `LATELY`.
 """
 
 import numpy as np
@@ -23,8 +23,6 @@ NEARBY = 2.0
 """Distance [m] beyond which two hypothetical features are not compared."""
 LATELY = 5
 """Number of last steps that a manoeuvre may cover: one that began within half a second."""
-MISSED = 1.5
-"""Standard deviations by which fewer returns are detected than predicted, from which on a jump is looked for."""
 DRAWS = 12
 """Samples of a place over which a panel's predicted gain is averaged."""
 CERTAIN = 30.0
