@@ -39,7 +39,7 @@ MODES = 7
 ALIGNED = 0.2
 """Share of the paths over unknown walls that have them on the Tx leg alone, and so keep their direction of arrival."""
 STILL = 1e-5
-"""[m/s^2] acceleration along an axis that is known not to move."""
+"""What stands for zero: [m/s^2] of an axis that is known not to move, [m/s] least deviation of a rate of length."""
 ASTRAY = 0.3
 """[m] by which a step of a fit may go along directions in which a length alone tells nothing."""
 BEARINGS = 8
@@ -59,6 +59,3 @@ SWAYS = 5
 """Number of levels of the body's attitude, half a decade of angle apart."""
 PRIORS = 5
 """Number of priors of the vertical motion that are compared, from a level floor to what each step alone asks for."""
-FREE, STIFF = 1e3, 1e-5
-"""Standard deviation [m] of the constant that an unexplained track adds to its length, and the least one [m/s] of the
-rate that it adds, in `track_rates`."""
