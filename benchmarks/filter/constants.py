@@ -31,44 +31,48 @@ ROOT = Path(__file__).parents[2]
 TABLE = "rislam_rt.slam.model_constants"
 NUDGE = 1e-9
 """Reported deviations by which chance moves a measurement: next to nothing, but it decides what was undecided."""
-PROBABILITIES = (
-    "rare", "cleared", "shown", "square", "upright", "born", "company",
-    "DAMPING", "ALIGNED", "CUT",
-)  # fmt: skip
+PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born", "company", "DAMPING", "ALIGNED", "CUT")
 """Numbers whose odds are halved and doubled."""
-LOGARITHMS = ("DISMISSAL", "LOG_APART", "FAR_STRONGER")
+LOGARITHMS = ("DISMISSAL", "FAR_STRONGER")
 """Numbers that are logarithms: what they are the logarithm of is halved and doubled."""
 LABELS = (
-    "TX", "NONE", "UNTOLD", "OTHER", "PANEL", "UNUSED", "REMOVED", "NEW", "KNOWN", "OVER", "UNKNOWN", "UP", "TURN", "HEAD",
-    "POSE", "ONE", "TWO", "FIRST", "COLUMNS", "AXES", "DIAGONAL", "DIGITS", "WALL", "KNOWN_WALL", "WALL_KNOWN", "POINT",
-    "OVER_RX", "OVER_TX", "OVER_SAME", "TWO_WALLS", "BESIDE", "IMAGE", "TX_IMAGE", "BOTH_LEGS", "THEN_WALL", "WALL_THEN",
-    "OTHER_LEG", "IS_WALL", "IS_IMAGE", "IS_FAR", "IS_POINT", "COMMON", "MORE_WALLS", "UNIT_TILTS", "WIDTHS", "PANEL_STD",
+    "TX", "NONE", "UNTOLD", "OTHER", "PANEL", "UNUSED", "REMOVED", "NEW", "KNOWN", "OVER", "UNKNOWN", "UP",
+    "TURN", "HEAD", "POSE", "ONE", "TWO", "FIRST", "COLUMNS", "AXES", "DIAGONAL", "DIGITS", "WALL",
+    "KNOWN_WALL", "WALL_KNOWN", "POINT", "OVER_RX", "OVER_TX", "OVER_SAME", "TWO_WALLS", "BESIDE", "IMAGE",
+    "TX_IMAGE", "BOTH_LEGS", "THEN_WALL", "WALL_THEN", "OTHER_LEG", "IS_WALL", "IS_IMAGE", "IS_FAR",
+    "IS_POINT", "COMMON", "MORE_WALLS", "UNIT_TILTS", "WIDTHS", "PANEL_STD", "WANDER",
 )  # fmt: skip
 """Indices, names of kinds, unit vectors, and what follows from others: nothing that was set by hand."""
 
 
-class Changed(MetaPathFinder, SourceFileLoader):
+class Changed(MetaPathFinder):
     """Imports one module with one number at its top, or constant of its table, at another value."""
 
     def __init__(self, module: str, name: str, factor: float) -> None:
-        super().__init__(module, str(ROOT / (module.replace(".", "/") + ".py")))
-        self.module, self.number, self.factor = module, name, factor
+        self.module, self.name, self.factor = module, name, factor
 
     def find_spec(self, fullname: str, path: Any, target: ModuleType | None = None) -> ModuleSpec | None:
         """Where the module to change is found."""
         found = PathFinder.find_spec(fullname, path) if fullname == self.module else None
         if found:
-            found.loader, self.path = self, str(found.origin)
+            found.loader = _Loader(fullname, str(found.origin), self.name, self.factor)
         return found
 
+
+class _Loader(SourceFileLoader):
+    """Runs a module with one statement more, behind the one that sets the number."""
+
+    def __init__(self, module: str, path: str, name: str, factor: float) -> None:
+        super().__init__(module, path)
+        self.number, self.factor = name, factor
+
     def exec_module(self, module: ModuleType) -> None:
-        """Run the module with one statement more, behind the one that sets the number."""
         tree = ast.parse(Path(self.path).read_text(encoding="utf-8"))
         more = ast.parse(f"{self.number} = changed_({self.number!r}, {self.number}, {self.factor})").body[0]
-        for block in [tree, *(node for node in tree.body if isinstance(node, ast.ClassDef))]:
-            places = [place for place, node in enumerate(block.body) if self.number in _set_by(node)]
+        for block in [tree.body, *(node.body for node in tree.body if isinstance(node, ast.ClassDef))]:
+            places = [place for place, node in enumerate(block) if self.number in _set_by(node)]
             if places:
-                block.body.insert(places[-1] + 1, more)
+                block.insert(places[-1] + 1, more)
         vars(module)["changed_"] = changed
         exec(compile(tree, self.path, "exec"), vars(module))
 
@@ -186,7 +190,8 @@ def main() -> None:
     paths = sorted(chosen.recordings.glob(f"room_*/{chosen.pattern}"))[: chosen.rooms]
     if not paths:
         parser.error(f'no {chosen.pattern} in {chosen.recordings}/room_*: record with save = "components"')
-    names = [each for each in (numbers() if chosen.numbers else constants()) if not chosen.only or each[1] in chosen.only]
+    every = numbers() if chosen.numbers else constants()
+    names = [each for each in every if not chosen.only or each[1] in chosen.only]
     for line in study(paths, names, chosen.cycles):
         print(line, flush=True)
 
