@@ -35,9 +35,9 @@ from rislam_rt.slam.window.state import WindowState
 MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
 """Number of walls on a path of each kind beyond the one of a wall return: each takes its share of the power, and so of
 the paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
-MORE_UNKNOWN = 2
-"""The same of a path of none of these kinds: over walls that the map lacks. Without wall returns most walls stay
-unknown: such paths are as frequent as points at least, and it counts none."""
+MORE_UNKNOWN = int(MORE_WALLS.max())
+"""The same of a path of none of these kinds, as many as of any of them: over walls that the map lacks. Without wall
+returns most walls stay unknown: such paths are as frequent as points at least, and it counts none."""
 ASIDE = 10.0
 """Log evidence behind a track's best hypothesis from which on another does not speak for other tracks, nor is asked for
 more."""
