@@ -27,7 +27,7 @@ DRAWS = 12
 """Samples of a place over which a panel's predicted gain is averaged."""
 CERTAIN = 30.0
 """Log odds beyond which nothing is in doubt, at a probability of 1e-13: those of identities and direction priors are
-clipped to it, and what is as far behind a track's best hypothesis is not fitted any further."""
+clipped to it, and what is as far behind a track's best hypothesis is not asked for anything more."""
 FEWEST = 15
 """Measurements of a feature within the window from which on their residuals may remove it."""
 FAINT = 0.5

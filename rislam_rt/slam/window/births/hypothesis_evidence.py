@@ -29,7 +29,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors
-from rislam_rt.slam.window.solver_limits import NEARBY
+from rislam_rt.slam.window.solver_limits import CERTAIN, NEARBY
 from rislam_rt.slam.window.state import WindowState
 
 MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
@@ -38,9 +38,6 @@ the paths that are heard. Over known walls, of all walls together; of known poin
 MORE_UNKNOWN = int(MORE_WALLS.max())
 """The same of a path of none of these kinds, as many as of any of them: over walls that the map lacks. Without wall
 returns most walls stay unknown: such paths are as frequent as points at least, and it counts none."""
-ASIDE = 10.0
-"""Log evidence behind a track's best hypothesis from which on another does not speak for other tracks, nor is asked for
-more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
@@ -103,7 +100,7 @@ def log_shared(
         total[row] = np.logaddexp(total[row], value)
     best = np.full(count, -np.inf)
     np.maximum.at(best, track, evidence)
-    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - ASIDE) & ~table.trials.is_pair)
+    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - CERTAIN) & ~table.trials.is_pair)
     wall = table.trials.is_wall[good]
     same = (wall[:, None] == wall) & (track[good][:, None] != track[good])
     off = fits.place[good][:, None] - fits.place[good]
