@@ -70,7 +70,7 @@ class _Loader(SourceFileLoader):
         tree = ast.parse(Path(self.path).read_text(encoding="utf-8"))
         more = ast.parse(f"{self.number} = changed_({self.number!r}, {self.number}, {self.factor})").body[0]
         for block in [tree.body, *(node.body for node in tree.body if isinstance(node, ast.ClassDef))]:
-            places = [place for place, node in enumerate(block) if self.number in _set_by(node)]
+            places = [place for place, node in enumerate(block) if self.number in names_set(node)]
             if places:
                 block.insert(places[-1] + 1, more)
         vars(module)["changed_"] = changed
@@ -90,7 +90,7 @@ def changed(name: str, value: Any, factor: float) -> Any:
     return max(1, round(factor * value)) if isinstance(value, int) else factor * value
 
 
-def _set_by(node: ast.stmt) -> list[str]:
+def names_set(node: ast.stmt) -> list[str]:
     """Names that a statement sets."""
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
     flat = [one for target in targets for one in (target.elts if isinstance(target, ast.Tuple) else [target])]
@@ -108,7 +108,7 @@ def numbers() -> list[tuple[str, str]]:
     for file in [*sorted(slam.glob("*.py")), *sorted((slam / "window").rglob("*.py"))]:
         if file.stem not in ("nested_config", "config", "input_checks", "__init__"):
             module = import_module(".".join(file.relative_to(ROOT).with_suffix("").parts))
-            for name in [name for node in ast.parse(file.read_text(encoding="utf-8")).body for name in _set_by(node)]:
+            for name in [name for node in ast.parse(file.read_text(encoding="utf-8")).body for name in names_set(node)]:
                 if name.isupper() and name not in LABELS and isinstance(vars(module)[name], int | float | np.ndarray):
                     found.append((module.__name__, name))
     return found

@@ -1,6 +1,6 @@
 """Numerical limits of the window filter: solver steps, gates, and bounds beyond which an alternative is not examined.
 
-Some belong to the model and are not in its table: `EDGE`, `ALIGNED`, `LATELY`.
+Some belong to a model and not here: docs/slam.md, `Numbers beside the constants`, says which.
 """
 
 import numpy as np
