@@ -38,6 +38,8 @@ the paths that are heard. Over known walls, of all walls together; of known poin
 MORE_UNKNOWN = int(MORE_WALLS.max())
 """The same of a path of none of these kinds, as many as of any of them: over walls that the map lacks. Without wall
 returns most walls stay unknown: such paths are as frequent as points at least, and it counts none."""
+CLOSE = 0.8
+"""Gap in resolution cells below which two paths come out as one component beyond doubt."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
@@ -78,7 +80,7 @@ def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, c
     for wall, clear in zip(aligned, heard, strict=True):
         rise = float(np.linalg.norm(known.place[wall] - summary.middle))
         gap = np.hypot(length, rise) - length
-        found += np.where((table.kind == WALL) & (gap < cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
+        found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), CONSTANTS.log_lost, 0.0)
     return found
