@@ -33,7 +33,7 @@ NUDGE = 1e-9
 """Reported deviations by which chance moves a measurement: next to nothing, but it decides what was undecided."""
 PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born", "company", "DAMPING", "ALIGNED", "CUT")
 """Numbers whose odds are halved and doubled."""
-LOGARITHMS = ("DISMISSAL",)
+LOGARITHMS = ("DISMISSAL", "FAR_STRONGER")
 """Numbers that are logarithms: what they are the logarithm of is halved and doubled."""
 LABELS = (
     "TX", "NONE", "UNTOLD", "OTHER", "PANEL", "UNUSED", "REMOVED", "NEW", "KNOWN", "OVER", "UNKNOWN", "UP",

@@ -84,10 +84,14 @@ def echoes(observed: Observations, cell: Floats) -> Booleans:
     if observed.panel_odds is None:
         return found
     found = observed.odds < 0.0
-    row, other = (observed.log_amplitude > observed.log_amplitude[found, None]).nonzero()
+    row, other = (observed.log_amplitude > observed.log_amplitude[found, None] + FAR_STRONGER).nonzero()
     inside = (np.abs(observed.seen[found][row] - observed.seen[other]) < cell).all(axis=1)
     found[found] = np.bincount(row[inside], minlength=int(found.sum())) > 0
     return found
+
+
+FAR_STRONGER = 1.0
+"""Least difference in log amplitude between a component and its echo: a turn of a fifth of a radian leaves a tenth."""
 
 
 def associate_cycle(

@@ -17,6 +17,8 @@ POINTS = 8
 """Most normal points to which a track's history is condensed."""
 NEAR = np.array([0.3, 0.15, 0.15])
 """Gap in length [m] and cosines up to which a predicted return of the map is weighed as a track's explanation."""
+MOST = 2
+"""Most predicted returns of the map, the nearest, that are weighed as explanations of one track."""
 STRIDE = 3
 """Cycles between two examinations of tracks for births."""
 NEARBY = 2.0

@@ -15,7 +15,7 @@ from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
-from rislam_rt.slam.window.solver_limits import NEAR, STRENGTHS
+from rislam_rt.slam.window.solver_limits import MOST, NEAR, STRENGTHS
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -47,7 +47,7 @@ def explanations(
     for row, place in enumerate(rows):
         off = np.abs(lead + share * groups.gap - context.tracks.mean[place, :, 0]) / NEAR
         near = (off < 1.0).all(axis=1).nonzero()[0]
-        for column in near[np.argsort(off[near].sum(axis=1))].tolist():
+        for column in near[np.argsort(off[near].sum(axis=1))][:MOST].tolist():
             found.append(_explanation(context, histories, row, view, column, mean[HEAD:].reshape(-1, 3), root))
     return found
 
