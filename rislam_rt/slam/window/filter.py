@@ -34,7 +34,7 @@ from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import MISSED, REFRESH
+from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
 
@@ -164,14 +164,14 @@ def _associate_over_motions(
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
-    if best.surprise > MISSED and learnt and window.turns and (window.step[-1:] > 0.0).any():
+    if best.surprise > CONSTANTS.fit and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
         trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
         trial = divergence_monitor.turned(trial, angle)
         view = view_of(trial)
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial
-    if best.surprise > MISSED and (state.window.step[-2:] > 0.0).sum() == 2:
+    if best.surprise > CONSTANTS.fit and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):

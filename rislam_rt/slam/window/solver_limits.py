@@ -1,6 +1,6 @@
 """Numerical limits of the window filter: solver steps, gates, and bounds beyond which an alternative is not examined.
 
-Some belong to the model and are not in its table: `EDGE`, `ALIGNED`, `LATELY`, `MISSED`.
+Some belong to a model and not here: docs/slam.md, `Numbers beside the constants`, says which.
 """
 
 import numpy as np
@@ -13,10 +13,6 @@ DAMPING = 0.3
 """Weight of the new value in each update of a step's log acceleration precision."""
 STEPS = 4
 """Gauss-Newton steps of a hypothesis's fit: initial values are within the linear range of the truth."""
-HOPELESS = 30.0
-"""Log likelihood behind the best hypothesis of a track from which on another is not fitted any further."""
-RIDGE = 1e-3
-"""Information [1/m^2] that keeps unobservable directions of a fit finite: (30 m)^-2."""
 POINTS = 8
 """Most normal points to which a track's history is condensed."""
 NEAR = np.array([0.3, 0.15, 0.15])
@@ -29,16 +25,13 @@ NEARBY = 2.0
 """Distance [m] beyond which two hypothetical features are not compared."""
 LATELY = 5
 """Number of last steps that a manoeuvre may cover: one that began within half a second."""
-MISSED = 1.5
-"""Standard deviations by which fewer returns are detected than predicted, from which on a jump is looked for."""
 DRAWS = 12
 """Samples of a place over which a panel's predicted gain is averaged."""
 CERTAIN = 30.0
-"""Log odds to which those of a panel's identity are clipped."""
+"""Log odds beyond which nothing is in doubt, at a probability of 1e-13: those of identities and direction priors are
+clipped to it, and what is as far behind a track's best hypothesis is not asked for anything more."""
 FEWEST = 15
 """Measurements of a feature within the window from which on their residuals may remove it."""
-RECENT = 5
-"""Cycles within which a removed feature's path must have been detected for its measurements to go on as a track."""
 FAINT = 0.5
 """Integrated SNR below which a return is not predicted: it moves nothing in its cell by more than the noise does."""
 EDGE = 1.15
@@ -48,7 +41,7 @@ MODES = 7
 ALIGNED = 0.2
 """Share of the paths over unknown walls that have them on the Tx leg alone, and so keep their direction of arrival."""
 STILL = 1e-5
-"""[m/s^2] acceleration along an axis that is known not to move."""
+"""What stands for zero: [m/s^2] of an axis that is known not to move, [m/s] least deviation of a rate of length."""
 ASTRAY = 0.3
 """[m] by which a step of a fit may go along directions in which a length alone tells nothing."""
 BEARINGS = 8
@@ -68,6 +61,3 @@ SWAYS = 5
 """Number of levels of the body's attitude, half a decade of angle apart."""
 PRIORS = 5
 """Number of priors of the vertical motion that are compared, from a level floor to what each step alone asks for."""
-FREE, STIFF = 1e3, 1e-5
-"""Standard deviation [m] of the constant that an unexplained track adds to its length, and the least one [m/s] of the
-rate that it adds, in `track_rates`."""

@@ -13,11 +13,12 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.egomotion import MEASURED
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
-from rislam_rt.slam.window.solver_limits import FREE, STIFF
+from rislam_rt.slam.window.solver_limits import STILL
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -110,7 +111,7 @@ def _histories(state: WindowState, rows: Integers, which: Integers, slot: Intege
     length = log.seen[rows, 0]
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     apart = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
-    own = (apart**2 + doubt) * speed**2 + turning**2 + STIFF**2
+    own = (apart**2 + doubt) * speed**2 + turning**2 + STILL**2
     weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
     return _Histories(
         which, slot, time, length, weight, toward, length - (follow - follow[first][which]), ends, span, speed, own
@@ -191,7 +192,7 @@ def _own_numbers(found: _Histories, weight: Floats) -> Floats:
     """Derivatives (N, 2) of the components' lengths by the two unknowns of their track, a constant and a rate, as
     numbers of unit information under weights (N,) and what is known beforehand: to be eliminated."""
     s, sx, sxx = (found.total(weight * found.time**power) for power in range(3))
-    s, sxx = s + FREE**-2.0, sxx + 1.0 / found.own_variance
+    s, sxx = s + FAR**-2.0, sxx + 1.0 / found.own_variance
     constant, rate, lean = np.sqrt(sxx / (s * sxx - sx**2)), 1.0 / np.sqrt(sxx), sx / sxx
     which, time = found.which, found.time
     return np.stack([constant[which] * (1.0 - lean[which] * time), rate[which] * time], axis=1)

@@ -10,11 +10,13 @@ from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.horizon_detection import Elevations, elevations, nothing_heard
+from rislam_rt.slam.window.landmarks.measurement_prediction import PANEL_STD
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.solver_limits import GATE
 
-WANDER = 1.0
-"""Standard deviation of an unexplained path's log amplitude from cycle to cycle: a panel's code may change."""
+WANDER = np.sqrt(2.0) * PANEL_STD
+"""Standard deviation of an unexplained path's log amplitude from cycle to cycle: of the difference of a panel's under
+two codes."""
 CYCLE = 0.1
 """Time [s] assumed between two cycles whose time step is told as zero."""
 

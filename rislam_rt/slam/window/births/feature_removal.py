@@ -12,7 +12,7 @@ from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.solver_limits import FEWEST, RECENT
+from rislam_rt.slam.window.solver_limits import FEWEST
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -52,7 +52,7 @@ def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Fl
     ident, time = tracks.next_ident, np.concatenate([[0.0], np.cumsum(step)])
     for number in np.unique(which[lost]):
         rows = (lost & (which == number)).nonzero()[0]
-        if len(rows) < 4 or log.cycle[rows[-1]] < cycle - RECENT or forms[number][0] == UNKNOWN:
+        if len(rows) < 4 or forms[number][0] == UNKNOWN:
             continue
         late = rows[-8:]
         when = time[log.cycle[late] - cycle - 1]

@@ -29,22 +29,17 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors
-from rislam_rt.slam.window.solver_limits import NEARBY
+from rislam_rt.slam.window.solver_limits import CERTAIN, NEARBY
 from rislam_rt.slam.window.state import WindowState
 
 MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
 """Number of walls on a path of each kind beyond the one of a wall return: each takes its share of the power, and so of
 the paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
-MORE_UNKNOWN = 2
-"""The same of a path of none of these kinds: over walls that the map lacks. Without wall returns most walls stay
-unknown: such paths are as frequent as points at least, and it counts none."""
+MORE_UNKNOWN = int(MORE_WALLS.max())
+"""The same of a path of none of these kinds, as many as of any of them: over walls that the map lacks. Without wall
+returns most walls stay unknown: such paths are as frequent as points at least, and it counts none."""
 CLOSE = 0.8
 """Gap in resolution cells below which two paths come out as one component beyond doubt."""
-LOG_APART = np.log(1e-4)
-"""Log probability that two paths more than a cell apart come out as one component."""
-ASIDE = 10.0
-"""Log evidence behind a track's best hypothesis from which on another does not speak for other tracks, nor is asked for
-more."""
 
 
 def log_kind(table: Hypotheses, landmarks: WindowTable) -> Floats:
@@ -74,7 +69,7 @@ def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, c
     with a known level or upright wall, or is unresolved from it, as the hypothesis has it.
 
     It hangs on how far apart the two would be, and on whether that other wall is heard by itself: where it ends,
-    so does its edge.
+    so does its edge. To come out as one more than a cell apart takes two rare events.
     """
     landmarks, scene = context.landmarks, context.scene
     track, found = table.trials.track, np.zeros(len(table.kind))
@@ -87,7 +82,7 @@ def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, c
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
-        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), LOG_APART, 0.0)
+        found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), CONSTANTS.log_lost, 0.0)
     return found
 
 
@@ -107,7 +102,7 @@ def log_shared(
         total[row] = np.logaddexp(total[row], value)
     best = np.full(count, -np.inf)
     np.maximum.at(best, track, evidence)
-    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - ASIDE) & ~table.trials.is_pair)
+    good = np.flatnonzero(np.isfinite(evidence) & (evidence > best[track] - CERTAIN) & ~table.trials.is_pair)
     wall = table.trials.is_wall[good]
     same = (wall[:, None] == wall) & (track[good][:, None] != track[good])
     off = fits.place[good][:, None] - fits.place[good]

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.solver_limits import ASTRAY, HOPELESS, RIDGE, STEPS
+from rislam_rt.slam.window.solver_limits import ASTRAY, CERTAIN, STEPS
 
 
 class Trials(NamedTuple):
@@ -101,7 +101,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         if turn == 1:
             best = np.full(len(summary.seen), np.inf)
             np.minimum.at(best, trials.track, cost)
-            active = (cost < best[trials.track] + 2.0 * HOPELESS).nonzero()[0]
+            active = (cost < best[trials.track] + 2.0 * CERTAIN).nonzero()[0]
             lost = np.ones(count, dtype=np.bool_)
             lost[active] = False
             cost[lost] = np.inf
@@ -185,7 +185,8 @@ def _equations(
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
     normal[:, np.arange(size), np.arange(size)] *= 1.0 + 1e-12  # a blind direction that rounding would make singular
     normal[:, common, common] += 1.0
-    normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), RIDGE)[:, None]
+    ridge = (2.0 * CONSTANTS.size) ** -2.0  # what nothing tells of lies in the room
+    normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), ridge)[:, None]
     slope[:, common] -= error
     tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)

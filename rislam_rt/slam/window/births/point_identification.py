@@ -27,9 +27,6 @@ from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
-ASIDE = 12.0
-"""Log evidence behind a track's best point hypothesis from which on another is not weighed as a panel."""
-
 
 class Identified(NamedTuple):
     """Panel identities of the points of H hypotheses, and what they add to the evidence of T tracks."""
@@ -63,7 +60,7 @@ def identify(
         if (context.log.side[at] == OTHER).all():
             found.identity.log_ris[rows] = -CERTAIN
             continue
-        near = rows[evidence[rows] > evidence[rows].max() - ASIDE]
+        near = rows[evidence[rows] > evidence[rows].max() - CERTAIN]
         fresh = _history(context, at, table, fits, np.append(near, rows[0]))
         fresh.log_ris[:-1] += taken
         found.gain[near] = np.logaddexp.reduce(np.pad(fresh.log_ris[:-1], ((0, 0), (1, 0))), axis=1)

@@ -1,8 +1,10 @@
 """Track classification: the posterior over all hypotheses of what caused a track, each with at most one new feature."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
@@ -35,7 +37,7 @@ from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.births.unheard_returns import log_unheard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
-from rislam_rt.slam.window.solver_limits import HOPELESS
+from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -127,7 +129,7 @@ def _weigh(
     best = np.full(near, -np.inf)
     np.maximum.at(best, owner[track], np.where(np.isfinite(fits.cost), evidence, -np.inf))
     # so far behind nothing counts any more, whatever else speaks for it
-    fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * HOPELESS, np.inf, fits.cost))
+    fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * CERTAIN, np.inf, fits.cost))
     held = log_upright(table, fits, summary, known, landmarks, scene.use_vt)
     evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
     if scene.use_vt:
@@ -189,7 +191,8 @@ def decide_tracks(
             continue
         at = own[best - 1]
         count = int((summary.weight[row, :, 0] > 0.0).sum())
-        misfit = (fits.cost[at] - COST_MEAN * (count - 1.0)) / (COST_STD * np.sqrt(count))
+        mean, std = cost_under_noise(CONSTANTS.tail)
+        misfit = (fits.cost[at] - mean * (count - 1.0)) / (std * np.sqrt(count))
         decisions.append(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
@@ -225,9 +228,14 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
     return np.asarray(near & (wall[own] == wall[at]) & ~pair[own] & np.isfinite(fits.cost[own]) & (own != at))
 
 
-COST_MEAN, COST_STD = 3.56, 2.17
-"""Mean and standard deviation of a fit's cost per measurement under noise alone: `(4 + 3) log(1 + chi^2 / 4)` for chi^2
-with 3 degrees of freedom."""
+@lru_cache(maxsize=4)
+def cost_under_noise(tail: float) -> tuple[float, float]:
+    """Mean and standard deviation of a fit's cost per measurement under noise alone, by which tracks are classified:
+    `(tail + 3) log(1 + chi^2 / tail)` for chi^2 with 3 degrees of freedom, by Gauss-Laguerre quadrature."""
+    half, weight = scipy.special.roots_genlaguerre(64, 0.5)
+    cost, weight = (tail + 3.0) * np.log1p(2.0 * half / tail), weight / weight.sum()
+    mean = float(weight @ cost)
+    return mean, float(np.sqrt(weight @ (cost - mean) ** 2))
 
 
 def is_clear(decision: TrackDecision, log_ratio: float = 0.0) -> bool:

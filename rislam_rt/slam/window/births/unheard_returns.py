@@ -11,12 +11,12 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.predicted_returns import poses_of, reflect
 from rislam_rt.slam.window.births.hypotheses import Hypotheses
-from rislam_rt.slam.window.births.hypothesis_evidence import ASIDE
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.horizon_detection import Elevations, above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.window_gaussian import poses
+from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -33,7 +33,7 @@ def log_unheard(
     found, track = np.zeros(len(table.kind)), owner[table.trials.track]
     best = np.full(len(track_rows), -np.inf)
     np.maximum.at(best, track, evidence)
-    rows = (over_known(table) & (evidence > best[track] - ASIDE)).nonzero()[0]
+    rows = (over_known(table) & (evidence > best[track] - CERTAIN)).nonzero()[0]
     if not len(rows):
         return found
     log, scene, where = context.log, context.scene, poses(context.window)

@@ -21,8 +21,6 @@ from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 
 CELL = 0.01
 """Distance [m] within which two positions are one: as far as a cycle's returns tell."""
-FEWEST = 3
-"""Pairs of a predicted return and a component without which no jump is estimated."""
 CUT = 0.7
 """Probability that a track ends in a cycle with a jump, besides what silences it in any other."""
 PAIRS = 60
@@ -59,7 +57,7 @@ def jump(view: CycleAssociation, observed: Observations) -> Floats:
     row, column = row[alike], column[alike]
     near = np.argsort(off[row, column], kind="stable")[:PAIRS]
     row, column = row[near], column[near]
-    if len(row) < FEWEST:
+    if len(row) < egomotion.FEWEST:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
     found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
@@ -81,7 +79,7 @@ def turn(view: CycleAssociation, observed: Observations, cell: float) -> float:
     by = np.exp(1j * np.angle(flat[row] * seen[column].conj()))
     agree = np.abs(by[:, None] - by) < ALIKE
     count = [len(np.unique(row[near])) for near in agree]
-    if max(count, default=0) < FEWEST:
+    if max(count, default=0) < egomotion.FEWEST:
         return 0.0
     return float(np.angle(by[agree[int(np.argmax(count))]].sum()))
 

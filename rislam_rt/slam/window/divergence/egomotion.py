@@ -21,7 +21,8 @@ from rislam_rt.slam.window.measurement_log import Log, unique_forms
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for."""
 FEWEST = 3
-"""Tracks with a rate of length from which on the motion is checked."""
+"""Tracks with a rate of length from which on the motion is checked, and pairs of a return and a component from which on
+a jump or a turn is: two agree on any horizontal motion."""
 
 
 class Rates(NamedTuple):

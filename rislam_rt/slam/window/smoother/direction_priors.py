@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.window.solver_limits import CERTAIN
 
 
 class DirectionPriors(NamedTuple):
@@ -42,7 +43,7 @@ class DirectionPriors(NamedTuple):
         cavity = (middle / variance - own * self.aim) / left
         spread = 1.0 / left + self.std**2
         log_right = -0.5 * (cavity - self.aim) ** 2 / spread - 0.5 * np.log(2.0 * np.pi * spread)
-        odds = np.clip(self.log_odds + log_right, -30.0, 30.0)
+        odds = np.clip(self.log_odds + log_right, -CERTAIN, CERTAIN)
         return self._replace(probability=1.0 / (1.0 + np.exp(-odds)))
 
 
