@@ -150,9 +150,14 @@ def _carried(window: Window, rows: Floats) -> Floats:
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
+def mean_now(window: Window) -> Floats:
+    """Mean (7 + 3F,) of the sliding window's last pose, its velocity, the compass offset, and the features."""
+    unknowns = np.concatenate([window.head, window.accel.ravel()])
+    return np.concatenate([_carried(window, unknowns), window.head[HEAD:]])
+
+
 def now(window: Window) -> tuple[Floats, Floats]:
-    """Mean (7 + 3F,) and covariance of the sliding window's last pose, its velocity, the compass offset, and the
-    features."""
+    """Mean (7 + 3F,) of the present as in `mean_now`, and its covariance."""
     return now_with_excess(window)[:2]
 
 
@@ -171,8 +176,7 @@ def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
     covariance = window.covariance[:size, :size].copy()
     covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
     covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
-    mean = np.append(_carried(window, np.append(window.head, window.accel)), window.head[HEAD:])
-    return mean, covariance, excess
+    return mean_now(window), covariance, excess
 
 
 def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
