@@ -144,8 +144,8 @@ def weigh_tilts(
 def _chance(above: Floats, shows: Floats, asked: Booleans, heard: Booleans) -> Floats:
     """Probability (..., R) of what was heard of returns above the horizon with probabilities `above`; what is heard
     where a return should be may be something else."""
-    hit = CONSTANTS.rare + (1.0 - CONSTANTS.rare) * above
-    return np.where(asked, np.where(heard, hit, 1.0 - shows * above), 1.0)
+    below = np.where(asked & heard, CONSTANTS.rare, 1.0)
+    return below + above * np.where(asked, np.where(heard, 1.0 - CONSTANTS.rare, -shows), 0.0)
 
 
 def prior_tilts(probability: Floats) -> Tilts:
