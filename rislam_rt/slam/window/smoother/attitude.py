@@ -124,7 +124,7 @@ def _precision(every: Floats, told: Attitude) -> Floats:
 def posterior(variance: Floats, told: Attitude) -> tuple[Floats, Floats]:
     """Means (..., A) [rad] and covariances (..., A, A) of a cycle's rotation with prior variances (..., A) after what
     is `told` of it (K = 1)."""
-    covariance = np.linalg.inv(_precision(variance, told))
+    covariance = np.asarray(np.linalg.inv(_precision(variance, told)), dtype=np.float64)
     return covariance @ told.slope[0], covariance
 
 
