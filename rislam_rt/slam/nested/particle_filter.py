@@ -183,7 +183,7 @@ def _seen(front: WindowState, view: CycleAssociation, used: Booleans) -> Seen:
     at = np.searchsorted(log.cycle, front.cycle) + view.pick[used]
     returns = compile_forms(front.landmarks.rows(log.form[at, 0]))
     seen = log.seen[at] - log.share[at, None] * view.groups.gap[row]
-    return Seen(returns, front.landmarks.anchor, front.scene.body, seen, log.momentary[at] + FLOOR**2)
+    return Seen(returns, front.landmarks.anchor, front.scene.body, seen, log.momentary(at) + FLOOR**2)
 
 
 def _classify(front: WindowState, config: SlamConfig) -> tuple[WindowState, Booleans]:
@@ -238,7 +238,7 @@ def _history(front: WindowState, row: int) -> LandmarkHistory:
     prior = np.linalg.inv(information)
     return LandmarkHistory(
         compile_forms(own[None]), known, landmarks.anchor[local], prior @ place, prior, slots, seen,
-        log.momentary[at],
+        log.momentary(at),
     )  # fmt: skip
 
 

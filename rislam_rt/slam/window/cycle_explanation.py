@@ -227,7 +227,7 @@ def beside_panels(
     they ran over a panel, or none is known."""
     if observed.side is not None or max(state.landmarks.panels) < 0:
         return None
-    speed = float(np.linalg.norm(window_gaussian.now(state.window)[0][3:6]))
+    speed = float(np.linalg.norm(window_gaussian.mean_now(state.window)[3:6]))
     sway = attitude.spread(observed.seen[:, 1:], np.diag(state.attitude_variance))
     return tracks.continuations(_predicted(state.tracks, speed, dt, turn, bend), observed, sway, state.cycle)
 

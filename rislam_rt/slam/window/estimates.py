@@ -27,7 +27,7 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
     unknown = [panel for panel, row in enumerate(state.landmarks.panels) if row < 0]
     if state.scene.ris is None or not unknown:
         return ahead
-    mean, _ = window_gaussian.now(state.window)
+    mean = window_gaussian.mean_now(state.window)
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
     found = [find_candidate(state.tracks, state.landmarks, mean, state.cycle - 1, poses, panel) for panel in unknown]
     return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))

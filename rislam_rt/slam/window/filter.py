@@ -198,8 +198,7 @@ def _solve(
     known = np.concatenate([state.attitude_information[:-1], told.information])
     state = state._replace(sway=sway, attitude_information=known)
     variance, last = state.attitude_variance, state.window.num_poses - 1
-    covariance = state.attitude_covariance[-1]
-    rotation = covariance @ told.slope[0]
+    rotation, covariance = attitude.posterior(variance, told)
     state = level(state, last, rotation[None])
     innovation = innovation - turned @ rotation
     window = window_gaussian.with_present(

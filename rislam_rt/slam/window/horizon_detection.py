@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.attitude import Tilts
@@ -70,11 +70,13 @@ def _near(returns: Elevations, log_like: Floats) -> _Near:
     return _Near(row, share / share.sum(axis=1, keepdims=True), returns.slopes[row])
 
 
-def _above(near: _Near, tilts: Tilts) -> tuple[Floats, Booleans]:
-    """Probability (L, N, R) that near returns arrive above the plane of the array under each tilt, and whether they do
-    so at each elevation (L, N, R, Z)."""
-    over = (tilts.point @ near.slopes.T)[..., None] >= -GRAZING - RISES
-    return (over * near.share).sum(axis=-1), over
+def _above(near: _Near, tilts: Tilts) -> tuple[Floats, Integers]:
+    """Probability (L, N, R) that near returns arrive above the plane of the array under each tilt, and the lowest of
+    the elevations (L, N, R) at which they do so, as an index; `len(RISES)` for none."""
+    lowest = np.searchsorted(GRAZING + RISES, -(tilts.point @ near.slopes.T))
+    beyond = np.zeros((len(near.row), len(RISES) + 1))
+    beyond[:, :-1] = near.share[:, ::-1].cumsum(axis=1)[:, ::-1]
+    return beyond[np.arange(len(beyond)), lowest], lowest
 
 
 def expected_above(returns: Elevations, log_like: Floats, tilts: Tilts) -> Floats:
@@ -121,7 +123,7 @@ def weigh_tilts(
     """Weigh the tilts of a cycle by which of the returns that are `asked` (R,), and detected with probabilities
     `shows` (R,) were they above the plane, are `heard` (R,)."""
     near, above = _near(returns, log_like), np.ones(len(returns.rise))
-    (each, over), row, fresh = _above(near, tilts), near.row, log_like.copy()
+    (each, lowest), row, fresh = _above(near, tilts), near.row, log_like.copy()
     chance = _chance(each, shows[row], asked[row], heard[row])
     joint = np.log(chance).sum(axis=2)
     weight = tilts.weight * np.exp(joint - joint.max())
@@ -130,7 +132,9 @@ def weigh_tilts(
     others = weight[..., None] / chance
     others /= others.sum(axis=(0, 1))
     above[row] = np.einsum("lnr,lnr->r", others, each)
-    by_rise = np.einsum("lnr,lnrz->zr", others, over)
+    size = len(RISES) + 1
+    first = np.bincount((lowest + size * np.arange(len(row))).ravel(), others.ravel(), size * len(row))
+    by_rise = first.reshape(-1, size)[:, :-1].cumsum(axis=1).T
     fresh[row] += np.log(_chance(by_rise, shows[row], asked[row], heard[row])).T
     apart = np.log(np.tensordot(tilts.weight, chance, 2)).sum()
     gain = float(np.log(total) + joint.max() - apart)
@@ -140,8 +144,8 @@ def weigh_tilts(
 def _chance(above: Floats, shows: Floats, asked: Booleans, heard: Booleans) -> Floats:
     """Probability (..., R) of what was heard of returns above the horizon with probabilities `above`; what is heard
     where a return should be may be something else."""
-    hit = CONSTANTS.rare + (1.0 - CONSTANTS.rare) * above
-    return np.where(asked, np.where(heard, hit, 1.0 - shows * above), 1.0)
+    below = np.where(asked & heard, CONSTANTS.rare, 1.0)
+    return below + above * np.where(asked, np.where(heard, 1.0 - CONSTANTS.rare, -shows), 0.0)
 
 
 def prior_tilts(probability: Floats) -> Tilts:

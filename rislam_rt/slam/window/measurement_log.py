@@ -52,17 +52,17 @@ class Log(NamedTuple):
         form[rows], shares[rows], variance[rows], known[rows] = forms, share, shared + scatter, shared
         return self._replace(form=form, share=shares, extra=variance, shared=known)
 
-    @property
-    def momentary(self) -> Floats:
-        """Variance (N, 3) of each measurement taken alone: scatter counts `memory` times in `extra`, as its pull keeps
-        its sign for as many cycles."""
-        return np.asarray(self.std**2 + self.shared + (self.extra - self.shared) / CONSTANTS.memory)
+    def momentary(self, rows: Integers) -> Floats:
+        """Variance (A, 3) of each of the measurements `rows` (A,) taken alone: scatter counts `memory` times in
+        `extra`, as its pull keeps its sign for as many cycles."""
+        std, extra, shared = self.std[rows], self.extra[rows], self.shared[rows]
+        return np.asarray(std**2 + shared + (extra - shared) / CONSTANTS.memory)
 
     def sharper(self, rows: Integers) -> Floats:
         """Factor (A, 3) by which residuals of the components `rows` (A,) grow where they are measured in deviations of
         their own cycle (`momentary`), not in those by which they are weighed in the window."""
         whole = self.std[rows] ** 2 + self.extra[rows]
-        return np.asarray(np.sqrt(whole / self.momentary[rows]))
+        return np.asarray(np.sqrt(whole / self.momentary(rows)))
 
     def mirrored(self, spacing: float) -> Booleans:
         """Whether each component's cosines (N, 2) may as well be one period of the array off, whose antennas stand
@@ -127,7 +127,7 @@ def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float) -> F
     The estimate has followed the measurement by as much as it was free to, so that a residual is smaller than the
     error is (the E step of expectation maximisation, Dempster et al. 1977).
     """
-    std, extra, now = (field[rows] for field in (log.std, log.extra, log.momentary))
+    std, extra, now = log.std[rows], log.extra[rows], log.momentary(rows)
     return np.asarray(np.mean(left**2 * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
 
 

@@ -75,13 +75,12 @@ def rate_factor(state: WindowState) -> RateFactor | None:
         return None
     first = state.cycle - window.num_poses + 1
     rows = (~log.explained & (log.track >= 0) & (log.cycle >= first)).nonzero()[0]
-    _, which, count = np.unique(log.track[rows], return_inverse=True, return_counts=True)
-    long = count >= MEASURED
-    rows, which = rows[long[which]], (np.cumsum(long) - 1)[which[long[which]]]
+    rows = rows[np.bincount(log.track[rows])[log.track[rows]] >= MEASURED]
     if not len(rows) or not (window.step > 0.0).all():
         return None
-    order = np.argsort(which, kind="stable")
-    found = _histories(state, rows[order], which[order], log.cycle[rows[order]] - first)
+    rows = rows[np.argsort(log.track[rows], kind="stable")]
+    which = np.cumsum(np.diff(log.track[rows], prepend=log.track[rows[0]]) != 0)
+    found = _histories(state, rows, which, log.cycle[rows] - first)
     return _factor(found, _shares(found, state), state)
 
 

@@ -112,16 +112,20 @@ def next_levels(before: Floats, told: Attitude) -> Floats:
 
 def _variances(probability: Floats) -> Floats:
     """Variances (C, L, A) [rad^2] of the attitude with one chain at one of its levels, the other as expected."""
-    axes, expected = AXES[: len(probability) + 1], variance(probability)
-    every = np.tile(expected, (len(probability), SWAYS, 1))
-    for chain in range(len(probability)):
-        every[chain][:, axes == chain] = levels()[:, None] ** 2
-    return every
+    own = AXES[: len(probability) + 1] == np.arange(len(probability))[:, None, None]
+    return np.where(own, levels()[:, None] ** 2, variance(probability))
 
 
 def _precision(every: Floats, told: Attitude) -> Floats:
     """Precisions (..., A, A) of a cycle's rotation with prior variances (..., A)."""
     return np.asarray(told.information[0] + np.eye(every.shape[-1]) / every[..., None, :])
+
+
+def posterior(variance: Floats, told: Attitude) -> tuple[Floats, Floats]:
+    """Means (..., A) [rad] and covariances (..., A, A) of a cycle's rotation with prior variances (..., A) after what
+    is `told` of it (K = 1)."""
+    covariance = np.asarray(np.linalg.inv(_precision(variance, told)), dtype=np.float64)
+    return covariance @ told.slope[0], covariance
 
 
 class Tilts(NamedTuple):
@@ -139,13 +143,12 @@ LEVEL_BODY = Tilts(np.zeros((SWAYS, 1, 2)), np.full((SWAYS, 1), 1.0 / SWAYS))
 
 def tilts(probability: Floats, told: Attitude | None) -> Tilts:
     """Tilts (attitude) of a cycle under level probabilities (C, L), and after what is `told` of it (K = 1), if any."""
-    every = _variances(probability)[0]
     weight = np.repeat(probability[0][:, None] / len(UNIT_TILTS), len(UNIT_TILTS), axis=1)
-    if told is None:  # the axes are independent
-        return Tilts(UNIT_TILTS * np.sqrt(every[:, None, :2]), weight)
-    covariance = np.linalg.inv(_precision(every, told))
-    mean, root = (covariance @ told.slope[0])[:, :2], np.linalg.cholesky(covariance[:, :2, :2])
-    return Tilts(mean[:, None] + UNIT_TILTS @ np.swapaxes(root, 1, 2), weight)
+    if told is None:
+        return Tilts(UNIT_TILTS * levels()[:, None, None], weight)
+    mean, covariance = posterior(_variances(probability)[0], told)
+    root = np.linalg.cholesky(covariance[:, :2, :2])
+    return Tilts(mean[:, None, :2] + UNIT_TILTS @ np.swapaxes(root, 1, 2), weight)
 
 
 def _unit_tilts(rings: int, spokes: int) -> Floats:

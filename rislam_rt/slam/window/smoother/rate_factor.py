@@ -25,20 +25,12 @@ class RateFactor(NamedTuple):
     step_gradient: Floats
     """(3,) [1/m] ...and the gradient at the middle."""
 
-    def normal(self, position: Floats, along: Floats) -> tuple[Floats, Floats]:
-        """Hessian (K + 1, 3, K + 1, 3) and gradient (K + 1, 3) by the numbers that a motion basis `along`
-        (3, K, K + 1) multiplies, at positions (K, 3)."""
-        off, back = position - self.middle, np.swapaxes(along, 1, 2)
-        slope = self.gradient + (self.single @ off[..., None])[..., 0]
-        slope = slope - self.common @ np.einsum("kat,ka->t", self.common, off)
-        wide = back @ np.swapaxes(self.common, 0, 1)
-        each = back[:, None] @ (np.transpose(self.single, (1, 2, 0))[..., None] * along[None])
-        axes, many, _ = wide.shape
-        flat = wide.reshape(axes * many, -1)
-        hessian = np.transpose(each, (2, 0, 3, 1)) - np.transpose(
-            (flat @ flat.T).reshape(axes, many, axes, many), (1, 0, 3, 2)
-        )
-        return hessian, (back @ slope.T[..., None])[..., 0].T
+    def slope(self, position: Floats) -> Floats:
+        """Gradient (K, 3) of the rates' cost by the positions, at positions (K, 3)."""
+        off = position - self.middle
+        flat = self.common.reshape(off.size, -1)
+        own = (flat @ (off.ravel() @ flat)).reshape(off.shape)
+        return self.gradient + (self.single @ off[..., None])[..., 0] - own
 
     def first_step(self, dt: float, velocity: Floats, accel: Floats) -> tuple[Floats, Floats]:
         """Hessian (6, 6) and gradient (6,) of the first step's cost by the velocity after it and its acceleration.

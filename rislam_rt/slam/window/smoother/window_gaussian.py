@@ -150,9 +150,14 @@ def _carried(window: Window, rows: Floats) -> Floats:
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
+def mean_now(window: Window) -> Floats:
+    """Mean (7 + 3F,) of the sliding window's last pose, its velocity, the compass offset, and the features."""
+    unknowns = np.concatenate([window.head, window.accel.ravel()])
+    return np.concatenate([_carried(window, unknowns), window.head[HEAD:]])
+
+
 def now(window: Window) -> tuple[Floats, Floats]:
-    """Mean (7 + 3F,) and covariance of the sliding window's last pose, its velocity, the compass offset, and the
-    features."""
+    """Mean (7 + 3F,) of the present as in `mean_now`, and its covariance."""
     return now_with_excess(window)[:2]
 
 
@@ -171,8 +176,7 @@ def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
     covariance = window.covariance[:size, :size].copy()
     covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
     covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
-    mean = np.append(_carried(window, np.append(window.head, window.accel)), window.head[HEAD:])
-    return mean, covariance, excess
+    return mean_now(window), covariance, excess
 
 
 def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
@@ -295,23 +299,26 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     size, (steps, free), slots = len(window.head), window.accel.shape, window.slots.hessian
     spot = np.empty(slots.shape[:2])
     spot[:, :POSE], spot[:, POSE:] = poses(window), window.head[HEAD:]
-    slope = window.slots.slope(spot)
+    slope, weight = window.slots.slope(spot), slots[:, :POSE, :POSE]
+    if window.rates:
+        weight = weight.copy()
+        weight[:, :3, :3] += window.rates.single
+        slope[:, :3] += window.rates.slope(spot[:, :3])
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
     # axis by axis: a pose's place along one does not hang on the accelerations along the others
     along, start, edge = _basis(window), head_order(free), 2 * free
     many, back = len(start), np.swapaxes(along, 1, 2)
     inner = np.empty((steps + 2, free, steps + 2, free))
     one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
-    weight = slots[:, one, two].T[..., None]
+    weight = weight[:, one, two].T[..., None]
     both = back[0] @ (weight[:6] * along[0])  # the room's axes share one basis
     if free > TURN:
         both = np.concatenate([both, back[TURN] @ (weight[6:] * along)])
     inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
     pull = (back @ slope[:, :free].T[..., None])[..., 0].T
     if window.rates:
-        by_rates = window.rates.normal(spot[:, :3], along[:3])
-        inner[:, :3, :, :3] += by_rates[0]
-        pull[:, :3] += by_rates[1]
+        shared = (back[0] @ window.rates.common.reshape(steps + 1, -1)).reshape(3 * (steps + 2), -1)
+        inner[:, :3, :, :3] -= (shared @ shared.T).reshape(steps + 2, 3, steps + 2, 3)
     inner = inner.reshape(edge + steps * free, -1)
     cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
     hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]

@@ -1,10 +1,8 @@
 """What unexplained tracks tell of the poses, as a quadratic in the window."""
 
 import numpy as np
-import pytest
 
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.motion_basis import basis
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
 
 STEP = 0.1
@@ -20,20 +18,33 @@ def _factor(count, rng, *, strength=1.0):
     return RateFactor(single, common, gradient, middle, np.eye(3), np.ones(3))
 
 
-def test_the_cost_by_the_motions_numbers_is_that_by_the_positions():
+def test_the_cost_by_the_windows_numbers_is_that_by_the_positions():
     rng, count = np.random.default_rng(1), 5
-    factor, along = _factor(count, rng), basis(np.full(count - 1, STEP).tobytes(), False)
-    numbers = rng.standard_normal((3, count + 1))
+    window = window_gaussian.begin(np.zeros(3), np.ones(3), np.full(7, 0.1))
+    for _ in range(count - 1):
+        window = window_gaussian.extend(window, STEP, np.full(3, 1e2))
+    factor, place = _factor(count, rng), window_gaussian.poses(window)[:, :3]
+    alone, told = window_gaussian.solve(window), window_gaussian.solve(window._replace(rates=factor))
 
-    def cost(numbers):
-        off = (along @ numbers[..., None])[..., 0].T - factor.middle
-        own = np.einsum("kat,ka->t", factor.common, off)
-        return (factor.gradient * off).sum() + 0.5 * np.einsum("ka,kab,kb", off, factor.single, off) - 0.5 * own @ own
+    def numbers(window):
+        return np.concatenate([window.head, window.accel.ravel()])
 
-    hessian, gradient = factor.normal((along @ numbers[..., None])[..., 0].T, along)
-    change = rng.standard_normal((3, count + 1))
-    value = cost(numbers) + (gradient * change.T).sum() + 0.5 * np.einsum("ka,kalb,lb", change.T, hessian, change.T)
-    assert cost(numbers + change) == pytest.approx(value)
+    def moved(change):
+        accel = change[7:].reshape(window.accel.shape)
+        return window_gaussian.poses(window._replace(head=window.head + change[:7], accel=window.accel + accel))[:, :3]
+
+    def slope(window, solved):
+        return np.linalg.solve(solved.covariance, numbers(window) - numbers(solved))
+
+    design = np.array([(moved(unit) - place).ravel() for unit in np.eye(len(window.covariance))])
+    common, off = factor.common.reshape(3 * count, -1), (place - factor.middle).ravel()
+    single = np.zeros((count, 3, count, 3))
+    single[range(count), :, range(count)] = factor.single
+    hessian = single.reshape(3 * count, -1) - common @ common.T
+    found = np.linalg.inv(told.covariance) - np.linalg.inv(alone.covariance)
+    np.testing.assert_allclose(found, design @ hessian @ design.T, atol=1e-7)
+    wanted = design @ (factor.gradient.ravel() + hessian @ off)
+    np.testing.assert_allclose(slope(window, told) - slope(window, alone), wanted, atol=1e-7)
 
 
 def test_a_first_step_that_leaves_tells_the_velocity():
