@@ -172,7 +172,7 @@ def _associate_over_motions(
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial
     if best.surprise > CONSTANTS.fit and (state.window.step[-2:] > 0.0).sum() == 2:
-        by = divergence_monitor.jump(best, observed)
+        by = divergence_monitor.jump(best, observed, state.scene.use_vt)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
             return recovery.after_jump(state, by), view

@@ -11,6 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
@@ -46,14 +47,17 @@ def advance(log_odds: float, score: float, silent: Floats, kept: int) -> float:
     return min(max(float(np.log(lost / (1.0 - lost))) - score, -limit), limit)
 
 
-def jump(view: CycleAssociation, observed: Observations) -> Floats:
+def jump(view: CycleAssociation, observed: Observations, use_vt: bool) -> Floats:
     """Displacement (3,) [m] of the agent on which most pairs of predicted and measured path lengths agree; 0 where
-    there is none."""
-    lead = view.groups.leader
+    there is none. Without `use_vt` wall returns have no say: walls that nothing corrects err by more than they tell."""
+    lead, expected_log = view.groups.leader, view.groups.log_amplitude
+    if not use_vt:
+        moving = view.expected.forms[lead, 0] != TX
+        lead, expected_log = lead[moving], expected_log[moving]
     expected, heard = view.expected.seen[lead], observed.seen
     off = np.maximum(*(np.abs(heard[:, axis] - expected[:, axis, None]) for axis in (1, 2)))
     row, column = (off < ALIKE).nonzero()
-    alike = np.abs(observed.log_amplitude[column] - view.groups.log_amplitude[row]) < 10.0 * ALIKE
+    alike = np.abs(observed.log_amplitude[column] - expected_log[row]) < 10.0 * ALIKE
     row, column = row[alike], column[alike]
     near = np.argsort(off[row, column], kind="stable")[:PAIRS]
     row, column = row[near], column[near]
