@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
 from rislam_rt.slam.window.divergence import divergence_monitor, egomotion, motion_agreement
 from rislam_rt.slam.window.divergence.egomotion import Rates
@@ -192,6 +193,26 @@ def _window(rng):
     root[-1] = 0.0  # nothing is measured from the last pose as yet
     slots = window.slots._replace(hessian=root @ np.swapaxes(root, 1, 2))
     return window_gaussian.solve(window._replace(slots=slots))
+
+
+@pytest.mark.parametrize(("use_vt", "told"), [(True, True), (False, False)])
+def test_without_wall_returns_they_tell_no_jump(use_vt, told):
+    """Returns of four walls and two points, predicted for an agent 1.2 m from where it is; without
+    `use_vt` those of the walls have no say, and of points that agree there are two."""
+    rng, by = np.random.default_rng(6), np.array([0.9, -0.8, 0.0])
+    forms, seen = (
+        np.full((6, 5), UNKNOWN),
+        np.column_stack([rng.uniform(3.0, 9.0, 6), np.linspace(-0.9, 0.9, 6), np.zeros(6)]),
+    )
+    forms[:, 0] = [TX, TX, TX, TX, 0, 1]
+    toward = np.zeros((6, 3, 10))
+    toward[:, 0, :2] = 2.0 * np.array([[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [-0.7, 0.7], [-1.0, 0.1], [0.3, -0.9]])
+    heard = seen + toward[:, :, :3] @ by
+    level = np.full(6, -8.0)
+    groups = SimpleNamespace(leader=np.arange(6), log_amplitude=level)
+    view = SimpleNamespace(groups=groups, expected=SimpleNamespace(forms=forms, seen=seen, jacobian=toward))
+    found = divergence_monitor.jump(view, SimpleNamespace(seen=heard, log_amplitude=level), use_vt)
+    np.testing.assert_allclose(found, by if told else 0.0, atol=1e-3)
 
 
 def test_after_a_jump_all_but_the_place_is_as_it_was():
