@@ -123,7 +123,7 @@ def associate_cycle(
     untold = np.isin(expected.forms[lead, 0], [row for row in landmarks.panels if row >= 0]) & (beside is not None)
     if beside is not None:
         groups = _absorbed(groups, expected, untold.nonzero()[0], beside, scene.sensor.cell_length)
-    extra = groups.disturbance + groups.share_variance[:, None] * groups.gap**2
+    extra = groups.disturbance + groups.mean_share()[1][:, None] * groups.gap**2
     if len(observed.seen):
         extra += (np.maximum(scatter[lead], 1.0) - 1.0)[:, None] * _median(observed.std) ** 2
     if sway is not None:
@@ -236,7 +236,7 @@ def _associate(
     if not len(groups.leader) or not len(observed.seen):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), float(np.log1p(-shows[missed]).sum())
     lead, mate = groups.leader, groups.partner
-    share, extra, side = groups.share[:, None], view.extra, view.side
+    share, extra, side = groups.mean_share()[0][:, None], view.extra, view.side
     seen = places[lead] + share * groups.gap
     most = np.abs(expected.jacobian) @ np.sqrt(np.diagonal(covariance))  # no correlation makes a deviation larger
     most = (most[lead] + share * (most[mate] - most[lead])) ** 2 + extra

@@ -29,6 +29,7 @@ from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.unresolved_partner import partner_presence
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
@@ -67,7 +68,8 @@ def log_associations(
     used = np.ones(len(row), dtype=np.bool_) if state.scene.use_vt else forms[view.groups.leader[row], 0] != TX
     log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
     at = len(log.cycle) - len(observed.seen) + pick[used]
-    return state._replace(log=_explain(log, view, state.landmarks, row[used], at)), used
+    presence = partner_presence(view, observed)[0][used]
+    return state._replace(log=_explain(log, view, state.landmarks, row[used], at, presence)), used
 
 
 def innovations(
@@ -121,8 +123,9 @@ def learn_cycle(
         state = state._replace(lost_log_odds=odds)
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
+    told = partner_presence(view, observed)[1]
     visibility, landmarks = update_landmarks(
-        state.visibility, landmarks, state.window, expected, groups, view.clear, view.above, view.rises,
+        state.visibility, landmarks, state.window, expected, groups, view.clear, told, view.above, view.rises,
         view.scatter, view.shows, row, pick, raw, observed, view.poses,
         state.scene, code,
     )  # fmt: skip
@@ -131,15 +134,21 @@ def learn_cycle(
     return state._replace(visibility=visibility, landmarks=landmarks), landmark
 
 
-def _explain(log: Log, view: CycleAssociation, landmarks: WindowTable, row: Integers, at: Integers) -> Log:
-    """Record in the log that its components `at` (A,) were associated with clusters `row` (A,) of predicted returns."""
+def _explain(
+    log: Log, view: CycleAssociation, landmarks: WindowTable, row: Integers, at: Integers, presence: Floats
+) -> Log:
+    """Record in the log that its components `at` (A,) were associated with clusters `row` (A,) of predicted returns, in
+    which partners are heard with probabilities `presence` (A,)."""
     if not len(row):
         return log
     expected, groups = view.expected, view.groups
     lead, mate = groups.leader[row], groups.partner[row]
-    share, variance = conditioned_share(groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at])
-    both = (mate >= 0)[:, None]
+    share, variance = conditioned_share(
+        groups, expected, row, log.log_amplitude[at], log.log_amplitude_std[at], presence
+    )
+    both = ((mate >= 0) & (presence > 0.5))[:, None]
     forms = np.stack([expected.forms[lead], np.where(both, expected.forms[mate], UNKNOWN)], axis=1)
+    variance += np.where(both[:, 0], 0.0, share**2)
     shared = groups.disturbance[row] + variance[:, None] * groups.gap[row] ** 2
     scatter = scatter_variance(view.scatter[lead], log.std[at])
     return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), shared, scatter)

@@ -115,7 +115,7 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
-    groups: UnresolvedClusters, clear: Floats, above: Floats, rises: Floats, scatter: Floats, shows: Floats,
+    groups: UnresolvedClusters, clear: Floats, told_partner: Floats, above: Floats, rises: Floats, scatter: Floats, shows: Floats,
     row: Integers, pick: Integers, raw: Floats, observed: Observations, poses: Poses,
     scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
@@ -133,6 +133,8 @@ def update_landmarks(
     missed = clear * (1.0 - detection) / (1.0 - clear * detection)
     after, scatter = clear.copy(), scatter.copy()
     told = hit | (groups.by_itself == 1.0)
+    mate = groups.partner[row]
+    after[mate[mate >= 0]] = np.minimum(told_partner[mate >= 0], 0.995)
     after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
     lead = groups.leader[row]
     scatter[lead] += CONSTANTS.memory / CONSTANTS.window * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])

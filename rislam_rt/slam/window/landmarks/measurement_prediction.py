@@ -214,6 +214,12 @@ class UnresolvedClusters(NamedTuple):
     """(C,) probability that it comes out by itself: 1 for leaders, less for a return that a leader should absorb."""
     gap: Floats
     """(C, 3) difference of length and cosines from the leader to its partner; 0 without one."""
+    presence: Floats
+    """(C,) probability that the partner is heard with the leader; 0 without one."""
+
+    def mean_share(self) -> tuple[Floats, Floats]:
+        """Mean and variance (C,) of the partner's weight in the place of the merged component, heard or not."""
+        return _with_presence(self.share, self.share_variance, self.presence)
 
 
 def cluster(
@@ -246,6 +252,8 @@ def cluster(
         0.0,
     )
     share[twins], spread[twins] = 0.5, TWIN_STD**2
+    presence = np.where(both, clear[mate], 0.0)
+    presence[twins] = 1.0  # what is in the way of the one is in the way of the other
     fade = np.where(both, 0.7 * np.minimum(ratio, 1.0), 0.0)
     return UnresolvedClusters(
         leader,
@@ -257,7 +265,14 @@ def cluster(
         np.hypot(expected.log_amplitude_std[leader], fade),
         by_itself[leader],
         np.where(both[:, None], expected.seen[mate] - expected.seen[leader], 0.0),
+        presence,
     )
+
+
+def _with_presence(share: Floats, variance: Floats, presence: Floats) -> tuple[Floats, Floats]:
+    """Mean and variance of a share that has the given ones with a probability, and else is 0."""
+    mean = presence * share
+    return mean, np.maximum(presence * (variance + share**2) - mean**2, 0.0)
 
 
 def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tuple[Integers, Integers, Floats]:
@@ -328,8 +343,10 @@ def conditioned_share(
     row: Integers,
     log_amplitude: Floats,
     log_amplitude_std: Floats,
+    presence: Floats,
 ) -> tuple[Floats, Floats]:
-    """Mean and variance (A,) of the unresolved partner's share in clusters `row` (A,), given the measured amplitudes.
+    """Mean and variance (A,) of the unresolved partner's share in clusters `row` (A,), given the measured amplitudes,
+    and the probabilities `presence` (A,) that it is heard.
 
     Two paths of amplitudes a, b with the sum A come out at the share `(A^2 + b^2 - a^2) / (2 A^2)` from the first to
     the second: exact to first order in the gap, whatever the phase.
@@ -347,4 +364,4 @@ def conditioned_share(
     gain = np.where(twins, 0.0, prior / (prior + uncertainty))
     share[both] = np.clip(share[both] + gain * (told - share[both]), 0.0, 1.0)
     variance[both] = (1.0 - gain) * prior
-    return share, variance
+    return _with_presence(share, variance, presence)
