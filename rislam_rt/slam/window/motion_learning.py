@@ -34,14 +34,15 @@ def learn_motion(state: WindowState) -> WindowState:
     if not len(window.accel) or state.config.motion == "told":
         return state
     posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel)), CONSTANTS.stay)
-    share = manoeuvre_share(window, motion.expected_precision(posterior[UP]))
+    share, still = manoeuvre_share(window, motion.expected_precision(posterior[UP]))
     nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
     posterior[UP], level[UP] = nearer[:-1], nearer[-1]
     fresh = precisions(posterior)
+    fresh[:, 2] *= (STILL**-2.0 / fresh[:, 2]) ** still
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
     # the covariance is that of the precisions before
-    wide = surplus(window.precision, posterior)
+    wide = surplus(window.precision, posterior, still)
     return state._replace(window=window._replace(precision=precision, surplus=wide), level=level)
 
 
@@ -61,11 +62,12 @@ def likelihoods(window: Window, count: int) -> Floats:
     return found
 
 
-def manoeuvre_share(window: Window, precision: Floats) -> float:
-    """Expected share, from 0 for a level floor to 1 for the vertical chain's prior precisions (K,), of a prior of the
-    vertical accelerations between these two, by the marginal likelihood of all steps together.
+def manoeuvre_share(window: Window, precision: Floats) -> tuple[float, float]:
+    """Expected share, from 0 for a floor that is all but level to 1 for the vertical chain's prior precisions (K,), of a
+    prior of the vertical accelerations between these two, and the probability that the height does not change at all,
+    by the marginal likelihood of all steps together.
 
-    Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare event.
+    An even floor is as likely beforehand as an uneven one. Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare event.
     """
     size, free = len(window.head), window.accel.shape[1]
     inner = inverse(window.covariance[size + 2 :: free, size + 2 :: free])
@@ -73,13 +75,16 @@ def manoeuvre_share(window: Window, precision: Floats) -> float:
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
     share = np.linspace(0.0, 1.0, PRIORS)
     std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])
+    std = np.concatenate([std, np.full((1, len(precision)), STILL)])
     # N(0, P^-1) against what is told, information `told` with the slope `slope`
     inside, pull = np.eye(len(told)) + std[:, :, None] * told * std[:, None, :], std * slope
     form, log_det = np.array([form_and_log_det(*each) for each in zip(inside, pull, strict=True)]).T
     log_like = 0.5 * (form - log_det)
-    log_like[1:] += CONSTANTS.log_rare
+    log_like[1:-1] += CONSTANTS.log_rare
     weight = np.exp(log_like - log_like.max())
-    return float(weight @ share / weight.sum())
+    weight /= weight.sum()
+    moves = weight[:-1].sum()
+    return float(weight[:-1] @ share / max(moves, 1e-9)), float(weight[-1])
 
 
 def nearer_floor(level: Floats, share: float) -> Floats:
@@ -97,10 +102,12 @@ def precisions(levels: Floats) -> Floats:
     return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
-def surplus(precision: Floats, levels: Floats) -> Floats:
+def surplus(precision: Floats, levels: Floats, still: float = 0.0) -> Floats:
     """Variance (..., A) of the slopes of acceleration priors beyond their precisions (..., A), from motion-mode
-    probabilities (N, ..., L) of N groups of axes (see `now_with_excess`)."""
+    probabilities (N, ..., L) of N groups of axes and the probability that the height does not change (see
+    `now_with_excess`)."""
     variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
+    variance[..., 2] *= 1.0 - still
     return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
 
 
