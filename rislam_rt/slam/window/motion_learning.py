@@ -81,6 +81,7 @@ def manoeuvre_share(window: Window, precision: Floats) -> tuple[float, float]:
     form, log_det = np.array([form_and_log_det(*each) for each in zip(inside, pull, strict=True)]).T
     log_like = 0.5 * (form - log_det)
     log_like[1:-1] += CONSTANTS.log_rare
+    log_like[-1] += CONSTANTS.log_upright
     weight = np.exp(log_like - log_like.max())
     weight /= weight.sum()
     moves = weight[:-1].sum()
