@@ -29,8 +29,8 @@ from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.unresolved_partner import partner_presence
 from rislam_rt.slam.window.tracks import WindowTracks
+from rislam_rt.slam.window.unresolved_partner import partner_presence
 
 
 class HeardCycle(NamedTuple):

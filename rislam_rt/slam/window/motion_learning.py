@@ -3,8 +3,8 @@
 Axes are learnt in groups, a chain of motion modes each (see `smoother.motion`). The height is asked once more: each
 step's likelihood is that of its own acceleration, the other steps' priors being what they are, and one datum that tells
 of forty steps at once counts forty times. Next to nothing measures the height while no ceiling is known; noise of no
-weight made an agent climb. So the vertical chain's priors stand against those of a level floor, by the marginal
-likelihood of all steps together.
+weight made an agent climb. So the vertical chain's priors stand against those of an uneven floor and of a level one, on
+which the height does not change, by the marginal likelihood of all steps together.
 """
 
 import numpy as np
@@ -63,11 +63,12 @@ def likelihoods(window: Window, count: int) -> Floats:
 
 
 def manoeuvre_share(window: Window, precision: Floats) -> tuple[float, float]:
-    """Expected share, from 0 for a floor that is all but level to 1 for the vertical chain's prior precisions (K,), of a
-    prior of the vertical accelerations between these two, and the probability that the height does not change at all,
-    by the marginal likelihood of all steps together.
+    """Expected share, from 0 for an uneven floor to 1 for the vertical chain's prior precisions (K,), of a prior of the
+    vertical accelerations between these two, and the probability that the floor is level and the height does not
+    change at all, both by the marginal likelihood of all steps together.
 
-    An even floor is as likely beforehand as an uneven one. Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare event.
+    Floors are level as often as other surfaces are. Priors in between are `PRIORS` steps in equal ratios of the
+    precision; a manoeuvre of any size is a rare event.
     """
     size, free = len(window.head), window.accel.shape[1]
     inner = inverse(window.covariance[size + 2 :: free, size + 2 :: free])

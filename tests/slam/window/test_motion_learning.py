@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.motion_learning import manoeuvre_share, nearer_floor
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
@@ -24,6 +25,11 @@ def window_of(height, std, floor=1e-3):
 
 def share_of(window):
     """The share of what the chain of single steps would ask for."""
+    return learnt(window)[0]
+
+
+def learnt(window):
+    """That share, and the probability that the height does not change at all."""
     return manoeuvre_share(window, np.full(CYCLES - 1, motion.expected_precision(LIVELY)))
 
 
@@ -67,3 +73,25 @@ def test_the_floor_makes_nothing_livelier():
     np.testing.assert_allclose(nearer_floor(LIVELY[None], 1.0)[0], LIVELY)
     variance = motion.expected_variance(np.stack([nearer_floor(LIVELY[None], share)[0] for share in (0.0, 0.5, 1.0)]))
     assert (np.diff(variance) > 0.0).all()
+
+
+def test_a_level_floor_is_told_from_an_uneven_one():
+    """Heights to 0.1 mm: constant ones speak for a level floor, a random walk of the velocity against it."""
+    rng, std = np.random.default_rng(1), np.full(CYCLES, 1e-4)
+    steps = np.cumsum(np.cumsum(CONSTANTS.level * DT**2 * rng.standard_normal((20, CYCLES)), axis=1), axis=1)
+    noise = 1e-4 * rng.standard_normal((20, CYCLES))
+    level = [learnt(window_of(one, std))[1] for one in noise]
+    uneven = [learnt(window_of(one, std))[1] for one in noise + steps]
+    assert np.mean(level) > 0.95
+    assert np.median(uneven) < 0.05
+
+
+def test_nothing_heard_leaves_floors_as_level_as_other_surfaces():
+    still = learnt(window_of(np.zeros(CYCLES), np.full(CYCLES, 1e6)))[1]
+    assert still == pytest.approx(9.0 / (9.0 + 1.0 + 4.0 * 0.02), rel=1e-3)
+
+
+@pytest.mark.parametrize("speed", [0.1, 0.3])
+def test_who_climbs_is_on_no_level_floor(speed):
+    height = speed * DT * np.maximum(np.arange(CYCLES) - 20, 0)
+    assert learnt(window_of(height, np.full(CYCLES, 0.01)))[1] < 0.01

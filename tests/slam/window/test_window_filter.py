@@ -229,7 +229,8 @@ def test_a_new_beginning_is_as_sure_of_its_place_as_the_pose_was_and_a_metre_les
         fresh = slam.estimate(recovery.restart(state._replace(config=config)), config)
         np.testing.assert_array_equal(fresh.position, before.position)
         wider = np.diag(fresh.covariance - before.covariance)[:3]
-        np.testing.assert_allclose(wider, [1.0, 1.0, up], atol=1e-8)  # a tenth of a millimetre, squared
+        # a third of a millimetre, squared: what the learnt motion may be off by
+        np.testing.assert_allclose(wider, [1.0, 1.0, up], atol=1e-7)
         assert not len(fresh.map.wall_offset)
 
 

@@ -115,15 +115,16 @@ def visible(expected: ExpectedComponents, groups: UnresolvedClusters, clear: Flo
 
 def update_landmarks(
     visibility: VisibilityObservations, landmarks: WindowTable, window: Window, expected: ExpectedComponents,
-    groups: UnresolvedClusters, clear: Floats, told_partner: Floats, above: Floats, rises: Floats, scatter: Floats, shows: Floats,
-    row: Integers, pick: Integers, raw: Floats, observed: Observations, poses: Poses,
+    groups: UnresolvedClusters, clear: Floats, partner_clear: Floats, above: Floats, rises: Floats, scatter: Floats,
+    shows: Floats, row: Integers, pick: Integers, raw: Floats, observed: Observations, poses: Poses,
     scene: KnownEnvironment, code: RisCode | None,
 ) -> tuple[VisibilityObservations, WindowTable]:  # fmt: skip
     """Update of occlusion, existence, strengths and panel identities after clusters `row` (A,) were detected as
     components `pick` (A,) with residuals of mean square `raw` (A,), and the other clusters missed.
 
     `clear` (R,) and `scatter` (R,) are what was recalled of the returns, `above` (R,) the probability that they arrive
-    above the plane of the array, `rises` (R, Z) the log likelihoods of their elevations.
+    above the plane of the array, `rises` (R, Z) the log likelihoods of their elevations; `partner_clear` (A,) is the
+    probability that the detected clusters' partners are not occluded, as their components tell (`unresolved_partner`).
     """
     if not len(expected.seen):
         return visibility, landmarks
@@ -134,7 +135,7 @@ def update_landmarks(
     after, scatter = clear.copy(), scatter.copy()
     told = hit | (groups.by_itself == 1.0)
     mate = groups.partner[row]
-    after[mate[mate >= 0]] = np.minimum(told_partner[mate >= 0], 0.995)
+    after[mate[mate >= 0]] = np.minimum(partner_clear[mate >= 0], 0.995)
     after[groups.leader[told]] = np.where(hit, 0.995, missed[groups.leader])[told]
     lead = groups.leader[row]
     scatter[lead] += CONSTANTS.memory / CONSTANTS.window * (np.minimum(raw, 30.0 * scatter[lead]) - scatter[lead])

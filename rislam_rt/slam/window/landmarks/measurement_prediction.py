@@ -270,7 +270,7 @@ def cluster(
 
 
 def _with_presence(share: Floats, variance: Floats, presence: Floats) -> tuple[Floats, Floats]:
-    """Mean and variance of a share that has the given ones with a probability, and else is 0."""
+    """Mean and variance of an unresolved partner's share: the given ones with a probability `presence`, else 0."""
     mean = presence * share
     return mean, np.maximum(presence * (variance + share**2) - mean**2, 0.0)
 

@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.horizon_detection import elevations
-from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster, conditioned_share
 from rislam_rt.slam.window.solver_limits import EDGE
 
 CELL = np.array([0.3, 0.5, 0.5])
@@ -58,3 +58,38 @@ def test_the_strongest_of_a_cell_takes_in_the_others(told):
     np.testing.assert_allclose(groups.disturbance, disturbance[led], rtol=1e-12)
     whole = np.where(np.isin(led, list(taken)), strength[led], 0.5 * np.log(total[led]))
     np.testing.assert_allclose(groups.log_amplitude, whole, rtol=1e-12)
+
+
+def pair(clear):
+    """Two returns of one cell, the weaker by a fifth, and the probabilities that nothing occludes them."""
+    forms = np.array([[-1, -1, -1, 0, -1], [-1, -1, -1, 1, -1]])
+    seen = np.array([[4.0, 0.1, 0.2], [4.2, 0.3, 0.1]])
+    expected = ExpectedComponents(
+        forms, seen, np.zeros((2, 3, 7)), np.log([1.0, 0.8]), np.full(2, 0.2), np.zeros(2), np.ones(2),
+        elevations(np.ones(2), np.zeros(2), seen[:, 1:]),
+    )  # fmt: skip
+    return expected, cluster(expected, CELL, np.array([0.9, clear]))
+
+
+def test_a_partner_that_may_be_silent_has_the_share_of_a_mixture():
+    """Mean and variance of a share that is drawn as the partner is heard, or 0 where it is not; 4 standard errors."""
+    _, sure = pair(1.0)
+    _, groups = pair(0.3)
+    rng, count = np.random.default_rng(2), 200_000
+    drawn = sure.share[0] + np.sqrt(sure.share_variance[0]) * rng.standard_normal(count)
+    drawn *= rng.random(count) < groups.presence[0]
+    mean, variance = (field[0] for field in groups.mean_share())
+    assert groups.presence[0] == pytest.approx(0.3)
+    assert mean == pytest.approx(drawn.mean(), abs=4.0 * drawn.std() / np.sqrt(count))
+    assert variance == pytest.approx(drawn.var(), abs=4.0 * (drawn**2).std() / np.sqrt(count))
+
+
+def test_a_partner_that_is_not_heard_moves_nothing():
+    expected, groups = pair(0.3)
+    row, level = np.array([0]), np.array([0.1])
+    share, variance = conditioned_share(groups, expected, row, level, np.array([0.02]), np.array([0.0]))
+    assert share[0] == variance[0] == 0.0
+    heard = conditioned_share(groups, expected, row, level, np.array([0.02]), np.array([1.0]))
+    half = conditioned_share(groups, expected, row, level, np.array([0.02]), np.array([0.5]))
+    assert half[0][0] == pytest.approx(0.5 * heard[0][0])
+    assert half[1][0] == pytest.approx(0.5 * (heard[1][0] + heard[0][0] ** 2) - half[0][0] ** 2)
