@@ -43,7 +43,18 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     precision = np.tile(std**-2.0, (count - 1, 1))
     none = np.zeros(accel.shape)
     return Window(
-        head, accel, precision, precision, none, step, prior, np.zeros((size, size)), slots, whole, no_holds()
+        head,
+        accel,
+        precision,
+        precision,
+        none,
+        precision[:, 2],
+        step,
+        prior,
+        np.zeros((size, size)),
+        slots,
+        whole,
+        no_holds(),
     )
 
 

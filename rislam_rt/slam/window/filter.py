@@ -56,7 +56,7 @@ def init(
     return WindowState(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
-        motion_mode, motion_mode,
+        motion_mode, motion_mode, True,
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
         attitude.first_levels(compass=not turns),
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
@@ -121,7 +121,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
     else:
         precision = motion_learning.precisions(level)
-        window = window_gaussian.extend(window, dt, precision, motion_learning.surplus(precision, level))
+        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level))
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
         attitude=np.concatenate([rotation, np.zeros((1, 3))]),

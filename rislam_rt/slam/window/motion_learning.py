@@ -19,6 +19,8 @@ from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
 from rislam_rt.slam.window.state import WindowState
 
+UPWARDS = 2
+"""Index of the vertical axis among the window's accelerations."""
 UP = 1
 """Index of the vertical axis's group among `GROUPS`."""
 GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
@@ -34,20 +36,25 @@ def learn_motion(state: WindowState) -> WindowState:
     if not len(window.accel) or state.config.motion == "told":
         return state
     posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel)), CONSTANTS.stay)
-    share, still = manoeuvre_share(window, motion.expected_precision(posterior[UP]))
+    share, still = manoeuvre_share(window, motion.expected_precision(posterior[UP]), state.is_level)
     nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
     posterior[UP], level[UP] = nearer[:-1], nearer[-1]
-    fresh = precisions(posterior)
-    fresh[:, 2] *= (STILL**-2.0 / fresh[:, 2]) ** still
+    before = window.precision.copy()
+    before[:, UPWARDS] = window.uneven
     # all steps at once, each as if the others were settled: damped, or they would take turns
-    precision = np.exp((1.0 - DAMPING) * np.log(window.precision) + DAMPING * np.log(fresh))
-    # the covariance is that of the precisions before
-    wide = surplus(window.precision, posterior, still)
-    return state._replace(window=window._replace(precision=precision, surplus=wide), level=level)
+    precision = np.exp((1.0 - DAMPING) * np.log(before) + DAMPING * np.log(precisions(posterior)))
+    uneven = precision[:, UPWARDS].copy()
+    if still > 0.5:
+        precision[:, UPWARDS] *= (STILL**-2.0 / uneven) ** still
+    variance = variances(posterior)
+    variance[:, UPWARDS] *= 1.0 - still
+    window = window._replace(precision=precision, variance=variance, uneven=uneven)
+    return state._replace(window=window, level=level, is_level=still > 0.5)
 
 
 def likelihoods(window: Window, count: int) -> Floats:
-    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes."""
+    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes; upwards were
+    the floor uneven, whether it is or not."""
     size, free = len(window.head), window.accel.shape[1]
     every = np.arange(count)
     inside = window.covariance[size : size + count * free, size : size + count * free]
@@ -58,11 +65,22 @@ def likelihoods(window: Window, count: int) -> Floats:
         )
         for group in GROUPS[: free - 1]
     ])  # fmt: skip
+    information, slope = _told_upwards(window)
+    covariance = inverse(information + np.diag(window.uneven))
+    mean, variance = (covariance @ slope)[:count, None], covariance.diagonal()[:count, None, None]
+    found[UP] = motion.log_likelihood(mean, variance, window.uneven[:count])
     found[0, :, motion.is_level_only()] = -np.inf
     return found
 
 
-def manoeuvre_share(window: Window, precision: Floats) -> tuple[float, float]:
+def _told_upwards(window: Window) -> tuple[Floats, Floats]:
+    """Information (K, K) on the window's vertical accelerations without their priors, and its slope (K,)."""
+    size, free = len(window.head), window.accel.shape[1]
+    inner = inverse(window.covariance[size + UPWARDS :: free, size + UPWARDS :: free])
+    return inner - np.diag(window.solved[:, UPWARDS]), np.asarray(inner @ window.accel[:, UPWARDS])
+
+
+def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -> tuple[float, float]:
     """Expected share, from 0 for an uneven floor to 1 for the vertical chain's prior precisions (K,), of a prior of the
     vertical accelerations between these two, and the probability that the floor is level and the height does not
     change at all, both by the marginal likelihood of all steps together.
@@ -70,19 +88,17 @@ def manoeuvre_share(window: Window, precision: Floats) -> tuple[float, float]:
     Floors are level as often as other surfaces are. Priors in between are `PRIORS` steps in equal ratios of the
     precision; a manoeuvre of any size is a rare event.
     """
-    size, free = len(window.head), window.accel.shape[1]
-    inner = inverse(window.covariance[size + 2 :: free, size + 2 :: free])
-    told, slope = inner - np.diag(window.solved[:, 2]), inner @ window.accel[:, 2]
+    information, slope = _told_upwards(window)
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
     share = np.linspace(0.0, 1.0, PRIORS)
     std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])
     std = np.concatenate([std, np.full((1, len(precision)), STILL)])
-    # N(0, P^-1) against what is told, information `told` with the slope `slope`
-    inside, pull = np.eye(len(told)) + std[:, :, None] * told * std[:, None, :], std * slope
+    # N(0, P^-1) against what is told
+    inside, pull = np.eye(len(slope)) + std[:, :, None] * information * std[:, None, :], std * slope
     form, log_det = np.array([form_and_log_det(*each) for each in zip(inside, pull, strict=True)]).T
     log_like = 0.5 * (form - log_det)
     log_like[1:-1] += CONSTANTS.log_rare
-    log_like[-1] += CONSTANTS.log_upright
+    log_like[-1] += CONSTANTS.log_upright if was_level else CONSTANTS.log_rare
     weight = np.exp(log_like - log_like.max())
     weight /= weight.sum()
     moves = weight[:-1].sum()
@@ -104,13 +120,10 @@ def precisions(levels: Floats) -> Floats:
     return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
-def surplus(precision: Floats, levels: Floats, still: float = 0.0) -> Floats:
-    """Variance (..., A) of the slopes of acceleration priors beyond their precisions (..., A), from motion-mode
-    probabilities (N, ..., L) of N groups of axes and the probability that the height does not change (see
-    `now_with_excess`)."""
-    variance = np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
-    variance[..., 2] *= 1.0 - still
-    return np.asarray(np.maximum(precision**2 * variance - precision, 0.0))
+def variances(levels: Floats) -> Floats:
+    """Variances (..., A) of accelerations along A axes, from motion-mode probabilities (N, ..., L) of N groups of axes
+    (see `now_with_excess`)."""
+    return np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
 def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:

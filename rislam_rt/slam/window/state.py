@@ -39,6 +39,8 @@ class WindowState(NamedTuple):
     with the rate of turn, where the heading is not known."""
     level: Floats
     """(2, L) or (3, L) filtered probabilities of the motion modes in the last step."""
+    is_level: bool
+    """Whether the floor is held for level, on which the height does not change."""
     heading: Floats
     """(K,) [rad] headings of the poses as the compass told; without one, what the estimated offsets are relative to."""
     attitude: Floats

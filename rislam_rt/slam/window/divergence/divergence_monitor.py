@@ -147,7 +147,7 @@ def with_free_compass(window: Window, std: float) -> Window:
     hessian, still = window.prior.hessian.copy(), ((0, 0), (0, int(not window.turns)))
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
-    window = window._replace(accel=np.pad(window.accel, still), surplus=np.pad(window.surplus, still))
+    window = window._replace(accel=np.pad(window.accel, still), variance=np.pad(window.variance, still))
     return _begun(window._replace(precision=precision), window.head, hessian)
 
 

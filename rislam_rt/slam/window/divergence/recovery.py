@@ -62,7 +62,7 @@ def restart(state: WindowState) -> WindowState:
     return state._replace(
         window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
-        motion_mode=state.level,
+        motion_mode=state.level, is_level=True,
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),

@@ -65,8 +65,11 @@ class Window(NamedTuple):
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`), in the next solution..."""
     solved: Floats
     """(K - 1, A) [s^4/m^2] ...and in that of the covariance."""
-    surplus: Floats
-    """(K - 1, A) [s^4/m^2] variance of each prior's slope that `precision` leaves out (see `now_with_excess`)."""
+    variance: Floats
+    """(K - 1, A) [m^2/s^4] variance of each acceleration over the motion modes, 0 for that of its prior."""
+    uneven: Floats
+    """(K - 1,) [s^4/m^2] prior precisions of the vertical accelerations, were the floor uneven (see
+    `motion_learning`)."""
     step: Floats
     """(K - 1,) [s] times between the poses."""
     prior: Quadratic
@@ -108,7 +111,7 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros((0, 3 + turns))
     return Window(
-        head, none, none, none, none, np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
+        head, none, none, none, none, np.zeros(0), np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
         np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
     )  # fmt: skip
 
@@ -172,7 +175,7 @@ def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
     """
     size, rows = len(window.head), _carried(window, window.covariance)
     whole, late = rows[:6, :size], rows[:6, size:]
-    excess = whole @ window.noise @ whole.T + (late * window.surplus.ravel()) @ late.T
+    excess = whole @ window.noise @ whole.T + (late * _surplus(window.solved, window.variance).ravel()) @ late.T
     covariance = window.covariance[:size, :size].copy()
     covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
     covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
@@ -210,9 +213,15 @@ def with_present(
     return window._replace(slots=Quadratic(hessian, gradient, middle))
 
 
-def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float = 0.0) -> Window:
+def _surplus(precision: Floats, variance: Floats) -> Floats:
+    """Variance (..., A) of the slopes of acceleration priors beyond their precisions (..., A), where the accelerations
+    have a variance (..., A) (see `now_with_excess`)."""
+    return np.maximum(precision**2 * variance - precision, 0.0)
+
+
+def extend(window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0) -> Window:
     """Append a pose to the sliding window, `dt` [s] after the last, with prior precisions (A,) of the step's
-    acceleration, and their `surplus` (A,)."""
+    acceleration, and its `variance` (A,)."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -222,7 +231,8 @@ def extend(window: Window, dt: float, precision: Floats, surplus: Floats | float
         accel=np.concatenate([window.accel, np.zeros((1, free))]),
         precision=np.concatenate([window.precision, precision[None]]),
         solved=np.concatenate([window.solved, precision[None]]),
-        surplus=np.concatenate([window.surplus, np.broadcast_to(surplus, (1, free))]),
+        variance=np.concatenate([window.variance, np.broadcast_to(variance, (1, free))]),
+        uneven=np.append(window.uneven, precision[2]),
         step=np.append(window.step, dt), slots=slots, covariance=covariance, rates=None,
     )  # fmt: skip
 
@@ -251,7 +261,7 @@ def slide(window: Window) -> Window:
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
-    shaken[size:, size:] += np.diag(window.surplus[0])
+    shaken[size:, size:] += np.diag(_surplus(window.precision[0], window.variance[0]))
     carry = step_transition(dt, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
@@ -263,7 +273,7 @@ def slide(window: Window) -> Window:
     covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
         head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
-        surplus=window.surplus[1:], step=window.step[1:], prior=prior, noise=_eliminated_noise(shaken, size, gain),
+        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:], prior=prior, noise=_eliminated_noise(shaken, size, gain),
         slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
     )  # fmt: skip

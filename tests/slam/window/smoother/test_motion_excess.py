@@ -65,7 +65,7 @@ def test_a_step_that_no_longer_counts_as_lively_leaves_what_it_did():
     """What is learnt of later steps tells nothing of how far the agent went astray before."""
     pushes = np.zeros((CYCLES - 1, 3))
     window, _ = _last(pushes, 4, leaving=False)
-    calm = window._replace(surplus=np.zeros_like(window.surplus))
+    calm = window._replace(variance=np.zeros_like(window.variance))
     left = np.diag(window_gaussian.now_with_excess(calm)[2])
     assert (left > 0.1 * np.diag(window_gaussian.now_with_excess(window)[2])).all()
 
