@@ -164,14 +164,14 @@ def _associate_over_motions(
             view = view_of(trial)
             if view.score + CONSTANTS.log_rare > calm.score:
                 best, window = view, trial
-    if best.surprise > CONSTANTS.fit and learnt and window.turns and (window.step[-1:] > 0.0).any():
+    if best.surprise > 1.0 and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
         trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
         trial = divergence_monitor.turned(trial, angle)
         view = view_of(trial)
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial
-    if best.surprise > CONSTANTS.fit and (state.window.step[-2:] > 0.0).sum() == 2:
+    if best.surprise > 1.0 and (state.window.step[-2:] > 0.0).sum() == 2:
         by = divergence_monitor.jump(best, observed, state.scene.use_vt)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):

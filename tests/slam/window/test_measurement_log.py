@@ -17,7 +17,7 @@ from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import append, empty_log, squares
 from rislam_rt.slam.window.motion_learning import assumed_precision
 from rislam_rt.slam.window.relinearisation import relinearise
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 
 BODY = Body(np.array([-0.05, 0.0, 0.0]), np.array([0.05, 0.0, 0.0]))
@@ -26,7 +26,7 @@ SCENE = KnownEnvironment(BODY, RadioConfig(), SensorModel(RadioConfig()), None, 
 
 def test_a_cycle_in_which_nothing_was_heard_takes_nothing_of_the_one_before():
     window = window_gaussian.begin(np.zeros(3), np.zeros(3), np.full(7, 0.1))
-    window = window_gaussian.add_feature(window, np.array([4.0, 0.0, 0.0]), no_holds())
+    window = window_features.add_feature(window, np.array([4.0, 0.0, 0.0]), no_holds())
     window = window_gaussian.extend(window, 0.1, np.ones(3))
     landmarks = enter(empty_table(), True, np.zeros(3), 5, 5.0, unknown(1))
     observed = Observations(

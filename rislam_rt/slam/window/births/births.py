@@ -19,7 +19,7 @@ from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED, STRIDE
 from rislam_rt.slam.window.state import WindowState
@@ -178,7 +178,7 @@ def _enter(
     other tracks speak against the motion that follows, return the state as it was, and False."""
     new = len(context.landmarks.ident)
     holds = decision.holds._replace(feature=np.full(len(decision.holds.std), new))
-    window = window_gaussian.add_feature(context.window, decision.place, holds)
+    window = window_features.add_feature(context.window, decision.place, holds)
     landmarks = enter(context.landmarks, decision.is_wall, histories.middle, len(at), 5.0, decision.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in decision.form]

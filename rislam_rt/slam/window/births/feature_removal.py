@@ -11,7 +11,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals
 from rislam_rt.slam.window.relinearisation import relinearise
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
@@ -39,7 +39,7 @@ def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
-    window, landmarks = window_gaussian.drop_features(context.window, keep), remove_features(landmarks, keep)
+    window, landmarks = window_features.drop_features(context.window, keep), remove_features(landmarks, keep)
     context = context._replace(window=window, landmarks=landmarks, log=log, tracks=tracks)
     return resolve(context, 2)[0]
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
@@ -273,13 +273,13 @@ def slide(window: Window) -> Window:
     covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
         head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
-        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:], prior=prior, noise=_eliminated_noise(shaken, size, gain),
-        slots=Quadratic(*(field[1:] for field in window.slots)),
+        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:], prior=prior,
+        noise=eliminated_noise(shaken, size, gain), slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
     )  # fmt: skip
 
 
-def _eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
+def eliminated_noise(noise: Floats, size: int, gain: Floats) -> Floats:
     """Covariance (size, size) of the cost's gradient that is left when the other unknowns are eliminated by `gain`."""
     lift = np.concatenate([np.eye(size), -gain], axis=1)
     return np.asarray(lift @ noise @ lift.T)
@@ -358,59 +358,3 @@ def weigh_holds(window: Window) -> Window:
     rows = HEAD + 3 * holds.feature[:, None] + np.arange(3)
     blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
     return window._replace(holds=holds.weighed(window.features[holds.feature], blocks))
-
-
-def add_feature(window: Window, place: Floats, holds: DirectionPriors, ridge: float = 1e-6) -> Window:
-    """Sliding window with one more feature at `place` (3,), known by its direction priors `holds` and otherwise by next
-    to nothing (`ridge` [1/m^2])."""
-    size = len(window.head)
-    hessian = np.zeros((size + 3, size + 3))
-    hessian[:size, :size], hessian[size:, size:] = window.prior.hessian, ridge * np.eye(3)
-    prior = Quadratic(
-        hessian, np.concatenate([window.prior.gradient, np.zeros(3)]), np.concatenate([window.prior.middle, place])
-    )
-    count, old = window.num_poses, window.slots
-    wide = np.zeros((count, POSE + size - HEAD + 3, POSE + size - HEAD + 3))
-    wide[:, :-3, :-3] = old.hessian
-    gradient = np.concatenate([old.gradient, np.zeros((count, 3))], axis=1)
-    middle = np.concatenate([old.middle, np.broadcast_to(place, (count, 3))], axis=1)
-    covariance = np.insert(np.insert(window.covariance, size * np.ones(3, int), 0.0, axis=0), [size] * 3, 0.0, axis=1)
-    covariance[size : size + 3, size : size + 3] = np.eye(3)
-    joined = DirectionPriors._make(np.concatenate(pair) for pair in zip(window.holds, holds, strict=True))
-    return window._replace(
-        holds=joined,
-        head=np.concatenate([window.head, place]),
-        prior=prior,
-        noise=np.pad(window.noise, (0, 3)),
-        slots=Quadratic(wide, gradient, middle),
-        covariance=covariance,
-    )
-
-
-def drop_features(window: Window, keep: Booleans) -> Window:
-    """Sliding window without the features not marked in `keep` (F,): marginalised from what left the window, deleted
-    from the slots, which have to be re-linearised."""
-    size = len(window.head)
-    stays = np.concatenate([np.ones(HEAD, dtype=np.bool_), np.repeat(keep, 3)])
-    inside, out = np.flatnonzero(stays), np.flatnonzero(~stays)
-    order = np.concatenate([inside, out])
-    hessian, gradient = window.prior.hessian, window.prior.slope(window.head)
-    spread = inverse(hessian[np.ix_(out, out)] + 1e-9 * np.eye(len(out)))
-    gain = hessian[np.ix_(inside, out)] @ spread
-    left = hessian[np.ix_(inside, inside)] - gain @ hessian[np.ix_(out, inside)]
-    prior = Quadratic(0.5 * (left + left.T), gradient[inside] - gain @ gradient[out], window.head[inside])
-    rows = np.concatenate([np.arange(POSE), POSE + np.flatnonzero(np.repeat(keep, 3))])
-    old = window.slots
-    slots = Quadratic(old.hessian[:, rows[:, None], rows], old.gradient[:, rows], old.middle[:, rows])
-    kept = np.concatenate([inside, np.arange(size, len(window.covariance))])
-    stay = keep[window.holds.feature]
-    holds = window.holds._replace(feature=(np.cumsum(keep) - 1)[window.holds.feature])
-    holds = DirectionPriors._make(field[stay] for field in holds)
-    return window._replace(
-        holds=holds,
-        head=window.head[inside],
-        prior=prior,
-        noise=_eliminated_noise(window.noise[np.ix_(order, order)], len(inside), gain),
-        slots=slots,
-        covariance=window.covariance[np.ix_(kept, kept)],
-    )

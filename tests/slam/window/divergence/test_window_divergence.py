@@ -13,7 +13,7 @@ from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
@@ -186,7 +186,7 @@ def _window(rng):
     """Three poses and two features that measurements tie together."""
     window = window_gaussian.begin(np.zeros(3), np.array([0.1, 0.2, 0.0]), np.array([1e-5] * 3 + [0.01] * 3 + [0.0]))
     for place in ([1.0, 2.0, 1.0], [-2.0, 1.0, 2.0]):
-        window = window_gaussian.add_feature(window, np.array(place), no_holds())
+        window = window_features.add_feature(window, np.array(place), no_holds())
     for _ in range(2):
         window = window_gaussian.extend(window, 0.1, np.full(3, 25.0))
     root = rng.standard_normal(window.slots.hessian.shape) * 10.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, prediction_variance
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
@@ -14,7 +14,7 @@ def drawn(turns):
     rng = np.random.default_rng(6)
     window = window_gaussian.begin(np.zeros(3), np.ones(3), np.full(7, 0.1), turns=turns)
     for _ in range(2):
-        window = window_gaussian.add_feature(window, rng.standard_normal(3), no_holds())
+        window = window_features.add_feature(window, rng.standard_normal(3), no_holds())
     for _ in range(4):
         window = window_gaussian.extend(window, float(rng.uniform(0.05, 0.2)), np.ones(3 + turns))
     root = rng.standard_normal(window.covariance.shape)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother import motion, window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.motion_basis import POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
@@ -21,7 +21,7 @@ def _last(pushes, keep, leaving):
     window = window_gaussian.begin(np.zeros(3), np.zeros(3), np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2, 0.0]))
     features = np.array([[1.0, 2.0, 0.5], [-1.0, 0.5, 2.0]])
     for feature in features:
-        window = window_gaussian.add_feature(window, feature, no_holds(), ridge=1.0)
+        window = window_features.add_feature(window, feature, no_holds(), ridge=1.0)
     for cycle in range(CYCLES):
         if cycle:
             push = pushes[cycle - 1]
@@ -41,7 +41,7 @@ def _last(pushes, keep, leaving):
         gradient[-1] = rows.T @ (weight * (rows @ spot - value))
         window = window_gaussian.solve(window._replace(slots=Quadratic(hessian, gradient, middle)))
         if leaving and cycle == CYCLES - 2:
-            window = window_gaussian.drop_features(window, np.array([True, False]))
+            window = window_features.drop_features(window, np.array([True, False]))
     return window, np.concatenate([place, speed])
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother import motion, window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
@@ -22,7 +22,7 @@ def _filtered(sightings, start, std, keep):
     """The window's answer, at most `keep` poses long."""
     window = window_gaussian.begin(start[:3], start[3:6], std)
     nothing = DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
-    window = window_gaussian.add_feature(window, np.ones(3), nothing, ridge=1.0)
+    window = window_features.add_feature(window, np.ones(3), nothing, ridge=1.0)
     for cycle, (rows, value, weight) in enumerate(sightings):
         if cycle:
             while window.num_poses >= keep:
@@ -90,7 +90,7 @@ def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
         np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
     )  # fmt: skip
     for truth, right in ((0.02, True), (0.6, False)):
-        held = window_gaussian.add_feature(window, np.array([5.0, 0.0, truth]) + 0.1 * rng.standard_normal(3), hold)
+        held = window_features.add_feature(window, np.array([5.0, 0.0, truth]) + 0.1 * rng.standard_normal(3), hold)
         hessian, gradient, middle = (field.copy() for field in held.slots)
         hessian[0, POSE:, POSE:] = np.eye(3) / 0.03**2
         middle[0, POSE:] = [5.0, 0.0, truth]
@@ -172,7 +172,7 @@ def _seen(turns):
     rng = np.random.default_rng(7)
     std = np.array([0.1, 0.1, 0.1, 0.2, 0.2, 0.2, 0.1 * turns])
     window = window_gaussian.begin(np.zeros(3), rng.standard_normal(3), std, turns=turns)
-    window = window_gaussian.add_feature(window, np.ones(3), no_holds(), ridge=1.0)
+    window = window_features.add_feature(window, np.ones(3), no_holds(), ridge=1.0)
     for cycle in range(6):
         if cycle:
             window = window_gaussian.extend(window, DT, rng.uniform(1.0, 100.0, 3 + turns))
