@@ -104,8 +104,7 @@ def test_a_picture_that_moves_while_no_time_passes_is_said(heading: str) -> None
     assert _led("no time passes", 4, heading=heading).said
 
 
-@pytest.mark.parametrize("heading", ["known", "estimated"])
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize(("seed", "heading"), [(4, "estimated"), (5, "known")])
 def test_nothing_wrong_is_not_called_lost(seed: int, heading: str) -> None:
     assert not _led("nothing wrong", seed, 20, heading=heading).said
 
