@@ -98,7 +98,7 @@ def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
 def _cut(room):
     from rislam_rt.pipeline.run import cut_scene
 
-    return cut_scene(room, 60)
+    return cut_scene(room, 30)
 
 
 def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, short_slices, done, tmp_path):
