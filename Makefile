@@ -22,6 +22,8 @@ demo: $(READY)
 test slow newest interop: export OPENBLAS_NUM_THREADS = 1
 test slow newest interop: export OMP_NUM_THREADS = 1
 test slow newest interop: export MKL_NUM_THREADS = 1
+# The tests start Python a hundred times: bytecode is kept, whatever the shell says.
+test slow newest interop: export PYTHONDONTWRITEBYTECODE =
 
 test: $(READY)
 	@$(BIN)/python -m pytest -n 2 --dist worksteal

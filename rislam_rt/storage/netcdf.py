@@ -76,11 +76,32 @@ def read_dataset(
     StoreError
         The file does not exist, or cannot be read.
     """
-    import xarray as xr
-
     try:
-        return xr.load_dataset(path, engine="h5netcdf")
+        return _load(path)
     except FileNotFoundError:
         raise StoreError(f"{path}: no such file; {missing}") from None
     except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
         raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); {damaged}") from None
+
+
+def _load(path: Path) -> "xr.Dataset":
+    """Read a NetCDF file with every HDF5 object opened once: h5netcdf opens a variable anew each time that it asks for
+    its shape, type or storage, which is most of the time that a small file takes."""
+    import h5netcdf
+    import h5py
+    import xarray as xr
+    from xarray.backends import H5NetCDFStore
+
+    class OpenedOnce(h5py.File):  # type: ignore[misc]
+        opened: dict[Any, Any]
+
+        def __getitem__(self, name: Any) -> Any:
+            if not isinstance(name, str):
+                return super().__getitem__(name)
+            if name not in self.opened:
+                self.opened[name] = super().__getitem__(name)
+            return self.opened[name]
+
+    with OpenedOnce(path, "r") as file:
+        file.opened = {}
+        return xr.load_dataset(H5NetCDFStore(h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")))

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-SHORT = ("--set", "channel=image_source", "--set", "cycles=6")
+SHORT = ("--set", "channel=image_source", "--set", "cycles=6", "--set", "receiver.estimator=bound")
 
 
 def test_new_room_from_corners(run):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-SHORT = ("channel=image_source", "depth=0", "cycles=3", 'schemes=["random"]')
+SHORT = ("channel=image_source", "depth=0", "cycles=3", "receiver.estimator=bound", 'schemes=["random"]')
 
 
 def test_a_run_in_a_room_that_was_edited_is_another_run(run, tmp_path):

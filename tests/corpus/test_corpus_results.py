@@ -41,7 +41,7 @@ CELLS = {
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A completed run of five cycles."""
-    settings = ["channel=image_source", "cycles=5", "depth=0", 'schemes=["random"]']
+    settings = ["channel=image_source", "cycles=5", "depth=0", "receiver.estimator=bound", 'schemes=["random"]']
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
     room = load_scene(ROOT / "scenes" / "paper_room")
     folder = tmp_path_factory.mktemp("sound") / "run"

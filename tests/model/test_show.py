@@ -23,7 +23,9 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="module")
 def result(scene: Scene) -> SlamResult:
-    spec = load_spec(find_pipeline("trace_then_slam"), ["cycles=5", "channel=image_source", "depth=1"])
+    spec = load_spec(
+        find_pipeline("trace_then_slam"), ["cycles=5", "channel=image_source", "depth=1", "receiver.estimator=bound"]
+    )
     return rislam_rt.run_slam(scene, spec, rng=np.random.default_rng(1))
 
 

@@ -11,7 +11,7 @@ from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-SHORT = ("channel=image_source", "cycles=8", "design.iterations=5")
+SHORT = ("channel=image_source", "cycles=8", "design.iterations=5", "receiver.estimator=bound")
 
 
 @pytest.fixture(scope="session")

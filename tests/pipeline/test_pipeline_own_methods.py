@@ -74,7 +74,7 @@ class NoChannel: ...
 """Methods at fault, beside the how-to's examples."""
 PAGE = (Path(__file__).parents[2] / "docs" / "own_methods.md").read_text()
 FILES = [block for block in re.findall(r"```python\n(.*?)```", PAGE, re.S) if block.startswith("# mine.py")]
-QUICK = ["cycles=8", "channel=image_source", "depth=1", "radio.reference_snr_db=30"]
+QUICK = ["cycles=8", "channel=image_source", "depth=1", "receiver.estimator=bound", "radio.reference_snr_db=30"]
 
 
 @pytest.fixture

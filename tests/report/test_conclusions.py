@@ -15,7 +15,13 @@ from rislam_rt.shipped import find_pipeline
 
 @pytest.fixture(scope="module")
 def result():
-    settings = ["channel=image_source", "depth=1", "cycles=6", 'schemes=["random", "no_ris"]']
+    settings = [
+        "channel=image_source",
+        "depth=1",
+        "cycles=6",
+        "receiver.estimator=bound",
+        'schemes=["random", "no_ris"]',
+    ]
     spec = load_spec(find_pipeline("trace_then_slam"), settings)
     return run_slam(load_scene("paper_room"), spec, rng=np.random.default_rng(7))
 

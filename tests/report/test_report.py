@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def result():
-    settings = ["channel=image_source", "cycles=6", "slam.num_samples=40", 'schemes=["random", "no_ris"]']
+    settings = ["channel=image_source", "cycles=6", "depth=1", "slam.num_samples=40", 'schemes=["random", "no_ris"]']
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
     return run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
 

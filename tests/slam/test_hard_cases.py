@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-SAMPLE = 40
+SAMPLE, QUICK = 40, 25
 
 
 def _load() -> ModuleType:
@@ -28,7 +28,9 @@ def _load() -> ModuleType:
 hard = _load()
 
 
-@pytest.mark.parametrize("number", range(SAMPLE))
+@pytest.mark.parametrize(
+    "number", [pytest.param(number, marks=pytest.mark.slow if number >= QUICK else ()) for number in range(SAMPLE)]
+)
 def test_filter_survives(number: int) -> None:
     """Twelve cycles at most: landmarks are born where the settings drawn ask for little history."""
     # a stride without a common factor goes through all kinds alike
@@ -98,14 +100,13 @@ def test_a_jump_is_said_and_landed_from(seed: int) -> None:
     assert verdict.std < 0.1
 
 
-@pytest.mark.parametrize("heading", ["known", "estimated"])
+@pytest.mark.parametrize("heading", [pytest.param("known", marks=pytest.mark.slow), "estimated"])
 def test_a_picture_that_moves_while_no_time_passes_is_said(heading: str) -> None:
     """No estimate can follow: what does not take any time is no motion."""
     assert _led("no time passes", 4, heading=heading).said
 
 
-@pytest.mark.parametrize("heading", ["known", "estimated"])
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize(("seed", "heading"), [(4, "estimated"), (5, "known")])
 def test_nothing_wrong_is_not_called_lost(seed: int, heading: str) -> None:
     assert not _led("nothing wrong", seed, 20, heading=heading).said
 

@@ -19,7 +19,7 @@ from rislam_rt.sweeps.store import DONE, Row
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-TINY = ("channel=image_source", "cycles=3", "slam.num_samples=20", 'schemes=["random"]')
+TINY = ("channel=image_source", "cycles=3", "receiver.estimator=bound", "slam.num_samples=20", 'schemes=["random"]')
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +185,7 @@ def test_picture_shows_a_line_for_each_scheme(swept):
 
 def test_a_sweep_counts_what_is_lost_and_keeps_what_was_said(capsys):
     """A start told right, and one told wrong by two metres and two metres a second; the cells in this process."""
-    settings = ("channel=image_source", "cycles=10", "depth=1", 'schemes=["no_ris"]')
+    settings = ("channel=image_source", "cycles=10", "depth=1", "receiver.estimator=bound", 'schemes=["no_ris"]')
     sweep = slam_sweep(PIPELINE, settings, ["told.start_scale=1,200"], repeat=2)
     cells = build_cells(sweep)
     rows = [Row(cell, DONE, "", run_cell({**cell.settings, **sweep.local}, cell.seed)) for cell in cells]

@@ -17,7 +17,7 @@ from rislam_rt.studies.swept.sweep import SNR
 from rislam_rt.sweeps import build_cells
 
 PIPELINES = Path(__file__).parents[2] / "pipelines"
-TINY = ("run.channel=image_source", "run.cycles=4", "run.depth=0", "repetitions=2")
+TINY = ("run.channel=image_source", "run.cycles=4", "run.depth=0", "run.receiver.estimator=bound", "repetitions=2")
 NAMES = ("fig4b", "fig4b_lively", "fig4c", "rooms", "ablations", "weighting", "robustness", "hardware")
 
 

@@ -92,10 +92,10 @@ def test_several_panels_are_written_and_read(stored):
 
 
 @pytest.fixture(scope="module")
-def errors_in_deviations(short_result, run_short):
+def errors_in_deviations(run_short):
     """(N, 3) errors of a run's components in delay and cosines, over the deviations said; of either estimator."""
-    drawn = run_short("receiver.estimator=bound", "receiver.merge=false", 'schemes=["random"]')
-    return {name: _errors(result) for name, result in (("waveform", short_result), ("bound", drawn))}
+    settings = {"waveform": ["receiver.estimator=waveform"], "bound": ["receiver.merge=false"]}
+    return {name: _errors(run_short(*more, 'schemes=["random"]')) for name, more in settings.items()}
 
 
 def _errors(result):

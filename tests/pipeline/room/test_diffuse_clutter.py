@@ -15,7 +15,10 @@ from rislam_rt.scene import load_scene
 from rislam_rt.shipped import find_pipeline
 
 PIPELINE = find_pipeline("trace_then_slam")
-ROUGH = ["cycles=4", "depth=1", "schemes=['optimized']", "room.scattering=0.3", "extras.diffuse=true"]
+ROUGH = [
+    "cycles=4", "depth=1", "schemes=['optimized']", "room.scattering=0.3", "extras.diffuse=true",
+    "receiver.estimator=bound", "design.iterations=5",
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -75,7 +75,13 @@ def paper() -> Scene:
 
 @pytest.fixture(scope="module")
 def result(paper: Scene) -> SlamResult:
-    settings = ["channel=image_source", "cycles=6", "depth=1", 'schemes=["random", "no_ris"]']
+    settings = [
+        "channel=image_source",
+        "cycles=6",
+        "depth=1",
+        "receiver.estimator=bound",
+        'schemes=["random", "no_ris"]',
+    ]
     return run_slam(paper, load_spec(PIPELINE, settings), rng=np.random.default_rng(7))
 
 
