@@ -204,13 +204,15 @@ def test_only_the_height_of_a_wheeled_agent_is_calmer_than_its_way(clear: tuple[
 
 
 def motion_prior(level: float, upwards: bool) -> float:
-    """Variance of the first step's acceleration, of a liveliness told to be `level`: of the mixture of its modes."""
+    """Variance of the first step's acceleration, of a liveliness told to be `level`: of the mixture of its modes;
+    upwards, where the floor may be level, too."""
     motion_mode = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
     motion_mode = np.where(model.is_level_only() & (not upwards), 0.0, motion_mode)
     if upwards:  # four manoeuvres, a quarter to the whole, against a level floor, each a rare event
         share = CONSTANTS.rare * 2.5 / (1.0 + 4.0 * CONSTANTS.rare)
         motion_mode = motion_mode**share * model.first_motion_mode(0.0) ** (1.0 - share)
-    return float(model.expected_variance(motion_mode / motion_mode.sum()))
+    moves = (1.0 + 4.0 * CONSTANTS.rare) / (np.exp(CONSTANTS.log_upright) + 1.0 + 4.0 * CONSTANTS.rare)
+    return float(model.expected_variance(motion_mode / motion_mode.sum())) * (moves if upwards else 1.0)
 
 
 def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Course]) -> None:

@@ -19,8 +19,6 @@ from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
 from rislam_rt.slam.window.state import WindowState
 
-UPWARDS = 2
-"""Index of the vertical axis among the window's accelerations."""
 UP = 1
 """Index of the vertical axis's group among `GROUPS`."""
 GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
@@ -40,14 +38,14 @@ def learn_motion(state: WindowState) -> WindowState:
     nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
     posterior[UP], level[UP] = nearer[:-1], nearer[-1]
     before = window.precision.copy()
-    before[:, UPWARDS] = window.uneven
+    before[:, 2] = window.uneven
     # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(before) + DAMPING * np.log(precisions(posterior)))
-    uneven = precision[:, UPWARDS].copy()
+    uneven = precision[:, 2].copy()
     if still > 0.5:
-        precision[:, UPWARDS] *= (STILL**-2.0 / uneven) ** still
+        precision[:, 2] *= (STILL**-2.0 / uneven) ** still
     variance = variances(posterior)
-    variance[:, UPWARDS] *= 1.0 - still
+    variance[:, 2] *= 1.0 - still
     window = window._replace(precision=precision, variance=variance, uneven=uneven)
     return state._replace(window=window, level=level, is_level=still > 0.5)
 
@@ -65,7 +63,7 @@ def likelihoods(window: Window, count: int) -> Floats:
         )
         for group in GROUPS[: free - 1]
     ])  # fmt: skip
-    information, slope = _told_upwards(window)
+    information, slope = _vertical_information(window)
     covariance = inverse(information + np.diag(window.uneven))
     mean, variance = (covariance @ slope)[:count, None], covariance.diagonal()[:count, None, None]
     found[UP] = motion.log_likelihood(mean, variance, window.uneven[:count])
@@ -73,11 +71,11 @@ def likelihoods(window: Window, count: int) -> Floats:
     return found
 
 
-def _told_upwards(window: Window) -> tuple[Floats, Floats]:
+def _vertical_information(window: Window) -> tuple[Floats, Floats]:
     """Information (K, K) on the window's vertical accelerations without their priors, and its slope (K,)."""
     size, free = len(window.head), window.accel.shape[1]
-    inner = inverse(window.covariance[size + UPWARDS :: free, size + UPWARDS :: free])
-    return inner - np.diag(window.solved[:, UPWARDS]), np.asarray(inner @ window.accel[:, UPWARDS])
+    inner = inverse(window.covariance[size + 2 :: free, size + 2 :: free])
+    return inner - np.diag(window.solved[:, 2]), np.asarray(inner @ window.accel[:, 2])
 
 
 def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -> tuple[float, float]:
@@ -88,7 +86,7 @@ def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -
     Floors are level as often as other surfaces are. Priors in between are `PRIORS` steps in equal ratios of the
     precision; a manoeuvre of any size is a rare event.
     """
-    information, slope = _told_upwards(window)
+    information, slope = _vertical_information(window)
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
     share = np.linspace(0.0, 1.0, PRIORS)
     std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])

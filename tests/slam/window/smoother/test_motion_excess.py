@@ -28,7 +28,7 @@ def _last(pushes, keep, leaving):
             place, speed = place + DT * speed + 0.5 * DT**2 * push, speed + DT * push
             while window.num_poses >= keep:
                 window = window_gaussian.slide(window)
-            window = window_gaussian.extend(window, DT, PRECISION, PRECISION**2 * VARIANCE - PRECISION)
+            window = window_gaussian.extend(window, DT, PRECISION, VARIANCE)
         rows, weight = rng.standard_normal((3, POSE + 6)), rng.uniform(1.0, 100.0, 3)
         rows[:, 3] = 0.0
         if leaving and cycle >= CYCLES - 1 - keep:  # what left the window may be marginalised, the rest is struck
