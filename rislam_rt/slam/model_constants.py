@@ -57,7 +57,7 @@ class ModelConstants(NamedTuple):
     walk: float = 1.0
     """Standard deviation [m/s] of a velocity of which nothing is known, and [m] of the position of a lost agent."""
     level: float = 0.001
-    """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on a level floor."""
+    """Standard deviation [m/s^2] of the vertical acceleration in the calmest motion mode: wheels on an uneven floor."""
     calmest: float = 0.003
     """Standard deviation [m/s^2] of the horizontal acceleration in the calmest motion mode: a rail car."""
     liveliest: float = 1.0
