@@ -120,7 +120,9 @@ class Residuals(NamedTuple):
         return Residuals._make(field[rows] for field in self)
 
 
-def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float) -> Floats:
+def squares(
+    rows: Integers, left: Floats, log: Log, spread: Floats | float, unseen: Floats | float = 0.0
+) -> Floats:
     """Expected mean squares (A,) of the errors of the log's components `rows` (A,), in reported deviations, given
     their residuals `left` (A, 3) and the variance `spread` (A, 3) of what they were compared with, in deviations.
 
@@ -128,7 +130,9 @@ def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float) -> F
     error is (the E step of expectation maximisation, Dempster et al. 1977).
     """
     std, extra, now = log.std[rows], log.extra[rows], log.momentary(rows)
-    return np.asarray(np.mean(left**2 * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
+    own = 1.0 / (1.0 + np.asarray(unseen))
+    left = own**2 * left**2 + 1.0 - own
+    return np.asarray(np.mean(left * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
 
 
 def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
