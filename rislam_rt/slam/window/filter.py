@@ -208,15 +208,17 @@ def _solve(
     state, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else last)
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
     spread = prediction_variance(window, left.slot, left.slopes)
-    left = left._replace(square=squares(left.row, left.left, state.log, spread, _unseen_climb(window, left)))
+    left = left._replace(square=squares(left.row, left.left, state.log, spread, _unseen_motion(window, left)))
     state = motion_learning.learn_motion(state._replace(window=window))
     return state, view, left, float(np.sum(innovation**2)), covariance
 
 
-def _unseen_climb(window: Window, left: Residuals) -> Floats:
-    """Variance (A, 3) of residuals, in deviations, by a climb that the window filter holds for none.
+def _unseen_motion(window: Window, left: Residuals) -> Floats:
+    """Variance (A, 3) of residuals, in deviations, by manoeuvres that the window filter holds for none.
 
-    Of white accelerations over the window the variance of the height grows with the cube of time.
+    Of white accelerations over the window the variance of the place grows with the cube of time.
     """
-    height = window_gaussian.now_with_excess(window)[2][2, 2] * ((left.slot + 1.0) / window.num_poses) ** 3.0
-    return np.asarray(left.slopes[..., 2] ** 2 * height[:, None])
+    astray = window_gaussian.now_with_excess(window)[2][:3, :3]
+    late = ((left.slot + 1.0) / window.num_poses) ** 3.0
+    slopes = left.slopes[..., :3]
+    return np.asarray(np.vecdot(slopes @ astray, slopes) * late[:, None])

@@ -72,8 +72,8 @@ def test_what_a_residual_has_lost_to_the_estimate_is_given_back():
 
 
 def test_what_a_motion_explains_that_is_held_for_none_is_no_error():
-    """Residuals that are the sum of an error of nine deviations squared and of a motion's effect, four times that: in the
-    mean the error's square; a long residual is for the most part motion."""
+    """Residuals that are the sum of an error of nine deviations squared and of what a motion does, four times that: in
+    the mean the error's square; a long residual is for the most part motion."""
     rng, count, loud, unseen = np.random.default_rng(6), 10, 9.0, 4.0
     log = append(empty_log(), Observations(*(np.ones((count, 3)),) * 2, *(np.zeros(count),) * 3), 0, 0)
     extra = np.full((count, 3), loud - 1.0)
