@@ -83,8 +83,9 @@ def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -
     vertical accelerations between these two, and the probability that the floor is level and the height does not
     change at all, both by the marginal likelihood of all steps together.
 
-    Floors are level as often as other surfaces are. Priors in between are `PRIORS` steps in equal ratios of the
-    precision; a manoeuvre of any size is a rare event.
+    Floors are level as often as other surfaces are; from one that is not (`was_level`), it takes a rare event to come
+    to one. Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare
+    event.
     """
     information, slope = _vertical_information(window)
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
