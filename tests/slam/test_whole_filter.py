@@ -208,7 +208,7 @@ def motion_prior(level: float, upwards: bool) -> float:
     upwards, where the floor may be level, too."""
     motion_mode = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
     motion_mode = np.where(model.is_level_only() & (not upwards), 0.0, motion_mode)
-    if upwards:  # four manoeuvres, a quarter to the whole, against a level floor, each a rare event
+    if upwards:  # four manoeuvres, a quarter to the whole, against an uneven floor, each a rare event
         share = CONSTANTS.rare * 2.5 / (1.0 + 4.0 * CONSTANTS.rare)
         motion_mode = motion_mode**share * model.first_motion_mode(0.0) ** (1.0 - share)
     moves = (1.0 + 4.0 * CONSTANTS.rare) / (np.exp(CONSTANTS.log_upright) + 1.0 + 4.0 * CONSTANTS.rare)
