@@ -12,8 +12,10 @@ from rislam_rt.measurement import ReceiverConfig, build_sensor, measure
 from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, Scene, SensorModel, SlamEstimate
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
-from rislam_rt.slam import SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, step
+from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, step
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.nested import particle_filter
+from rislam_rt.slam.window.cycle_explanation import learn_cycle
 from rislam_rt.slam.window.smoother import motion as model
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
@@ -69,16 +71,19 @@ def _one(paths: Paths, cycle: int) -> Paths:
     return replace(paths, **fields, ris=RisLegs(legs.tx[one], legs.rx[one], legs.tx_leg, legs.rx_leg))
 
 
-def go(heard: Heard, measurements: list[Measurement] | None = None, cycles: int = 120, seed: int = 5) -> Course:
+def go(
+    heard: Heard, measurements: list[Measurement] | None = None, cycles: int = 120, seed: int = 5,
+    config: SlamConfig = CONFIG,
+) -> Course:  # fmt: skip
     """The filter over the first cycles."""
     motion, rng = heard.scene.agent[CYCLES], np.random.default_rng(seed)
     assert heard.scene.ris is not None
-    state = init(heard.start, motion.body, heard.scene.ris.spec, heard.sensor, CONFIG, rng=rng)
+    state = init(heard.start, motion.body, heard.scene.ris.spec, heard.sensor, config, rng=rng)
     estimates, infos = [], []
     for cycle, measurement in enumerate((measurements or heard.measurements)[:cycles]):
         code, heading = RisCode(heard.codes.index[cycle], heard.codes.levels), float(motion.heading[cycle])
-        state, info = step(state, measurement, code, 0.1 if cycle else 0.0, heading, CONFIG, rng=rng)
-        estimates.append(estimate(state, CONFIG))
+        state, info = step(state, measurement, code, 0.1 if cycle else 0.0, heading, config, rng=rng)
+        estimates.append(estimate(state, config))
         infos.append(info)
     return Course(estimates, infos, state)
 
@@ -208,7 +213,7 @@ def motion_prior(level: float, upwards: bool) -> float:
     upwards, where the floor may be level, too."""
     motion_mode = model.first_motion_mode(level) @ model.transition(CONSTANTS.stay)
     motion_mode = np.where(model.is_level_only() & (not upwards), 0.0, motion_mode)
-    if upwards:  # four manoeuvres, a quarter to the whole, against a level floor, each a rare event
+    if upwards:  # four manoeuvres, a quarter to the whole, against an uneven floor, each a rare event
         share = CONSTANTS.rare * 2.5 / (1.0 + 4.0 * CONSTANTS.rare)
         motion_mode = motion_mode**share * model.first_motion_mode(0.0) ** (1.0 - share)
     moves = (1.0 + 4.0 * CONSTANTS.rare) / (np.exp(CONSTANTS.log_upright) + 1.0 + 4.0 * CONSTANTS.rare)
@@ -231,3 +236,21 @@ def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Cour
     np.testing.assert_allclose(np.diag(belief.covariance)[:3], [want, want, height], rtol=1e-5, atol=1e-9)
     assert info.outcome == StepOutcome.NO_MEASUREMENTS
     assert info.nis_dof == 0
+
+
+def test_residuals_of_the_nested_filter_tell_of_scatter(
+    clear: tuple[Heard, Course], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its front end learns the scatter of each path from the squares of residuals, none of which is nothing."""
+    squares = []
+
+    def learn(*given: Any) -> Any:
+        squares.append(given[4].square)
+        return learn_cycle(*given)
+
+    monkeypatch.setattr(particle_filter, "learn_cycle", learn)
+    nested = NestedConfig(num_agents=20, min_agents=20, num_points=32, min_points=32, engine="numpy", birth_cycles=6)
+    go(clear[0], cycles=16, config=SlamConfig(filter="nested", nested=nested))
+    found = np.concatenate(squares)
+    assert len(found) > 5
+    assert (found > 0.0).all()

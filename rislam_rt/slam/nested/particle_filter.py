@@ -49,7 +49,7 @@ from rislam_rt.slam.window.cycle_explanation import (
     unexplained,
 )
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
-from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.measurement_log import Log, squares
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
@@ -124,6 +124,7 @@ def step(
     told = update(belief, _seen(front, view, used), config.nested, engine)
     front = _refresh_view(front, told.belief, config)
     left = relinearise(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
+    left = left._replace(square=squares(left.row, left.left, front.log, 0.0))
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED

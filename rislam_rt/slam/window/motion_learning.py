@@ -105,7 +105,7 @@ def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -
 
 
 def nearer_floor(level: Floats, share: float) -> Floats:
-    """Vertical motion-mode probabilities (..., L), pooled with those of a level floor by `share` where they are
+    """Vertical motion-mode probabilities (..., L), pooled with those of an uneven floor by `share` where they are
     livelier."""
     pooled = motion.pool(level, motion.first_motion_mode(0.0), share)
     calmer = motion.expected_variance(pooled) < motion.expected_variance(level)
@@ -129,7 +129,8 @@ def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
     """Prior precisions (A,) of one step's acceleration, and of its rate of turn where the heading is estimated, under
     told motion."""
     upwards = config.sigma_a if config.height == "estimated" else STILL
-    rates = (config.turn_std / np.sqrt(dt),) if turns else ()
+    # in no time nothing turns, at any rate
+    rates = (config.turn_std / np.sqrt(dt or 1.0),) if turns else ()
     return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 

@@ -60,4 +60,4 @@ STRENGTHS = 13
 SWAYS = 5
 """Number of levels of the body's attitude, half a decade of angle apart."""
 PRIORS = 5
-"""Number of priors of the vertical motion that are compared, from a level floor to what each step alone asks for."""
+"""Number of priors of the vertical motion that are compared, from an uneven floor to what each step alone asks for."""

@@ -15,8 +15,12 @@ from rislam_rt.slam.window.cycle_association import CycleAssociation
 
 
 def partner_presence(view: CycleAssociation, observed: Observations) -> tuple[Floats, Floats]:
-    """Probabilities (A,) that the unresolved partner of each associated cluster is heard in its component: given this
-    cycle's component, and for cycles to come, where one of `memory` components that err alike counts. 0 without one."""
+    """Probabilities (A,) that the unresolved partner of each associated cluster is heard in this cycle's component, and
+    that nothing occludes it in cycles to come, for which one of `memory` components that err alike counts. 0 without a
+    partner.
+
+    What is not heard may be below the plane of an array that sways, and tells so much less of occlusion.
+    """
     groups, expected = view.groups, view.expected
     now = groups.presence[view.row].copy()
     later = now.copy()
@@ -38,7 +42,8 @@ def partner_presence(view: CycleAssociation, observed: Observations) -> tuple[Fl
     odds = scipy.special.logit(np.clip(now[both], 1e-12, 1.0 - 1e-12))
     now[both] = scipy.special.expit(odds + ratio)
     most = CONSTANTS.max_log_ratio
-    later[both] = scipy.special.expit(odds + np.clip(ratio / CONSTANTS.memory, -most, most))
+    heard, before = scipy.special.expit(odds + np.clip(ratio / CONSTANTS.memory, -most, most)), later[both]
+    later[both] = heard + (1.0 - heard) * (view.clear[mate] - before) / (1.0 - before)
     return now, later
 
 

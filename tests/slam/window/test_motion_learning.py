@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.motion_learning import manoeuvre_share, nearer_floor
+from rislam_rt.slam.window.motion_learning import assumed_precision, manoeuvre_share, nearer_floor
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
@@ -95,3 +96,12 @@ def test_nothing_heard_leaves_floors_as_level_as_other_surfaces():
 def test_who_climbs_is_on_no_level_floor(speed):
     height = speed * DT * np.maximum(np.arange(CYCLES) - 20, 0)
     assert learnt(window_of(height, np.full(CYCLES, 0.01)))[1] < 0.01
+
+
+def test_in_no_time_a_told_motion_stays_finite():
+    """Two measurements of one time stamp, the heading estimated: the belief is what it was."""
+    config = SlamConfig(motion="told", heading="estimated")
+    window = window_gaussian.begin(np.zeros(3), np.ones(3), np.full(7, 0.1), turns=True)
+    later = window_gaussian.extend(window, 0.0, assumed_precision(config, 0.0, turns=True))
+    for before, after in zip(window_gaussian.now(window), window_gaussian.now(later), strict=True):
+        np.testing.assert_allclose(after, before)

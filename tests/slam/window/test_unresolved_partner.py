@@ -13,9 +13,9 @@ STD, LEVEL_STD = np.array([0.002, 0.004, 0.004]), 0.05
 PLACE, GAP = np.array([4.0, 0.1, 0.2]), np.array([0.2, 0.1, -0.1])
 
 
-def view_of(presence, *, partner=1, uncertain=0.0):
+def view_of(presence, *, partner=1, uncertain=0.0, clear=None):
     """Association of one component with a cluster of two returns, of which a map known within `uncertain` [m] tells the
-    places."""
+    places; nothing occludes the partner with a probability `clear`, and if so it is heard."""
     slope = np.zeros((2, 3, 7))
     slope[0, 0, 0], slope[1, 0, 1] = 1.0, 1.0
     groups = SimpleNamespace(
@@ -29,6 +29,7 @@ def view_of(presence, *, partner=1, uncertain=0.0):
     )  # fmt: skip
     return SimpleNamespace(
         groups=groups, expected=expected, row=np.array([0]), pick=np.array([0]), scatter=np.ones(2),
+        clear=np.array([0.9, presence if clear is None else clear]),
         covariance=uncertain**2 * np.eye(7),
     )  # fmt: skip
 
@@ -70,3 +71,14 @@ def test_it_is_the_ratio_of_two_densities(share):
 def test_who_has_no_partner_hears_none():
     now, later = partner_presence(view_of(0.0, partner=-1), heard_at(0.4))
     assert now[0] == later[0] == 0.0
+
+
+@pytest.mark.parametrize("above", [1.0, 0.5, 0.0])
+def test_what_is_below_the_plane_of_the_array_tells_nothing_of_occlusion(above):
+    """By counting: a partner that is clear and above is heard; a component that it is not heard in is far likelier."""
+    view, clear = view_of(0.8 * above, clear=0.8), 0.8
+    heard = heard_at(0.0)
+    slow = np.exp(-CONSTANTS.max_log_ratio)  # the component is so much likelier without the partner
+    told = clear * (above * slow + 1.0 - above)
+    expected = told / (told + 1.0 - clear)
+    assert partner_presence(view, heard)[1][0] == pytest.approx(expected, rel=1e-9)
