@@ -92,6 +92,14 @@ def test_nothing_heard_leaves_floors_as_level_as_other_surfaces():
     assert still == pytest.approx(9.0 / (9.0 + 1.0 + 4.0 * 0.02), rel=1e-3)
 
 
+def test_from_an_uneven_floor_a_level_one_is_a_rare_event():
+    precision = np.full(CYCLES - 1, motion.expected_precision(LIVELY))
+    window = window_of(np.zeros(CYCLES), np.full(CYCLES, 1e6))
+    still = manoeuvre_share(window, precision, was_level=False)[1]
+    rare = CONSTANTS.rare
+    assert still == pytest.approx(rare / (rare + 1.0 + 4.0 * rare), rel=1e-3)
+
+
 @pytest.mark.parametrize("speed", [0.1, 0.3])
 def test_who_climbs_is_on_no_level_floor(speed):
     height = speed * DT * np.maximum(np.arange(CYCLES) - 20, 0)

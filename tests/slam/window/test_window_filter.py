@@ -13,6 +13,7 @@ from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import recovery
 from rislam_rt.slam.window.relinearisation import residuals
 from rislam_rt.slam.window.smoother import window_gaussian
@@ -249,3 +250,11 @@ def test_motion_that_is_told_stays_told(run):
     assert np.array_equal(state.window.precision[:, :2], np.full((19, 2), 0.02**-2.0))
     assert np.all(np.abs(state.window.accel[:, 2]) < 1e-4)  # a height that is known
     assert len(slam.estimate(state, config).map.wall_offset) >= 3
+
+
+def test_a_level_floor_is_known_for_one(run):
+    """What is held of its steps is far calmer than the calmest that an uneven floor may be."""
+    *_, (state, _, _) = run
+    assert state.is_level
+    assert (state.window.precision[:, 2] > 100.0 * CONSTANTS.level**-2.0).all()
+    assert (state.window.uneven < 2.0 * CONSTANTS.level**-2.0).all()
