@@ -175,7 +175,9 @@ def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
     """
     size, rows = len(window.head), _carried(window, window.covariance)
     whole, late = rows[:6, :size], rows[:6, size:]
-    excess = whole @ window.noise @ whole.T + (late * _surplus(window.solved, window.variance).ravel()) @ late.T
+    pushed = late * np.sqrt(_surplus(window.solved, window.variance)).ravel()
+    excess = whole @ window.noise @ whole.T
+    excess = 0.5 * (excess + excess.T) + pushed @ pushed.T
     covariance = window.covariance[:size, :size].copy()
     covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
     covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
