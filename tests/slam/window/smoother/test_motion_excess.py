@@ -74,3 +74,10 @@ def test_nothing_is_left_out_where_the_expected_precision_tells_all():
     sure = np.eye(len(motion.ladder()))
     precision = motion.expected_precision(sure)
     np.testing.assert_allclose(precision**2 * motion.expected_variance(sure), precision, rtol=1e-12)
+
+
+def test_it_is_symmetric_to_the_bit():
+    """After long gaps rounding would show beside the smallest variances."""
+    window, _ = _last(np.random.default_rng(7).standard_normal((CYCLES - 1, 3)), 4, leaving=False)
+    excess = window_gaussian.now_with_excess(window)[2]
+    np.testing.assert_array_equal(excess, excess.T)
