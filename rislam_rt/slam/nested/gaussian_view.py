@@ -43,19 +43,9 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     precision = np.tile(std**-2.0, (count - 1, 1))
     none = np.zeros(accel.shape)
     return Window(
-        head,
-        accel,
-        precision,
-        precision,
-        none,
-        precision[:, 2],
-        step,
-        prior,
-        np.zeros((size, size)),
-        slots,
-        whole,
+        head, accel, precision, precision, none, precision[:, 2], step, prior, np.zeros((size, size)), slots, whole,
         no_holds(),
-    )
+    )  # fmt: skip
 
 
 def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool) -> tuple[Floats, Floats]:

@@ -30,7 +30,7 @@ from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
-from rislam_rt.slam.window.unresolved_partner import partner_presence
+from rislam_rt.slam.window.unresolved_partner import partner_clear, partner_presence
 
 
 class HeardCycle(NamedTuple):
@@ -68,7 +68,7 @@ def log_associations(
     used = np.ones(len(row), dtype=np.bool_) if state.scene.use_vt else forms[view.groups.leader[row], 0] != TX
     log = append(state.log, observed, state.cycle, state.cycle - state.window.num_poses + 1)
     at = len(log.cycle) - len(observed.seen) + pick[used]
-    presence = partner_presence(view, observed)[0][used]
+    presence = partner_presence(view, observed)[used]
     return state._replace(log=_explain(log, view, state.landmarks, row[used], at, presence)), used
 
 
@@ -123,9 +123,9 @@ def learn_cycle(
         state = state._replace(lost_log_odds=odds)
     if min(landmarks.panels) < 0:  # once all are known, no track needs to be one
         state = state._replace(tracks=weigh_tracks(state.tracks, state.cycle, view.poses, state.scene, code))
-    told = partner_presence(view, observed)[1]
+    beside = partner_clear(view, observed)
     visibility, landmarks = update_landmarks(
-        state.visibility, landmarks, state.window, expected, groups, view.clear, told, view.above, view.rises,
+        state.visibility, landmarks, state.window, expected, groups, view.clear, beside, view.above, view.rises,
         view.scatter, view.shows, row, pick, raw, observed, view.poses,
         state.scene, code,
     )  # fmt: skip

@@ -112,7 +112,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
     rotation, told = state.attitude, state.attitude_information
     while window.num_poses >= CONSTANTS.window:
-        motion_mode = motion.forward(motion_mode, motion_learning.likelihoods(window, 1)[:, 0], CONSTANTS.stay)
+        told_of_first = motion_learning.likelihoods(window, 1, motion_learning.vertical_information(window))[:, 0]
+        motion_mode = motion.forward(motion_mode, told_of_first, CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
         rotation, told = rotation[1:], told[1:]
@@ -208,15 +209,16 @@ def _solve(
     state, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else last)
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
     spread = prediction_variance(window, left.slot, left.slopes)
-    left = left._replace(square=squares(left.row, left.left, state.log, spread, _unseen_motion(window, left)))
+    left = left._replace(square=squares(left.row, left.left, state.log, spread, _excess_variance(window, left)))
     state = motion_learning.learn_motion(state._replace(window=window))
     return state, view, left, float(np.sum(innovation**2)), covariance
 
 
-def _unseen_motion(window: Window, left: Residuals) -> Floats:
-    """Variance (A, 3) of residuals, in deviations, by manoeuvres that the window filter holds for none.
+def _excess_variance(window: Window, left: Residuals) -> Floats:
+    """Variance (A, 3) of residuals, in squared deviations, by the window's excess covariance: by manoeuvres that the
+    estimate holds for none.
 
-    Of white accelerations over the window the variance of the place grows with the cube of time.
+    Of white accelerations over equal steps the variance of the place grows with the cube of time.
     """
     astray = window_gaussian.now_with_excess(window)[2][:3, :3]
     late = ((left.slot + 1.0) / window.num_poses) ** 3.0

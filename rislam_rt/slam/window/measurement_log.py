@@ -120,16 +120,16 @@ class Residuals(NamedTuple):
         return Residuals._make(field[rows] for field in self)
 
 
-def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float, unseen: Floats | float = 0.0) -> Floats:
+def squares(rows: Integers, left: Floats, log: Log, spread: Floats | float, excess: Floats | float = 0.0) -> Floats:
     """Expected mean squares (A,) of the errors of the log's components `rows` (A,), in reported deviations, given
     their residuals `left` (A, 3) and the variance `spread` (A, 3) of what they were compared with, in deviations.
 
     The estimate has followed the measurement by as much as it was free to, so that a residual is smaller than the
-    error is (the E step of expectation maximisation, Dempster et al. 1977). It has not followed a motion that is held
-    for none: of that, a variance `unseen` (A, 3) in deviations, a residual is the sum with the error.
+    error is (the E step of expectation maximisation, Dempster et al. 1977). It has not followed manoeuvres that it
+    holds for none: a residual is the sum of the error and of these, of variance `excess` (A, 3) in squared deviations.
     """
     std, extra, now = log.std[rows], log.extra[rows], log.momentary(rows)
-    own = 1.0 / (1.0 + np.asarray(unseen))
+    own = 1.0 / (1.0 + np.asarray(excess))
     left = own**2 * left**2 + 1.0 - own
     return np.asarray(np.mean(left * (1.0 + extra / std**2) + np.minimum(spread, 1.0) * now / std**2, axis=1))
 

@@ -7,6 +7,8 @@ weight made an agent climb. So the vertical chain's priors stand against those o
 which the height does not change, by the marginal likelihood of all steps together.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rislam_rt.arrays import Floats
@@ -27,14 +29,24 @@ COLUMNS = np.array([0, 0, 1, 2])
 """Index into `GROUPS` of each axis."""
 
 
+class VerticalInformation(NamedTuple):
+    """What is told of the vertical accelerations of a window's K steps without their priors."""
+
+    information: Floats
+    """(K, K) [s^4/m^2], and..."""
+    slope: Floats
+    """(K,) [s^2/m] ...its product with the accelerations that it tells of."""
+
+
 def learn_motion(state: WindowState) -> WindowState:
     """Re-estimate every step's motion-mode probabilities by forward-backward smoothing, and the prior precision of its
     acceleration from them."""
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state
-    posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel)), CONSTANTS.stay)
-    share, still = manoeuvre_share(window, motion.expected_precision(posterior[UP]), state.is_level)
+    told = vertical_information(window)
+    posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel), told), CONSTANTS.stay)
+    share, still = manoeuvre_share(told, motion.expected_precision(posterior[UP]), was_level=state.is_level)
     nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
     posterior[UP], level[UP] = nearer[:-1], nearer[-1]
     before = window.precision.copy()
@@ -50,35 +62,35 @@ def learn_motion(state: WindowState) -> WindowState:
     return state._replace(window=window, level=level, is_level=still > 0.5)
 
 
-def likelihoods(window: Window, count: int) -> Floats:
-    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes; upwards were
-    the floor uneven, whether it is or not."""
+def likelihoods(window: Window, count: int, told: VerticalInformation) -> Floats:
+    """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes; upwards,
+    from what is told of all its steps, were the floor uneven, whether it is or not."""
     size, free = len(window.head), window.accel.shape[1]
     every = np.arange(count)
     inside = window.covariance[size : size + count * free, size : size + count * free]
     block = inside.reshape(count, free, count, free)[every, :, every]
+    covariance = inverse(told.information + np.diag(window.uneven))
+    mean, variance = (covariance @ told.slope)[:count, None], covariance.diagonal()[:count, None, None]
     found = np.stack([
-        motion.log_likelihood(
+        motion.log_likelihood(mean, variance, window.uneven[:count])
+        if number == UP
+        else motion.log_likelihood(
             window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group[0]]
         )
-        for group in GROUPS[: free - 1]
+        for number, group in enumerate(GROUPS[: free - 1])
     ])  # fmt: skip
-    information, slope = _vertical_information(window)
-    covariance = inverse(information + np.diag(window.uneven))
-    mean, variance = (covariance @ slope)[:count, None], covariance.diagonal()[:count, None, None]
-    found[UP] = motion.log_likelihood(mean, variance, window.uneven[:count])
     found[0, :, motion.is_level_only()] = -np.inf
     return found
 
 
-def _vertical_information(window: Window) -> tuple[Floats, Floats]:
-    """Information (K, K) on the window's vertical accelerations without their priors, and its slope (K,)."""
+def vertical_information(window: Window) -> VerticalInformation:
+    """Information on the window's vertical accelerations for `likelihoods` and `manoeuvre_share`."""
     size, free = len(window.head), window.accel.shape[1]
     inner = inverse(window.covariance[size + 2 :: free, size + 2 :: free])
-    return inner - np.diag(window.solved[:, 2]), np.asarray(inner @ window.accel[:, 2])
+    return VerticalInformation(inner - np.diag(window.solved[:, 2]), np.asarray(inner @ window.accel[:, 2]))
 
 
-def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -> tuple[float, float]:
+def manoeuvre_share(told: VerticalInformation, precision: Floats, *, was_level: bool) -> tuple[float, float]:
     """Expected share, from 0 for an uneven floor to 1 for the vertical chain's prior precisions (K,), of a prior of the
     vertical accelerations between these two, and the probability that the floor is level and the height does not
     change at all, both by the marginal likelihood of all steps together.
@@ -87,7 +99,7 @@ def manoeuvre_share(window: Window, precision: Floats, was_level: bool = True) -
     to one. Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare
     event.
     """
-    information, slope = _vertical_information(window)
+    information, slope = told
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
     share = np.linspace(0.0, 1.0, PRIORS)
     std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])

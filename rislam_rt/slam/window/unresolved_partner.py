@@ -7,26 +7,53 @@ component would be expected anywhere between the two, and tell nothing of the pa
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.assignment import squared_distance
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 
 
-def partner_presence(view: CycleAssociation, observed: Observations) -> tuple[Floats, Floats]:
-    """Probabilities (A,) that the unresolved partner of each associated cluster is heard in this cycle's component, and
-    that nothing occludes it in cycles to come, for which one of `memory` components that err alike counts. 0 without a
-    partner.
+def partner_presence(view: CycleAssociation, observed: Observations) -> Floats:
+    """Probabilities (A,) that the unresolved partner of each associated cluster is heard in this cycle's component; 0
+    without a partner."""
+    presence = view.groups.presence[view.row].copy()
+    both = _asked(view)
+    presence[both] = scipy.special.expit(scipy.special.logit(_open(presence[both])) + _log_ratio(view, observed, both))
+    return presence
+
+
+def partner_clear(view: CycleAssociation, observed: Observations) -> Floats:
+    """Probabilities (A,) that nothing occludes the unresolved partner of each associated cluster, for cycles to come:
+    of `memory` components that err alike one counts. 0 without a partner.
 
     What is not heard may be below the plane of an array that sways, and tells so much less of occlusion.
     """
+    clear = view.groups.presence[view.row].copy()
+    both, most = _asked(view), CONSTANTS.max_log_ratio
+    before = clear[both]
+    ratio = np.clip(_log_ratio(view, observed, both) / CONSTANTS.memory, -most, most)
+    heard = scipy.special.expit(scipy.special.logit(_open(before)) + ratio)
+    mate = view.groups.partner[view.row[both]]
+    clear[both] = heard + (1.0 - heard) * (view.clear[mate] - before) / (1.0 - before)
+    return clear
+
+
+def _asked(view: CycleAssociation) -> Integers:
+    """Associated clusters with an unresolved partner that may be silent while the leading path is heard."""
+    presence = view.groups.presence[view.row]
+    return ((view.groups.partner[view.row] >= 0) & (presence < 1.0)).nonzero()[0]
+
+
+def _open(probability: Floats) -> Floats:
+    """Probabilities of an unresolved partner within the open interval of finite log odds."""
+    return np.clip(probability, 1e-12, 1.0 - 1e-12)
+
+
+def _log_ratio(view: CycleAssociation, observed: Observations, both: Integers) -> Floats:
+    """Log likelihood ratios of the components of associated clusters `both`: with their unresolved partners, against
+    the leading paths alone."""
     groups, expected = view.groups, view.expected
-    now = groups.presence[view.row].copy()
-    later = now.copy()
-    both = ((groups.partner[view.row] >= 0) & (now < 1.0)).nonzero()[0]
-    if not len(both):
-        return now, later
     row, pick = view.row[both], view.pick[both]
     lead, mate, share = groups.leader[row], groups.partner[row], groups.share[row, None]
     left, level = observed.seen[pick] - expected.seen[lead], observed.log_amplitude[pick]
@@ -39,12 +66,7 @@ def partner_presence(view: CycleAssociation, observed: Observations) -> tuple[Fl
     ratio += _log_normal(level - groups.log_amplitude[row], noise + groups.log_amplitude_std[row] ** 2)
     ratio -= _log_density(left, slope, view.covariance, alone)
     ratio -= _log_normal(level - expected.log_amplitude[lead], noise + expected.log_amplitude_std[lead] ** 2)
-    odds = scipy.special.logit(np.clip(now[both], 1e-12, 1.0 - 1e-12))
-    now[both] = scipy.special.expit(odds + ratio)
-    most = CONSTANTS.max_log_ratio
-    heard, before = scipy.special.expit(odds + np.clip(ratio / CONSTANTS.memory, -most, most)), later[both]
-    later[both] = heard + (1.0 - heard) * (view.clear[mate] - before) / (1.0 - before)
-    return now, later
+    return ratio
 
 
 def _log_density(left: Floats, slope: Floats, covariance: Floats, extra: Floats) -> Floats:

@@ -74,14 +74,14 @@ def test_what_a_residual_has_lost_to_the_estimate_is_given_back():
 def test_what_a_motion_explains_that_is_held_for_none_is_no_error():
     """Residuals that are the sum of an error of nine deviations squared and of what a motion does, four times that: in
     the mean the error's square; a long residual is for the most part motion."""
-    rng, count, loud, unseen = np.random.default_rng(6), 10, 9.0, 4.0
+    rng, count, loud, excess = np.random.default_rng(6), 10, 9.0, 4.0
     log = append(empty_log(), Observations(*(np.ones((count, 3)),) * 2, *(np.zeros(count),) * 3), 0, 0)
     extra = np.full((count, 3), loud - 1.0)
     log, rows = log._replace(extra=extra, shared=extra), np.arange(count)
-    left = np.sqrt(1.0 + unseen) * rng.standard_normal((4000, count, 3))
-    found = np.mean([squares(rows, each, log, 0.0, np.full((count, 3), unseen)) for each in left])
+    left = np.sqrt(1.0 + excess) * rng.standard_normal((4000, count, 3))
+    found = np.mean([squares(rows, each, log, 0.0, np.full((count, 3), excess)) for each in left])
     assert found == np.clip(found, loud - 0.15, loud + 0.15)  # as above
-    long = squares(rows, np.full((count, 3), 30.0), log, 0.0, np.full((count, 3), unseen))
+    long = squares(rows, np.full((count, 3), 30.0), log, 0.0, np.full((count, 3), excess))
     np.testing.assert_allclose(long, loud * (900.0 / 25.0 + 0.8))
 
 

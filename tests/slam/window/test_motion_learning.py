@@ -5,7 +5,12 @@ import pytest
 
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.motion_learning import assumed_precision, manoeuvre_share, nearer_floor
+from rislam_rt.slam.window.motion_learning import (
+    assumed_precision,
+    manoeuvre_share,
+    nearer_floor,
+    vertical_information,
+)
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
@@ -29,9 +34,10 @@ def share_of(window):
     return learnt(window)[0]
 
 
-def learnt(window):
+def learnt(window, *, was_level=True):
     """That share, and the probability that the height does not change at all."""
-    return manoeuvre_share(window, np.full(CYCLES - 1, motion.expected_precision(LIVELY)))
+    precision = np.full(CYCLES - 1, motion.expected_precision(LIVELY))
+    return manoeuvre_share(vertical_information(window), precision, was_level=was_level)
 
 
 def test_one_datum_does_not_make_an_agent_climb():
@@ -93,9 +99,7 @@ def test_nothing_heard_leaves_floors_as_level_as_other_surfaces():
 
 
 def test_from_an_uneven_floor_a_level_one_is_a_rare_event():
-    precision = np.full(CYCLES - 1, motion.expected_precision(LIVELY))
-    window = window_of(np.zeros(CYCLES), np.full(CYCLES, 1e6))
-    still = manoeuvre_share(window, precision, was_level=False)[1]
+    still = learnt(window_of(np.zeros(CYCLES), np.full(CYCLES, 1e6)), was_level=False)[1]
     rare = CONSTANTS.rare
     assert still == pytest.approx(rare / (rare + 1.0 + 4.0 * rare), rel=1e-3)
 

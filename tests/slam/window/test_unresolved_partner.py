@@ -7,7 +7,7 @@ import pytest
 import scipy
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.unresolved_partner import partner_presence
+from rislam_rt.slam.window.unresolved_partner import partner_clear, partner_presence
 
 STD, LEVEL_STD = np.array([0.002, 0.004, 0.004]), 0.05
 PLACE, GAP = np.array([4.0, 0.1, 0.2]), np.array([0.2, 0.1, -0.1])
@@ -42,8 +42,8 @@ def heard_at(share, level=0.0):
 
 
 def test_where_a_component_is_tells_whether_two_paths_are_in_it():
-    assert partner_presence(view_of(0.5), heard_at(0.0))[0][0] < 1e-3
-    assert partner_presence(view_of(0.5), heard_at(0.4, np.log(1.28)))[0][0] > 1.0 - 1e-9
+    assert partner_presence(view_of(0.5), heard_at(0.0))[0] < 1e-3
+    assert partner_presence(view_of(0.5), heard_at(0.4, np.log(1.28)))[0] > 1.0 - 1e-9
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.2])
@@ -62,15 +62,15 @@ def test_it_is_the_ratio_of_two_densities(share):
 
     ratio = log_density(expected.seen[0] + 0.4 * GAP, both, wide, np.log(1.28), 0.3)
     ratio -= log_density(expected.seen[0], expected.jacobian[0], noise, 0.0, 0.2)
-    now, later = partner_presence(view, heard)
+    now, later = partner_presence(view, heard), partner_clear(view, heard)
     assert scipy.special.logit(now[0]) == pytest.approx(scipy.special.logit(0.3) + ratio, rel=1e-6)
     slow = np.clip(ratio / CONSTANTS.memory, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
     assert scipy.special.logit(later[0]) == pytest.approx(scipy.special.logit(0.3) + slow, rel=1e-6)
 
 
 def test_who_has_no_partner_hears_none():
-    now, later = partner_presence(view_of(0.0, partner=-1), heard_at(0.4))
-    assert now[0] == later[0] == 0.0
+    alone = view_of(0.0, partner=-1), heard_at(0.4)
+    assert partner_presence(*alone)[0] == partner_clear(*alone)[0] == 0.0
 
 
 @pytest.mark.parametrize("above", [1.0, 0.5, 0.0])
@@ -81,4 +81,4 @@ def test_what_is_below_the_plane_of_the_array_tells_nothing_of_occlusion(above):
     slow = np.exp(-CONSTANTS.max_log_ratio)  # the component is so much likelier without the partner
     told = clear * (above * slow + 1.0 - above)
     expected = told / (told + 1.0 - clear)
-    assert partner_presence(view, heard)[1][0] == pytest.approx(expected, rel=1e-9)
+    assert partner_clear(view, heard)[0] == pytest.approx(expected, rel=1e-9)
