@@ -160,6 +160,8 @@ ROWS: dict[str, Any] = {
     "dead reckoning [mm]": _median("dead_reckoning_m", MILLI, 0),
     "NEES per degree of freedom": _median("nees"),
     "NEES within 0.7 to 2": _share("consistent"),
+    "NEES across (x and y) per degree of freedom": _median("horizontal_nees"),
+    "its mean over the runs": _number("horizontal_nees_mean"),
     "lost": _share("lost"),
     "silently lost": _share("silent"),
     "births a run": _number("births"),

@@ -50,7 +50,8 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
         **(_ratio("late_", errors.absolute[late], truth.bound[late]) if late.any() else {}),
         **(_ratio("late_relative_", errors.relative[late], truth.relative_bound[late]) if late.any() else {}),
         "dead_reckoning_m": evaluate.root_mean_square(np.linalg.norm(drift, axis=1)),
-        "nees": _nees(truth, answers),
+        "nees": _nees(truth, answers, 3),
+        "horizontal_nees": _nees(truth, answers, 2),
     }
     own = np.array([np.sqrt(np.trace(estimate.covariance[:3, :3])) for estimate in answers.estimates])
     outcomes = [info.outcome for info in answers.infos]
@@ -177,11 +178,11 @@ def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
-def _nees(truth: Truth, answers: Answers) -> float | None:
-    """Score in an unseen room: mean NEES of the absolute position error over the cycles, per degree of freedom; None if
-    no axis is filtered."""
+def _nees(truth: Truth, answers: Answers, count: int) -> float | None:
+    """Score in an unseen room: mean NEES of the absolute position error along the first `count` axes over the cycles,
+    per degree of freedom; None if none of them is filtered."""
     covariance = np.array([estimate.covariance for estimate in answers.estimates])
-    axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :3, :3]).min(axis=0) > 0.0)
+    axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :count, :count]).min(axis=0) > 0.0)
     if not len(axes):
         return None
     offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position

@@ -1,5 +1,6 @@
 """The score card on results made by hand, whose scores are known."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,6 +80,7 @@ def test_a_perfect_run_has_the_starts_error_alone() -> None:
     assert scores["relative_rmse_m"] < 1e-12
     assert scores["ratio"] == pytest.approx(np.linalg.norm(TOLD) / 0.02)
     assert scores["nees"] == pytest.approx(np.sum(TOLD**2) / 0.01**2 / 2.0)
+    assert scores["horizontal_nees"] == pytest.approx(scores["nees"])
     assert not scores["lost"]
     assert not scores["silent"]
     assert scores["walls_heard"] == scores["walls_found"] == scores["walls_good"] == 2
@@ -91,6 +93,18 @@ def test_a_perfect_run_has_the_starts_error_alone() -> None:
         assert scores[name] == pytest.approx(1.0)
     # told 0.01 m/s too much along y: the error grows evenly with time
     assert scores["dead_reckoning_m"] == pytest.approx(0.01 * np.sqrt(np.mean(TIME**2)))
+
+
+def test_the_height_counts_in_the_nees_but_not_in_that_across() -> None:
+    given, up = answers(), np.array([0.0, 0.0, 0.02])
+    more = np.diag([0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0])
+    estimates = [
+        replace(each, position=each.position + up, covariance=each.covariance + more) for each in given.estimates
+    ]
+    scores = score_run(truth(), inputs(), given._replace(estimates=tuple(estimates)))
+    across = np.sum(TOLD**2) / 0.01**2
+    assert scores["horizontal_nees"] == pytest.approx(across / 2.0)
+    assert scores["nees"] == pytest.approx((across + 2.0**2) / 3.0)
 
 
 def test_relative_errors_and_what_is_late() -> None:
