@@ -82,8 +82,8 @@ class Material:
         return float(np.sqrt(1.0 - self.scattering**2))
 
     def as_body(self) -> "Material":
-        """Dielectric material that comes nearest to a constant |R|: a thick, slightly lossy body with this |R| at
-        normal incidence (0.998 at most); a slab stays as it is.
+        """Wall material of a scene as a dielectric, which comes nearest to its constant |R|: a thick, slightly lossy
+        body with this |R| at normal incidence (0.998 at most); a slab stays as it is.
 
         `permittivity = ((1 + R) / (1 - R))^2`; elsewhere it follows Fresnel's law.
         """

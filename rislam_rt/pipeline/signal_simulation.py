@@ -91,7 +91,7 @@ def signals_size(scene: Scene, spec: SignalsSpec) -> SignalsSize:
 
 
 def check_space(file: Path, size: SignalsSize) -> None:
-    """Check that the samples of a data set of received signals fit on the disk of `file`, before they are made.
+    """Check that the samples of received signals that are to be simulated fit on the disk of `file`.
 
     Raises
     ------

@@ -86,6 +86,6 @@ def _cell(link: LandmarkLink, at: int) -> str:
 
 
 def _why(link: LandmarkLink) -> str:
-    """Advice on a landmark that is not detected: the most frequent reason; empty if it is."""
+    """Report's cell of the table of advice: the most frequent reason why a landmark is not detected; empty if it is."""
     said = [reason for reason in link.reason if reason]
     return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)

@@ -167,7 +167,7 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
 
 
 def _flatten(loaded: Any, node: str | None) -> Mesh:
-    """Join all nodes of trimesh's scene (or one and those below it) into one mesh as it is read, transforms applied."""
+    """Join all meshes of a file that holds several (or one node and those below it) into one, transforms applied."""
     graph = loaded.graph
     nodes = list(graph.nodes_geometry)
     if node is not None:

@@ -294,7 +294,7 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
-    """Read and validate a scene file: its specification and its bytes.
+    """Read a scene file and validate it by the schema: its specification and its bytes.
 
     Raises
     ------

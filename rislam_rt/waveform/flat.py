@@ -48,7 +48,8 @@ def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivativ
 
 
 def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
-    """Baseband frequencies (M,) [Hz] of a multicarrier sounding's tones, evenly spaced over the band, centred on 0."""
+    """Baseband frequencies (M,) [Hz] of the tones of the multicarrier waveform, evenly spaced over the flat band,
+    centred on 0."""
     return (np.arange(num_subcarriers) - (num_subcarriers - 1) / 2.0) * bandwidth / num_subcarriers
 
 

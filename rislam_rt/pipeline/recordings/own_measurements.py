@@ -165,7 +165,7 @@ def inputs_of(
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:
-    """Check units and ranges of an estimator's inputs from a user's file, and return them."""
+    """Check units and ranges of a user's own measurements, and return them."""
     for cycle, one in enumerate(inputs.measurements):
         where = f"{place}: cycle {cycle}"
         if (one.tau > LONGEST_DELAY).any():

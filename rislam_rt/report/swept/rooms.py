@@ -99,7 +99,7 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
 
 
 def rooms_body(content: Mapping[str, Any], spec: RoomsSpec, figure: str | None) -> list[str]:
-    """Lines of the page of the study in many rooms: the aims, the picture, a table of all rooms."""
+    """Lines of the page of the swept study in the shipped rooms: the aims, the picture, a table of all rooms."""
     aims = content["aims"]
     text = f"""Aims: agent's RMSE at most {aims["rmse_m"]:g} m and {aims["over_bound"]:g} times its posterior bound,
     panel at most {aims["ris_m"]:g} m, scatterers {aims["scatterer_m"]:g} m, walls {aims["wall_deg"]:g} degrees and

@@ -34,7 +34,7 @@ class TriangleArray(NamedTuple):
         return self.scene.reflectors[self.owner[triangle]].name
 
     def outside(self, points: Floats) -> Integers:
-        """Indices of those points (K, 3) that lie outside the bounds of a scene's triangles."""
+        """Indices of those points (K, 3) that lie outside the bounds of a triangle array."""
         low, high = self.bounds
         return np.flatnonzero(((points < low) | (points > high)).any(axis=-1))
 

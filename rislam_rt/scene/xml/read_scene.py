@@ -49,7 +49,7 @@ class XmlScene:
 
 
 def find_xml(source: str) -> Path:
-    """Path of the scene file that a source names: a path, or `sionna:NAME` for a scene that Sionna RT brings along.
+    """Path of the XML scene file to read that a source names: a path, or `sionna:NAME` for one of Sionna RT's own.
 
     Raises
     ------

@@ -27,7 +27,8 @@ class Group(NamedTuple):
 
     @property
     def schemes(self) -> list[str]:
-        """Names of the schemes that ran, in the order of `SCHEMES`, as cells' files do not keep theirs; others last."""
+        """Names of the schemes in the collected cells of a swept study, in the order of `SCHEMES`, as cells' files do
+        not keep theirs; others last."""
         ran = {name for result in self.results if result for name in result["schemes"]}
         return [name for name in SCHEMES if name in ran] + sorted(ran - set(SCHEMES))
 

@@ -36,7 +36,8 @@ class Errors(NamedTuple):
 
 
 def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
-    """Score the estimates of one run against its truth: RMSE, bounds, NEES, divergence, walls, landmarks, births.
+    """Score the estimates of one run in an unseen room against its truth: RMSE, bounds, NEES, divergence, walls,
+    landmarks, births.
 
     None where there is nothing to score.
     """

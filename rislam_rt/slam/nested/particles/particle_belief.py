@@ -242,8 +242,8 @@ def _renew_agents(
 
 
 def _inherit(cloud: Cloud, ancestors: Integers, engine: CloudEngine) -> Cloud:
-    """Belief after resampling: cloud of a landmark for the children of agent particles, written anew only if most of it
-    is unused."""
+    """Particle belief after resampling: cloud of a landmark for the children of agent particles, written anew only if
+    most of it is unused."""
     block, row = cloud.block[ancestors], cloud.row[ancestors]
     cloud = cloud._replace(block=block, row=row, log_total=cloud.log_total[ancestors])
     written = int(cloud.block.max(initial=0)) + 1

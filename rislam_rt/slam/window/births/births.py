@@ -3,8 +3,7 @@ are."""
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.slam.arrival_rays import rays
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.predicted_returns import TX
@@ -14,6 +13,7 @@ from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.births.map_explanations import explanations
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
 from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
+from rislam_rt.slam.window.births.unheard_returns import bearings, missing_legs
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
@@ -42,7 +42,7 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     histories = summarise_tracks(context, track_rows)
     told = explanations(context, rows, histories, view, mean, covariance)
     panels = context.landmarks.panels
-    lonely = _missing_legs(context, rows, mean)
+    lonely = missing_legs(context, rows, mean)
     beside = (
         np.zeros(len(rows)) if context.scene.use_vt else _log_same_direction(context, rows, track_rows, histories, mean)
     )
@@ -90,41 +90,6 @@ def _mirrored(context: WindowState, at: Integers) -> bool:
     return bool((both & (log.mirrored(spacing).mean(axis=0) > 0.5)).any())
 
 
-def _missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
-    """Log probability (T,) that so few single-bounce returns are heard beside each track, were it a return over two
-    unknown walls.
-
-    Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
-    walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard. All of them are
-    compared as they are now: near a corner they change fast.
-    """
-    every, (ray, length) = context.tracks, _bearings(context, rows, mean)
-    shine = every.log_amplitude[rows] + np.log(length)
-    old = every.hits >= 3
-    away, reach = _bearings(context, old, mean)
-    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
-    walls = context.landmarks.walls
-    if len(walls):
-        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
-        span = place - anchor
-        normal = span / np.linalg.norm(span, axis=1)[:, None]
-        depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
-        away = np.concatenate([away, np.sign(depth)[:, None] * normal])
-        reach = np.concatenate([reach, 2.0 * np.abs(depth)])
-        bright = np.concatenate([bright, np.ones((len(ray), len(walls)), dtype=np.bool_)], axis=1)
-    along, share = ray @ away.T, reach / length[:, None]
-    leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
-    found = (leg & (share < 0.995) & bright).sum(axis=1)
-    missing = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])  # both, one of them, none
-    return missing[np.minimum(found, 2)]
-
-
-def _bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> tuple[Floats, Floats]:
-    """Directions of arrival (N, 3) in the room's axes and lengths (N,) [m] of some tracks."""
-    seen = context.tracks.mean[rows, :, 0]
-    return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
-
-
 def _log_same_direction(
     context: WindowState, rows: Integers, track_rows: list[Integers], histories: TrackSummary, mean: Floats
 ) -> Floats:
@@ -134,13 +99,13 @@ def _log_same_direction(
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
     old = context.tracks.hits >= 3
-    away, reach = _bearings(context, old, mean)
+    away, reach = bearings(context, old, mean)
     points, panels = context.landmarks.points, np.array(context.landmarks.panels)
     span = mean[HEAD:].reshape(-1, 3)[points] - mean[:3]
     far = np.linalg.norm(span, axis=1)
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
     panel = np.append(context.tracks.side[old] >= PANEL, np.isin(points, panels[panels >= 0]))
-    ray, length = _bearings(context, rows, mean)
+    ray, length = bearings(context, rows, mean)
     variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]
@@ -149,11 +114,6 @@ def _log_same_direction(
     shorter = (reach < length[:, None] - CONSTANTS.depth) & (panel | ~over_panel[:, None])
     odds = np.where(shorter, np.exp(np.minimum(log_odds, 20.0)), 0.0).sum(axis=1)
     return np.asarray(np.log1p(ALIGNED * (odds - 1.0)))
-
-
-LEG = 0.04
-"""Difference of cosines up to which a single-bounce return may be a leg of a track's right angle, or lie along its
-line."""
 
 
 def _taken(context: WindowState, at: Integers, form: Integers) -> bool:

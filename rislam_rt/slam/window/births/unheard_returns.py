@@ -1,4 +1,5 @@
-"""Evidence against a new wall that is heard over a known one, from its own single-bounce return not being heard."""
+"""Evidence against returns over two walls, from single-bounce returns that are not heard: a new wall's own where it is
+heard over a known one, or one of two unknown walls'."""
 
 import math
 
@@ -7,6 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.predicted_returns import poses_of, reflect
@@ -15,9 +17,14 @@ from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.horizon_detection import Elevations, above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
+
+LEG = 0.04
+"""Difference of cosines up to which a single-bounce return may be a leg of a track's right angle, or lie along its
+line."""
 
 
 def log_unheard(
@@ -100,3 +107,38 @@ def log_silence(shows: Floats, present: Booleans) -> float:
             clear *= (1.0 - show) / (1.0 - clear * show)
         clear = clear * (1.0 - CONSTANTS.rare) + (1.0 - clear) * CONSTANTS.cleared
     return found
+
+
+def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
+    """Log probability (T,) that so few single-bounce returns are heard beside each track, were it a return over two
+    unknown walls.
+
+    Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
+    walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard. All of them are
+    compared as they are now: near a corner they change fast.
+    """
+    every, (ray, length) = context.tracks, bearings(context, rows, mean)
+    shine = every.log_amplitude[rows] + np.log(length)
+    old = every.hits >= 3
+    away, reach = bearings(context, old, mean)
+    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
+    walls = context.landmarks.walls
+    if len(walls):
+        place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
+        span = place - anchor
+        normal = span / np.linalg.norm(span, axis=1)[:, None]
+        depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
+        away = np.concatenate([away, np.sign(depth)[:, None] * normal])
+        reach = np.concatenate([reach, 2.0 * np.abs(depth)])
+        bright = np.concatenate([bright, np.ones((len(ray), len(walls)), dtype=np.bool_)], axis=1)
+    along, share = ray @ away.T, reach / length[:, None]
+    leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
+    found = (leg & (share < 0.995) & bright).sum(axis=1)
+    missing = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])  # both, one of them, none
+    return missing[np.minimum(found, 2)]
+
+
+def bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> tuple[Floats, Floats]:
+    """Directions of arrival (N, 3) in the room's axes and lengths (N,) [m] of some tracks."""
+    seen = context.tracks.mean[rows, :, 0]
+    return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)

@@ -101,7 +101,8 @@ def turned(window: Window, by: float) -> Window:
 
 
 def log_jump() -> float:
-    """Prior log probability of a jump to one certain place (`CELL`), as far as the agent walks in a second."""
+    """Divergence monitor's prior log probability of a jump to one certain place (`CELL`), as far as the agent walks in
+    a second."""
     return CONSTANTS.log_lost + 2.0 * float(np.log(CELL / CONSTANTS.walk))
 
 

@@ -50,7 +50,7 @@ class WindowTable(NamedTuple):
 
     @property
     def ris_probability(self) -> Floats:
-        """Probability (F, Q) that each feature of the landmark table is each of the panels; 0 for walls."""
+        """Landmark table's probability (F, Q) that each feature is each of the panels; 0 for walls."""
         return ris_probabilities(self.log_ris, self.points)
 
     @property

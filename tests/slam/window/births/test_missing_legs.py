@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.births.births import _missing_legs
+from rislam_rt.slam.window.births.unheard_returns import missing_legs
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 CORNER = np.array([1.2, 1.6])
@@ -32,4 +32,4 @@ def test_a_corner_has_the_single_returns_of_its_walls_beside_it(heard, expected)
     )
     landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
     context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks)
-    assert _missing_legs(context, np.array([2]), np.zeros(HEAD))[0] == pytest.approx(expected)
+    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0] == pytest.approx(expected)
