@@ -123,7 +123,7 @@ def test_brute_force_finds_the_same_paths(rooms, name):
 def test_every_path_obeys_the_law_of_reflection(rooms, name):
     scene = getattr(rooms, name)()
     walls = build_walls(scene)
-    trajectory = rooms.at(np.random.default_rng(5).uniform(0.3, 2.7, (10, 3)))
+    trajectory = rooms.at(np.random.default_rng(5).uniform(0.3, 2.7, (5, 3)))
     paths = ImageSourceChannel(scene, RadioConfig(), 2).paths(trajectory)
     assert paths.valid.any(axis=0).all()
     for cycle, p in np.argwhere(paths.valid):
