@@ -72,7 +72,8 @@ def _save(figure: Figure, target: Any, kind: str, metadata: dict[str, str]) -> N
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
         if kind == "png":
             figure.set_dpi(DPI)
-            FigureCanvasAgg(figure).print_png(target, metadata=metadata)
+            canvas: Any = FigureCanvasAgg(figure)
+            canvas.print_png(target, metadata=metadata)
         else:
             figure.savefig(target, format=kind, dpi=DPI, metadata=metadata)
 
