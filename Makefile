@@ -23,7 +23,7 @@ test slow newest interop: export OPENBLAS_NUM_THREADS = 1
 test slow newest interop: export OMP_NUM_THREADS = 1
 test slow newest interop: export MKL_NUM_THREADS = 1
 # The tests start Python a hundred times: bytecode is kept, whatever the shell says.
-test slow newest interop: export PYTHONDONTWRITEBYTECODE =
+demo test slow docs newest interop: export PYTHONDONTWRITEBYTECODE =
 
 test: $(READY)
 	@$(BIN)/python -m pytest -n 2 --dist worksteal
@@ -38,6 +38,7 @@ docs: $(READY)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet && echo "site/index.html"
 
 # Everything is pinned with hashes, the build back end too, so that no step resolves anything by itself.
+# Two modules of three are never used: compiled are those that are, when they are first.
 $(READY): requirements.lock pyproject.toml
 	@python=''; \
 	for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
@@ -50,7 +51,7 @@ $(READY): requirements.lock pyproject.toml
 	fi; \
 	echo "building $(VENV) with $$($$python --version)"; \
 	$$python -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes -r requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Floats
@@ -62,17 +63,25 @@ def scheme_colour(name: str) -> str:
     return SCHEME.get(name, "#0072B2")
 
 
-def _save(figure: Figure, target: Any, **how: Any) -> None:
-    """Save a figure in our style without warnings about characters that the fonts lack, which are drawn as boxes."""
+def _save(figure: Figure, target: Any, kind: str, metadata: dict[str, str]) -> None:
+    """Save a figure in our style without warnings about characters that the fonts lack, which are drawn as boxes.
+
+    `savefig` draws twice, first only to place the axes; for PNG, whose renderer it places them with, once does.
+    """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+")
-        figure.savefig(target, **how)
+        if kind == "png":
+            figure.set_dpi(DPI)
+            canvas: Any = FigureCanvasAgg(figure)
+            canvas.print_png(target, metadata=metadata)
+        else:
+            figure.savefig(target, format=kind, dpi=DPI, metadata=metadata)
 
 
 def to_png(figure: Figure) -> bytes:
     """Encode a figure in our style as PNG."""
     buffer = io.BytesIO()
-    _save(figure, buffer, format="png", dpi=DPI, metadata={"Software": ""})
+    _save(figure, buffer, "png", {"Software": ""})
     return buffer.getvalue()
 
 
@@ -102,6 +111,6 @@ def save_figure(figure: Figure, path: Path) -> Path:
     """
     kind = picture_kind(path)
     buffer = io.BytesIO()
-    _save(figure, buffer, format=kind, dpi=DPI, metadata={MARKED_BY[kind]: MARK})
+    _save(figure, buffer, kind, {MARKED_BY[kind]: MARK})
     write_atomic(path, buffer.getvalue())
     return path

@@ -1,6 +1,8 @@
 """NetCDF files: encoding of named arrays with dimensions, units and meanings, writing whole or not at all, reading."""
 
 from collections.abc import Mapping, Sequence
+from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,9 +58,15 @@ def write_dataset(data: "xr.Dataset", path: Path) -> None:
 
 def dataset_bytes(data: "xr.Dataset") -> bytes:
     """Encode a data set as the content of a NetCDF file, large variables compressed."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     squeeze = {"zlib": True, "complevel": 1}
     packed = {name: squeeze for name, value in data.data_vars.items() if value.size > 1000}
-    return bytes(data.to_netcdf(engine="h5netcdf", encoding=packed))
+    memory = BytesIO()
+    with _opened_once()(memory, "w", track_order=True) as file, h5netcdf.File(file, "w") as content:
+        data.dump_to_store(H5NetCDFStore(content), encoding=packed)
+    return memory.getvalue()
 
 
 def read_dataset(
@@ -85,23 +93,41 @@ def read_dataset(
 
 
 def _load(path: Path) -> "xr.Dataset":
-    """Read a NetCDF file with every HDF5 object opened once: h5netcdf opens a variable anew each time that it asks for
-    its shape, type or storage, which is most of the time that a small file takes."""
+    """Read a NetCDF file into memory."""
     import h5netcdf
-    import h5py
     import xarray as xr
     from xarray.backends import H5NetCDFStore
 
+    with _opened_once()(path, "r") as file:
+        return xr.load_dataset(H5NetCDFStore(h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")))
+
+
+@cache
+def _opened_once() -> Any:
+    """Class of HDF5 files in which every object is opened once: h5netcdf opens a variable anew each time that it asks
+    for its shape, type or storage, which is most of the time that a small file takes."""
+    import h5py
+
     class OpenedOnce(h5py.File):  # type: ignore[misc]
-        opened: dict[Any, Any]
+        def __init__(self, *given: Any, **options: Any) -> None:
+            super().__init__(*given, **options)
+            self.opened: dict[str, Any] = {}
 
         def __getitem__(self, name: Any) -> Any:
             if not isinstance(name, str):
                 return super().__getitem__(name)
-            if name not in self.opened:
-                self.opened[name] = super().__getitem__(name)
-            return self.opened[name]
+            if name == "/":
+                return self  # through which h5netcdf deletes
+            if (path := "/" + name.lstrip("/")) not in self.opened:
+                self.opened[path] = super().__getitem__(path)
+            return self.opened[path]
 
-    with OpenedOnce(path, "r") as file:
-        file.opened = {}
-        return xr.load_dataset(H5NetCDFStore(h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")))
+        def __delitem__(self, name: str) -> None:
+            super().__delitem__(name)
+            self.opened.pop("/" + name.lstrip("/"), None)
+
+        def close(self) -> None:
+            self.opened.clear()
+            super().close()
+
+    return OpenedOnce

@@ -125,7 +125,7 @@ def run_sweep(
     tell
         Called when the cost is known and after every cell.
     grow
-        Called with all rows whenever the table is written, at the end too: to draw figures of the results so far.
+        Called with all rows whenever the table is written, after the last cell too: to draw figures of the results.
 
     Raises
     ------
@@ -194,6 +194,7 @@ class _SweepState:
         self.width = effort.jobs
         self.timings = store.read_timings(folder)
         self.due = 0.0
+        self.written = False
         self.known: tuple[float, SweepCost] | None = None
 
     def take(self, ident: str, outcome: CellOutcome) -> None:
@@ -203,6 +204,7 @@ class _SweepState:
         store.append_timing(self.folder, cell, outcome)
         self.timings.append({"point": cell.point, "seconds": outcome.seconds})
         self.left.pop(ident)
+        self.written = False
         if monotonic() >= self.due:
             self.write()
         self.show(row)
@@ -224,13 +226,14 @@ class _SweepState:
 
     def write(self) -> None:
         """Write the table of all cells as a sweep runs, and draw the figures of the results so far, unless the old ones
-        are kept."""
-        if self.keep:
+        are kept or no cell has ended since."""
+        if self.keep or self.written:
             return
         begin = monotonic()
         rows = list(self.rows.values())
         store.write_table(self.folder, rows)
         if self.grow is not None:
             self.grow(rows)
+        self.written = True
         taken = monotonic() - begin
         self.due = monotonic() + max(TABLE_SECONDS, taken / TABLE_SHARE)

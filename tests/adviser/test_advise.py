@@ -28,7 +28,7 @@ def settings(*changed: str) -> Settings:
     return build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
 
 
-def look(scene: Scene, *changed: str, places: int = 5) -> tuple[Survey, dict[tuple[str, str], LandmarkLink]]:
+def look(scene: Scene, *changed: str, places: int = 3) -> tuple[Survey, dict[tuple[str, str], LandmarkLink]]:
     looked = survey(scene, settings(*changed), places)
     return looked, {(link.landmark, link.code): link for link in link_budget(looked, rng=np.random.default_rng(1))}
 
@@ -125,13 +125,13 @@ def test_a_covered_path_names_what_covers_it_and_alternated_codes_uncover_a_pane
 
 
 def test_what_lacks_is_what_would_do(paper: Scene) -> None:
-    faint, links = look(paper, "radio.reference_snr_db=-12")
+    faint, links = look(paper, "radio.reference_snr_db=-12", places=5)
     link = links["ris", "aimed"]
     lack = lack_db(link)
     assert detection_label(link) != "heard"
     assert lack > 0.0
     weak = weak_places(link)
-    _, less = look(paper, f"radio.reference_snr_db={-12 + lack + 0.1}")
+    _, less = look(paper, f"radio.reference_snr_db={-12 + lack + 0.1}", places=5)
     assert float(np.median(less["ris", "aimed"].margin_db[weak])) == pytest.approx(0.1, abs=1e-9)
     assert isinstance(paper.ris, RisPanel)
     grown = enough_elements(faint, paper.ris, link)
@@ -139,7 +139,7 @@ def test_what_lacks_is_what_would_do(paper: Scene) -> None:
     share = {}
     for rows in (grown.rows, grown.rows - 2):
         panel = replace(paper.ris, spec=replace(grown, rows=rows, cols=rows))
-        _, tried = look(replace(paper, ris=panel), "radio.reference_snr_db=-12")
+        _, tried = look(replace(paper, ris=panel), "radio.reference_snr_db=-12", places=5)
         share[rows] = float(np.mean(tried["ris", "aimed"].margin_db[weak] >= 0.0))
     assert share[grown.rows] >= 0.5 > share[grown.rows - 2]
     line = next(line for line in remedies(faint, [*links.values()]) if line.startswith("ris: "))

@@ -74,7 +74,7 @@ def test_bad_input_is_one_line_and_exit_2(run, arguments, tmp_path):
 
 
 def test_unwritable_file_is_exit_4(run):
-    code, _, err = run("check", SCENE, "--json", "/proc/none/check.json")
+    code, _, err = run("check", ROOT / "scenes" / "empty_box", "--json", "/proc/none/check.json")
     assert code == 4
     assert "/proc/none/check.json" in err
 

@@ -38,12 +38,20 @@ def test_settings_are_printed_without_what_only_a_run_needs():
 
 def test_missing_library_is_one_line_and_exit_3(tmp_path):
     environment = {**os.environ, "DRJIT_LIBLLVM_PATH": str(tmp_path / "libLLVM.so")}
-    for words in (["doctor"], ["run", PIPELINE], ["trace", SCENE]):
-        done = subprocess.run(
-            [sys.executable, "-m", "rislam_rt", *map(str, words)],
-            capture_output=True, text=True, cwd=tmp_path, env=environment, check=False,
-        )  # fmt: skip
-        assert done.returncode == 3
-        assert len(done.stderr.splitlines()) == 1
-        assert "DRJIT_LIBLLVM_PATH" in done.stderr
-        assert list(tmp_path.iterdir()) == []
+    commands = [["trace", str(SCENE)], ["run", str(PIPELINE)], ["doctor"]]
+    code = (
+        "import sys\n"
+        "from rislam_rt.cli import main\n"
+        f"for words in {commands}:\n"
+        "    sys.argv = ['rislam-rt', *words]\n"
+        "    try:\n        main()\n"
+        "    except SystemExit as left:\n        print('left with', left.code, file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=environment, check=True
+    )
+    lines = done.stderr.splitlines()
+    assert lines[1::2] == ["left with 3"] * 3
+    assert len(lines) == 6
+    assert all("DRJIT_LIBLLVM_PATH" in line for line in lines[::2])
+    assert list(tmp_path.iterdir()) == []

@@ -151,7 +151,7 @@ def test_two_workers_give_the_same_bytes_and_tables_grow(whole, tmp_path):
         grow=lambda rows: sizes.append(sum(row.state == "done" for row in rows)),
     )  # fmt: skip
     assert written(tmp_path) == written(whole[0])
-    assert sizes == sorted(sizes)
+    assert sizes == sorted(set(sizes))  # and never the same twice
     assert (sizes[0], sizes[-1]) == (1, 12)
     assert [t.done for t in told] == [1, 1, *range(2, 13)]
     assert told[1].last is None  # the cost, after one cell and before the rest

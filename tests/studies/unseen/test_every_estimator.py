@@ -21,7 +21,8 @@ from rislam_rt.scene.random_rooms import RandomRoom
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
 from rislam_rt.studies.unseen.cell import find_setup, scheme_here, trace_key
 
-CYCLES = 80
+CYCLES, OF_THE_DEFAULT = 80, 50
+"""The default filter, which maps walls, takes longest, and is within its limits sooner."""
 
 
 class Case(NamedTuple):
@@ -43,9 +44,9 @@ class Case(NamedTuple):
 LANDMARKS = {"use_vt": False}
 NESTED = {"filter": "nested", "use_vt": False}
 CASES = [
-    Case("default", "random", {}, 103, 0.05, 50.0, 1.0),
-    Case("default", "random", {}, 233, 0.05, 20.0, 0.55),
-    Case("default", "random", {}, 266, 0.05, 20.0, 0.55),
+    Case("default", "random", {}, 103, 0.05, 50.0, 0.7),
+    Case("default", "random", {}, 233, 0.05, 17.0, 0.35),
+    Case("default", "random", {}, 266, 0.05, 20.0, 0.4),
     Case("landmarks", "random", LANDMARKS, 103, 0.1, 10.0, 1.0),
     Case("landmarks", "random", LANDMARKS, 266, 0.2, 7.0, 0.6),
     Case("nested", "random", NESTED, 233, 0.12, 4.5, 0.65),
@@ -58,8 +59,11 @@ CASES = [
     Case("bp_slam_aoa", "bp_slam_aoa", {"use_vt": True}, 266, 0.015, 9.0, 0.75),
 ]
 
-SELDOM = {("default", 103), ("landmarks", 103), ("bp_slam_aoa", 103), ("bp_slam_aoa", 233)}
-"""The longest runs, of estimators that also run in another room."""
+SELDOM = {
+    ("default", 103), ("landmarks", 103), ("bp_slam_aoa", 103), ("bp_slam_aoa", 233), ("bp_slam", 266),
+    ("channel_slam", 266),
+}  # fmt: skip
+"""Runs of estimators that also run in another room."""
 
 
 def often(cases: list[Case]) -> list[Any]:
@@ -99,7 +103,7 @@ def test_most_births_are_of_the_right_kind(case: Case) -> None:
 
 
 def test_the_maps_hold_most_of_what_is_heard_and_no_crowd() -> None:
-    """Walls and points at their places after 8 s, of two runs together: 17 of 26 heard, and 3 that are not there."""
+    """Walls and points at their places after 5 s, of two runs together: 18 of 25 heard, and 1 that is not there."""
     names = ("walls_found", "points_found", "walls_heard", "points_heard", "ghost_walls", "ghost_points")
     count = {name: sum(run(case, None)[name] for case in CASES[1:3]) for name in names}
     found, heard, ghosts = (count[names[n]] + count[names[n + 1]] for n in (0, 2, 4))
@@ -119,7 +123,8 @@ def _kept(number: int) -> dict[str, Any]:
 
 def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
     content = {
-        "name": "accuracy", "channel": "image_source", "depth": 1, "cycles": CYCLES, "schemes": [case.scheme],
+        "name": "accuracy", "channel": "image_source", "depth": 1, "schemes": [case.scheme],
+        "cycles": OF_THE_DEFAULT if case.name == "default" else CYCLES,
         "motion": {"sigma_a_m_s2": 0.01}, "start": {"velocity_std_m_s": 0.03}, "slam": case.settings,
         "nested": {"engine": "numpy", "num_agents": 100, "num_points": 200},
     }  # fmt: skip
