@@ -8,7 +8,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.births.feature_removal import resolve
+from rislam_rt.slam.window.births.feature_removal import remove_from_map, resolve
 from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
 from rislam_rt.slam.window.births.map_explanations import explanations
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
@@ -19,6 +19,7 @@ from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
 from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED, STRIDE
@@ -76,7 +77,8 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
         elif born >= 0 and is_clear(decision):
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
-    return context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
+    context = context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
+    return context if born < 0 else _without_rivals(context, decisions[born].identity)
 
 
 def _mirrored(context: WindowState, at: Integers) -> bool:
@@ -158,3 +160,13 @@ def _enter(
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))
     return grown, True
+
+
+def _without_rivals(context: WindowState, born: PanelIdentity) -> WindowState:
+    """The map after the birth of a point, without those that were held until now for a panel that it is: there is one
+    of each."""
+    landmarks = context.landmarks
+    keep, points = np.ones(len(landmarks.ident), dtype=np.bool_), landmarks.points
+    keep[points] = ~((born.log_ris > 0.0) & (landmarks.log_ris[points] > 0.0)).any(axis=1)
+    keep[-1] = True
+    return remove_from_map(context, keep)

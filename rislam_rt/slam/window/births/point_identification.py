@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
@@ -23,7 +24,8 @@ from rislam_rt.slam.window.landmarks.ris_identification import (
     unknown,
     weigh,
 )
-from rislam_rt.slam.window.smoother.window_gaussian import poses
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.smoother.window_gaussian import now, poses
 from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
@@ -36,8 +38,8 @@ class Identified(NamedTuple):
     identity: PanelIdentity
     """(H,) panel identity of each point."""
     elsewhere: Floats
-    """(T, Q) log odds that a track runs over each panel by a path that is none of these hypotheses, against over
-    none."""
+    """(T, Q) log odds that a track runs over each panel by a path that is none of these hypotheses, against over none:
+    one that is shorter than the direct path over the point that is held for the panel needs another point for it."""
 
 
 def identify(
@@ -55,6 +57,7 @@ def identify(
     taken = -np.logaddexp.reduce(
         np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
     )  # but one
+    margin = longer(context, track_rows)
     for track, at in enumerate(track_rows):
         rows = (point & (table.trials.track == track)).nonzero()[0]
         if (context.log.side[at] == OTHER).all():
@@ -65,11 +68,33 @@ def identify(
         fresh.log_ris[:-1] += taken
         found.gain[near] = np.logaddexp.reduce(np.pad(fresh.log_ris[:-1], ((0, 0), (1, 0))), axis=1)
         found.gain[near] -= np.log1p(panels * CONSTANTS.panels)
-        found.elsewhere[track] = fresh.log_ris[-1]
+        found.elsewhere[track] = fresh.log_ris[-1] + np.logaddexp(
+            scipy.special.log_ndtr(margin[track]), scipy.special.log_ndtr(-margin[track]) + taken
+        )
         found = found._replace(identity=found.identity.put(near, fresh.take(np.arange(len(near)))))
     # what is heard over walls alone may well be hidden straight ahead: silence there tells nothing
     found.identity.hidden[table.kind != POINT] = 1.0
     return found._replace(identity=found.identity.clipped())
+
+
+def longer(context: WindowState, track_rows: list[Integers]) -> Floats:
+    """By how many standard deviations (T, Q) each track, whose point is to be identified, is longer than the direct
+    path over the point that is held for each panel: over walls, no path is shorter. Infinite where none is held."""
+    window, found = context.window, np.full((len(track_rows), context.scene.num_panels), np.inf)
+    last, held = np.array([at[-1] for at in track_rows]), np.array(context.landmarks.panels)
+    slot = context.log.cycle[last] - (context.cycle - window.num_poses + 1)
+    place = poses(window)[slot]
+    ends = poses_of(place[:, :3], context.heading[slot] + place[:, 3], context.scene.body)
+    covariance = now(window)[1]
+    for panel in (held >= 0).nonzero()[0]:
+        row = int(held[panel])
+        legs = [window.features[row] - end for end in (ends.tx, ends.rx)]
+        far = [np.linalg.norm(leg, axis=1) for leg in legs]
+        slope = legs[0] / far[0][:, None] + legs[1] / far[1][:, None]
+        apart = np.eye(3, len(covariance), HEAD + 3 * row) - np.eye(3, len(covariance))
+        variance = np.vecdot(slope, slope @ (apart @ covariance @ apart.T)) + context.log.std[last, 0] ** 2
+        found[:, panel] = (context.log.seen[last, 0] - far[0] - far[1]) / np.sqrt(variance)
+    return found
 
 
 def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:

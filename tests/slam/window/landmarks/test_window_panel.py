@@ -1,7 +1,9 @@
 """Who the panel is: evidence against quadrature, silence, what alternated codes tell, and whom to suspect."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from rislam_rt import slam
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.information import amplitude_std
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
-from rislam_rt.model import RadioConfig, RisCode, RisSpec, RisSpecs, SensorModel
+from rislam_rt.model import Paths, RadioConfig, RisCode, RisSpec, RisSpecs, Scene, SensorModel, SlamEstimate, Trajectory
 from rislam_rt.ris import rephase
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.scene import load_scene
@@ -19,10 +21,20 @@ from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import TX as MOVING
+from rislam_rt.slam.predicted_returns import poses_of
+from rislam_rt.slam.window.births.point_identification import longer
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
+from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.smoother.direction_priors import no_holds
+from rislam_rt.slam.window.smoother.window_features import add_feature
+from rislam_rt.slam.window.smoother.window_gaussian import solve
+from rislam_rt.slam.window.solver_limits import CERTAIN
+from rislam_rt.slam.window.state import WindowState
 
+SNR_13 = with_reference_snr(RadioConfig(), 13.0)
+CONFIG = SlamConfig(filter="window", use_vt=True)
 SENSOR = SensorModel(RadioConfig(noise_psd=3.52e-12))
 SPEC = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
 PLACE, TX, RX = np.array([[3.0, 3.0, 3.0]]), np.array([[2.0, 2.5, 0.5]]), np.array([[2.1, 2.5, 0.5]])
@@ -150,30 +162,89 @@ def test_forms_take_the_side_of_the_panel_that_their_point_is_held_for():
     assert (found == UNTOLD).all()
 
 
-def test_panel_is_found_as_soon_as_it_was_heard_six_times():
-    """Paper's room, 13 dB, random codes, alternated; until it is named there is a suspect."""
-    room, rng, cycles = Path(__file__).parents[4] / "scenes" / "paper_room", np.random.default_rng(4), 18
-    scene, radio = load_scene(room), with_reference_snr(RadioConfig(), 13.0)
-    motion = scene.agent[:cycles]
+class Walk(NamedTuple):
+    """A walk below the panel of the paper's room, at 13 dB."""
+
+    scene: Scene
+    motion: Trajectory
+    paths: Paths
+    radio: RadioConfig
+
+
+@pytest.fixture(scope="module")
+def walk() -> Walk:
+    scene, radio = load_scene(Path(__file__).parents[4] / "scenes" / "paper_room"), SNR_13
+    motion = scene.agent[:18]
     motion = replace(motion, position=motion.position + np.array([1.7, 0.9, 0.4]))
-    paths = ImageSourceChannel(replace(scene, agent=motion), radio, 1).paths(motion)
-    receiver, config = ReceiverConfig(alternation=True), SlamConfig(filter="window", use_vt=True)
-    spec = scene.ris.spec
-    sensor = SensorModel(radio, alternation=True)
+    return Walk(scene, motion, ImageSourceChannel(replace(scene, agent=motion), radio, 1).paths(motion), radio)
+
+
+def begun(walk: Walk, rng: np.random.Generator) -> WindowState:
+    motion, sensor = walk.motion, SensorModel(walk.radio, alternation=True)
     start = StartPrior(motion.position[0], motion.velocity[0], float(motion.heading[0]))
-    state = slam.init(start, motion.body, spec, sensor, config, rng=rng)
-    named, suspected = [], []
-    for cycle in range(cycles):
+    return slam.init(start, motion.body, walk.scene.ris.spec, sensor, CONFIG, rng=rng)
+
+
+def followed(walk: Walk, state: WindowState, rng: np.random.Generator) -> Iterator[SlamEstimate]:
+    """What the filter expects after each cycle, under random codes, alternated."""
+    receiver, spec = ReceiverConfig(alternation=True), walk.scene.ris.spec
+    for cycle in range(len(walk.motion)):
         code = RisCode(rng.integers(spec.levels, size=(spec.rows, spec.cols)), spec.levels)
-        here = rephase(paths.of_cycle(cycle), code)
-        heading = float(motion.heading[cycle])
-        heard, _ = measure(here, 0, heading, radio, receiver, rng=rng)
-        state, _ = slam.step(state, heard, code, 0.1 if cycle else 0.0, heading, config, rng=rng)
-        found = slam.predict(state, 0.1, config)
+        here, heading = rephase(walk.paths.of_cycle(cycle), code), float(walk.motion.heading[cycle])
+        heard, _ = measure(here, 0, heading, walk.radio, receiver, rng=rng)
+        state, _ = slam.step(state, heard, code, 0.1 if cycle else 0.0, heading, CONFIG, rng=rng)
+        yield slam.predict(state, 0.1, CONFIG)
+
+
+def test_panel_is_found_as_soon_as_it_was_heard_six_times(walk: Walk) -> None:
+    """Until it is named there is a suspect."""
+    rng, center = np.random.default_rng(4), walk.scene.ris.center
+    named, suspected = [], []
+    for found in followed(walk, begun(walk, rng), rng):
         if found.map.ris >= 0:
-            named.append(np.linalg.norm(found.map.position[found.map.ris] - scene.ris.center))
-        suspected += [np.linalg.norm(one.position - scene.ris.center) for one in found.suspects]
+            named.append(np.linalg.norm(found.map.position[found.map.ris] - center))
+        suspected += [np.linalg.norm(one.position - center) for one in found.suspects]
     assert len(named) >= 3
     assert named[-1] < 0.1
     assert len(suspected) >= 2
     assert min(suspected) < 0.5
+
+
+def test_a_point_that_is_held_for_the_panel_gives_way_to_one_that_is_nearer(walk: Walk) -> None:
+    """What is heard over the panel by a shorter way than the direct one over that point cannot be it over walls."""
+    rng, center = np.random.default_rng(4), walk.scene.ris.center
+    wrong, state = center + np.array([0.0, 0.0, 3.0]), begun(walk, rng)
+    held = unknown(1)._replace(log_ris=np.array([[CERTAIN]]), hidden=np.ones((1, 2)))  # silence tells nothing of it
+    state = state._replace(
+        window=add_feature(state.window, wrong, no_holds(), 1e4),
+        landmarks=enter(state.landmarks, False, np.zeros(3), 9, 5.0, held),
+    )
+    maps = [found.map for found in followed(walk, state, rng)]
+    np.testing.assert_allclose(maps[0].position[maps[0].ris], wrong, atol=0.1)
+    np.testing.assert_allclose(maps[-1].position[maps[-1].ris], center, atol=0.1)
+    assert np.linalg.norm(maps[-1].position - wrong, axis=1).min() > 0.5
+
+
+def test_a_track_is_longer_than_the_direct_path_over_a_panel_by_its_deviations(walk: Walk) -> None:
+    rng, center = np.random.default_rng(4), walk.scene.ris.center
+    state = begun(walk, rng)
+    known = unknown(1)._replace(log_ris=np.array([[CERTAIN]]))
+    state = state._replace(
+        window=add_feature(state.window, center, no_holds(), 0.05**-2),
+        landmarks=enter(state.landmarks, False, np.zeros(3), 9, 5.0, known),
+    )
+    state = state._replace(window=solve(state.window))
+    ends = poses_of(walk.motion.position[:1], state.heading[:1], walk.motion.body)
+    legs = [np.linalg.norm(center - end[0]) for end in (ends.tx, ends.rx)]
+    count, std = 3, 0.01
+    log = empty_log()._replace(
+        cycle=np.zeros(count, dtype=np.int64), seen=np.array([[sum(legs) + by, 0.0, 0.0] for by in (-0.5, 0.0, 0.5)]),
+        std=np.full((count, 3), std),
+    )  # fmt: skip
+    found = longer(state._replace(log=log), [np.array([row]) for row in range(count)])
+    slope = sum((center - end[0]) / leg for end, leg in zip((ends.tx, ends.rx), legs, strict=True))
+    # the pose is the start's, which is held
+    expected = np.array([-0.5, 0.0, 0.5]) / np.hypot(0.05 * np.linalg.norm(slope), std)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-3, atol=1e-6)
+    none = longer(state._replace(log=log, landmarks=empty_table()), [np.array([0])])
+    assert np.isposinf(none).all()
