@@ -54,9 +54,10 @@ def identify(
         found.identity.log_ris[:] = -np.inf
         return found
     point = IS_POINT[table.kind]
-    taken = -np.logaddexp.reduce(
-        np.append(landmarks.log_ris[landmarks.points], np.zeros((1, panels)), axis=0), axis=0
-    )  # but one
+    # a point that is not there is no panel: odds that it is both
+    exists, is_panel = -landmarks.log_odds[landmarks.points, None], -landmarks.log_ris[landmarks.points]
+    held = -np.logaddexp(np.logaddexp(exists, is_panel), exists + is_panel)
+    taken = -np.logaddexp.reduce(np.append(held, np.zeros((1, panels)), axis=0), axis=0)  # but one
     margin = longer(context, track_rows)
     for track, at in enumerate(track_rows):
         rows = (point & (table.trials.track == track)).nonzero()[0]

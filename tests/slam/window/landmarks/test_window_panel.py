@@ -210,14 +210,20 @@ def test_panel_is_found_as_soon_as_it_was_heard_six_times(walk: Walk) -> None:
     assert min(suspected) < 0.5
 
 
-def test_a_point_that_is_held_for_the_panel_gives_way_to_one_that_is_nearer(walk: Walk) -> None:
-    """What is heard over the panel by a shorter way than the direct one over that point cannot be it over walls."""
+@pytest.mark.parametrize(
+    ("offset", "log_odds"),
+    [
+        ([0.0, 0.0, 3.0], 12.0),  # what is heard by a shorter way than the direct one over it is not it over walls
+        ([0.0, 0.8, -0.8], 2.0),  # what is hardly there is hardly the panel
+    ],
+)
+def test_a_point_that_is_held_for_the_panel_gives_way(walk: Walk, offset: list[float], log_odds: float) -> None:
     rng, center = np.random.default_rng(4), walk.scene.ris.center
-    wrong, state = center + np.array([0.0, 0.0, 3.0]), begun(walk, rng)
+    wrong, state = center + np.array(offset), begun(walk, rng)
     held = unknown(1)._replace(log_ris=np.array([[CERTAIN]]), hidden=np.ones((1, 2)))  # silence tells nothing of it
     state = state._replace(
         window=add_feature(state.window, wrong, no_holds(), 1e4),
-        landmarks=enter(state.landmarks, False, np.zeros(3), 9, 5.0, held),
+        landmarks=enter(state.landmarks, False, np.zeros(3), 9, log_odds, held),
     )
     maps = [found.map for found in followed(walk, state, rng)]
     np.testing.assert_allclose(maps[0].position[maps[0].ris], wrong, atol=0.1)
