@@ -78,7 +78,7 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
             continue  # its turn comes in the next cycle, with the new feature known
         looked[rows[row]] = context.tracks.hits[rows[row]]
     context = context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
-    return context if born < 0 else _without_rivals(context, decisions[born].identity)
+    return context if born < 0 else _without_rival(context, decisions[born].identity, panels)
 
 
 def _mirrored(context: WindowState, at: Integers) -> bool:
@@ -162,11 +162,11 @@ def _enter(
     return grown, True
 
 
-def _without_rivals(context: WindowState, born: PanelIdentity) -> WindowState:
-    """The map after the birth of a point, without those that were held until now for a panel that it is: there is one
-    of each."""
-    landmarks = context.landmarks
-    keep, points = np.ones(len(landmarks.ident), dtype=np.bool_), landmarks.points
-    keep[points] = ~((born.log_ris > 0.0) & (landmarks.log_ris[points] > 0.0)).any(axis=1)
-    keep[-1] = True
+def _without_rival(context: WindowState, born: PanelIdentity, held: tuple[int, ...]) -> WindowState:
+    """The map after the birth of a point, without the one that was held until now for the panel that it is, by the rows
+    `held` (Q,) for each panel, -1 for none: there is one of each."""
+    panel = int(np.argmax(born.log_ris[0]))
+    keep = np.ones(len(context.landmarks.ident), dtype=np.bool_)
+    if born.log_ris[0, panel] > 0.0 and held[panel] >= 0:
+        keep[held[panel]] = False
     return remove_from_map(context, keep)

@@ -81,8 +81,11 @@ def identify(
 def longer(context: WindowState, track_rows: list[Integers]) -> Floats:
     """By how many standard deviations (T, Q) each track, whose point is to be identified, is longer than the direct
     path over the point that is held for each panel: over walls, no path is shorter. Infinite where none is held."""
-    window, found = context.window, np.full((len(track_rows), context.scene.num_panels), np.inf)
-    last, held = np.array([at[-1] for at in track_rows]), np.array(context.landmarks.panels)
+    window, held = context.window, np.array(context.landmarks.panels)
+    found = np.full((len(track_rows), len(held)), np.inf)
+    if (held < 0).all():
+        return found
+    last = np.array([at[-1] for at in track_rows])
     slot = context.log.cycle[last] - (context.cycle - window.num_poses + 1)
     place = poses(window)[slot]
     ends = poses_of(place[:, :3], context.heading[slot] + place[:, 3], context.scene.body)

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import TX as MOVING
 from rislam_rt.slam.predicted_returns import poses_of
+from rislam_rt.slam.window.births.births import _without_rival
 from rislam_rt.slam.window.births.point_identification import longer
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
@@ -229,6 +231,13 @@ def test_a_point_that_is_held_for_the_panel_gives_way(walk: Walk, offset: list[f
     np.testing.assert_allclose(maps[0].position[maps[0].ris], wrong, atol=0.1)
     np.testing.assert_allclose(maps[-1].position[maps[-1].ris], center, atol=0.1)
     assert np.linalg.norm(maps[-1].position - wrong, axis=1).min() > 0.5
+
+
+def test_a_point_held_for_another_panel_stays() -> None:
+    """Even if the new point might be either."""
+    context: Any = SimpleNamespace(landmarks=SimpleNamespace(ident=np.arange(3)))
+    born = unknown(1, 2)._replace(log_ris=np.array([[9.0, 5.0]]))
+    assert _without_rival(context, born, (-1, 0)) is context
 
 
 def test_a_track_is_longer_than_the_direct_path_over_a_panel_by_its_deviations(walk: Walk) -> None:
