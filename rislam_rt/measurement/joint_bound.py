@@ -18,7 +18,7 @@ LEAST_CERTAINTY = 2.0
 def joint_errors(
     received: Received, radio: RadioConfig, config: ReceiverConfig, draws: Floats
 ) -> tuple[NoiselessComponents, ComponentErrors]:
-    """Components of the resolved paths of one capture, and errors drawn from their joint Cramér-Rao bound.
+    """Joint bound of the resolved paths of one capture: their components, and errors drawn from that Cramér-Rao bound.
 
     Paths merge until every component is certain enough, or has no neighbour to merge with.
 

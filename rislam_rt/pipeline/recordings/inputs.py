@@ -136,7 +136,7 @@ def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
 
 
 def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:
-    """Random generator of the estimator from the seed in a NetCDF recording; None if the file has no seed."""
+    """Random generator of the estimator, an input read from a NetCDF recording; None if the file has no seed."""
     if "filter_entropy" not in data.attrs:
         return None
     key = tuple(int(part) for part in np.atleast_1d(data.attrs["filter_spawn_key"]))

@@ -285,8 +285,8 @@ def _weigh_tracks(found: WindowTracks, rows: Integers, tilts: Tilts) -> HorizonE
 
 
 def _names(landmarks: WindowTable, forms: Integers) -> Integers:
-    """Landmark label (A,) of the forms (A, 5) that explain components: the ident of a point or wall, or a combined one
-    of a point's image in a wall and of two walls in either order."""
+    """Landmark labels (A,) by which a cycle's explanation names what explains each component: of forms (A, 5) the ident
+    of a point or wall, or a combined one of a point's image in a wall and of two walls in either order."""
     if not len(forms):
         return np.zeros(0, dtype=np.int64)
     point, first, second = forms[:, 0] >= 0, forms[:, 3], forms[:, 4]

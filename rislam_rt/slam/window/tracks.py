@@ -57,7 +57,7 @@ class WindowTracks(NamedTuple):
 
     @property
     def identity(self) -> PanelIdentity:
-        """Panel identities (T,) of the tracks, were they points heard over no wall."""
+        """Panel identities (T,) that are kept with the tracks from cycle to cycle, as of points heard over no wall."""
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
     def keep(self, rows: Booleans) -> "WindowTracks":

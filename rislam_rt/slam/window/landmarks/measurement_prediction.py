@@ -303,9 +303,9 @@ def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tupl
 def _taken_in(
     first: Integers, second: Integers, strength: Floats, power: Floats, clear: Floats
 ) -> tuple[Booleans, Integers, Floats, Floats]:
-    """Absorption of weaker returns `second` by stronger ones `first` of the same cell: which of R returns are absorbed,
-    the strongest that each absorbed, the probability that each comes out by itself, and its power with what it
-    absorbed."""
+    """Predicted measurements that are unresolved: which of R expected returns, the weaker ones `second`, stronger ones
+    `first` of the same cell absorb, the strongest that each absorbed, the probability that each comes out by itself,
+    and its power with what it absorbed."""
     count, level, weaker = len(strength), strength.tolist(), second.tolist()
     owner, partner = [-1] * count, np.full(count, -1)
     crowded = np.flatnonzero(np.bincount(first, minlength=count))

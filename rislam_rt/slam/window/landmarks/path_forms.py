@@ -94,8 +94,8 @@ def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: 
 
 
 def margins(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Margins (N,) [m] by which the bounce on the wall `walls[:, 1]` lies on the base's side of the wall `walls[:, 0]`,
-    for the ray from `device` (3,) or (N, 3) over both walls (N, 2, 3) to `base` (N, 3).
+    """Margins (N,) [m] of forms over two walls: how far the bounce on the wall `walls[:, 1]` lies on the base's side of
+    the wall `walls[:, 0]`, for the ray from `device` (3,) or (N, 3) over both walls (N, 2, 3) to `base` (N, 3).
 
     Also depths (N,): of the base before `walls[:, 0]`, and of its image and of the device before `walls[:, 1]`, which
     are on one side if the path can be.
