@@ -12,7 +12,7 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, basis, last_pose_matrix
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, last_pose_matrix, pose_matrix
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
@@ -30,12 +30,12 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     trail = np.einsum("n,knj->kj", belief.weight, belief.trail)
     trail[:, 3] -= heading
     mean[6] -= heading[-1]
-    turns = config.heading != "known"
+    turns, straight = config.heading != "known", np.zeros(len(step))
     std = np.append(np.where(config.axes > 0.0, config.sigma_a, STILL), max(config.turn_std, STILL) * 10.0)[: 3 + turns]
     head, accel = _motion(step, trail, mean, std, turns)
     size, count, slim = len(mean), len(heading), POSE + len(mean) - HEAD
     back = np.eye(size)
-    back[:HEAD, :HEAD] = np.linalg.inv(last_pose_matrix(step.tobytes(), turns)[:, :HEAD])
+    back[:HEAD, :HEAD] = np.linalg.inv(last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[:, :HEAD])
     whole = np.zeros((size + accel.size,) * 2)
     whole[:size, :size] = back @ covariance @ back.T
     prior = Quadratic(inverse(whole[:size, :size] + ROUNDING * np.eye(size)), np.zeros(size), head)
@@ -43,8 +43,8 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     precision = np.tile(std**-2.0, (count - 1, 1))
     none = np.zeros(accel.shape)
     return Window(
-        head, accel, precision, precision, none, precision[:, 2], step, prior, np.zeros((size, size)), slots, whole,
-        no_holds(),
+        head, accel, precision, precision, none, precision[:, 2], step, straight, prior,
+        np.zeros((size, size)), slots, whole, no_holds(),
     )  # fmt: skip
 
 
@@ -54,7 +54,12 @@ def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool)
     count, head = len(trail), mean.copy()
     accel = np.zeros((count - 1, len(std)))
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)
-    for axis, along in enumerate(basis(step.tobytes(), turns)):
+    design = pose_matrix(step.tobytes(), np.zeros(count - 1).tobytes(), turns)
+    for axis in range(len(std)):
+        along = np.zeros((count, count + 1))
+        along[:, 0], along[:, 2:] = design[:, axis, axis], design[:, axis, (2 * len(std) - turns) + axis :: len(std)]
+        if axis < TURN:
+            along[:, 1] = design[:, axis, len(std) + axis]
         speed = np.concatenate([[0.0, 1.0], step]) / MET
         calm = np.eye(count - 1, count + 1, 2) / std[axis]
         rows = np.concatenate([weight[:, None] * along, speed[None], calm])

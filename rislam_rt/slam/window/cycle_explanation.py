@@ -27,6 +27,7 @@ from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
+from rislam_rt.slam.window.smoother.motion_basis import rotation
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -223,10 +224,12 @@ class _Followed(NamedTuple):
     """(L,) probabilities of the levels of the tilt's deviation, by what the tracks tell as well."""
 
 
-def _predicted(before: WindowTracks, speed: float, dt: float, turn: float, bend: float) -> WindowTracks:
-    """Tracks predicted over a step `dt` [s] in which the body turns by `turn` [rad]; `speed` [m/s] and `bend` [m/s^2]
-    are those of the agent."""
-    return tracks.advance(before, dt, turn, np.array([2.0 * bend + speed**2, 0.1, 0.1]))
+def _predicted(state: WindowState, velocity: Floats, dt: float, turn: float, bend: float) -> WindowTracks:
+    """Tracks predicted over a step `dt` [s] in which the body turns by `turn` [rad]; `velocity` (3,) [m/s] and `bend`
+    [m/s^2] are those of the agent."""
+    agent, course = state.heading[-1], state.window.course[-1:]
+    kept = (rotation(agent).T @ velocity)[:2] if course.any() else np.zeros(2)
+    return tracks.advance(state.tracks, dt, turn, np.array([2.0 * bend + velocity @ velocity, 0.1, 0.1]), kept)
 
 
 def beside_panels(
@@ -236,9 +239,9 @@ def beside_panels(
     they ran over a panel, or none is known."""
     if observed.side is not None or max(state.landmarks.panels) < 0:
         return None
-    speed = float(np.linalg.norm(window_gaussian.mean_now(state.window)[3:6]))
+    velocity = window_gaussian.mean_now(state.window)[3:6]
     sway = attitude.spread(observed.seen[:, 1:], np.diag(state.attitude_variance))
-    return tracks.continuations(_predicted(state.tracks, speed, dt, turn, bend), observed, sway, state.cycle)
+    return tracks.continuations(_predicted(state, velocity, dt, turn, bend), observed, sway, state.cycle)
 
 
 def _follow(
@@ -247,7 +250,7 @@ def _follow(
 ) -> _Followed:  # fmt: skip
     """Continue, begin and end tracks with the components of a cycle that no path of the map explains."""
     speed = float(np.linalg.norm(view.mean[3:6]))
-    found = _predicted(state.tracks, speed, dt, turn, bend)
+    found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
     horizon = _weigh_tracks(found, rows, view.tilts)

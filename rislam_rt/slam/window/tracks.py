@@ -74,17 +74,19 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     )  # fmt: skip
 
 
-def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats) -> WindowTracks:
+def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats, velocity: Floats) -> WindowTracks:
     """Kalman prediction of the tracks over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the root of
-    the rates' variance per second."""
+    the rates' variance per second. A body whose course follows its heading keeps a `velocity` (2,) [m/s] in its own
+    axes, which turns with it: lengths shrink by twice the way towards where a path comes from."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]
     if dt <= 0.0:  # time passes from cycle to cycle, whatever a coarse clock says
         noise = np.zeros((len(tracks.ident), 3, 2, 2))
         noise[..., 0, 0] = CYCLE**2 * (tracks.mean[..., 1] ** 2 + tracks.covariance[..., 1, 1])
     mean = tracks.mean @ move.T
-    cos, sin = np.cos(turn), np.sin(turn)
+    cos, sin, before = np.cos(turn), np.sin(turn), mean[:, 1:, 0].copy()
     mean[:, 1], mean[:, 2] = cos * mean[:, 1] + sin * mean[:, 2], cos * mean[:, 2] - sin * mean[:, 1]
+    mean[:, 0, 1] -= 2.0 * (mean[:, 1:, 0] - before) @ velocity
     return tracks._replace(mean=mean, covariance=move @ tracks.covariance @ move.T + noise)
 
 

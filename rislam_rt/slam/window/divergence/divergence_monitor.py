@@ -17,7 +17,7 @@ from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN, rotation
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 
 CELL = 0.01
@@ -113,7 +113,7 @@ def shifted(window: Window, by: Floats) -> Window:
     # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
     accel[-2, :3] += by / size
-    accel[-1, :3] -= by / size * dt[0] / dt[1]
+    accel[-1, :3] -= rotation(window.course[-1]) @ by / size * dt[0] / dt[1]
     return window._replace(accel=accel)
 
 

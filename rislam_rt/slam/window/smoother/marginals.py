@@ -3,21 +3,18 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.slam.window.smoother.motion_basis import FIRST, HEAD, POSE, TURN, basis
-from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN
+from rislam_rt.slam.window.smoother.window_gaussian import Window, pose_design
 
 
 def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Floats:
     """Marginal variance (N, 3) of predictions for poses in slots (N,), by slopes (N, 3, 4 + 3F) with respect to pose
     and features."""
-    size, free, first = len(window.head), window.accel.shape[1], int(slot.min(initial=window.num_poses - 1))
+    size, first = len(window.head), int(slot.min(initial=window.num_poses - 1))
+    (along, used), free = pose_design(window), window.accel.shape[1]
     design = np.zeros((window.num_poses - first, POSE, len(window.covariance)))
     design[:, TURN, 6] = 1.0
-    for axis, along in enumerate(basis(window.step.tobytes(), window.turns)[:, first:]):
-        design[:, axis, FIRST[axis]] = along[:, 0]
-        if axis != TURN:
-            design[:, axis, 3 + axis] = along[:, 1]
-        design[:, axis, size + axis :: free] = along[:, 2:]
+    design[:, :free, used] = along[first:]
     wide, slot = design @ window.covariance, slot - first
     pose, cross, inner = (
         wide @ np.swapaxes(design, 1, 2),
@@ -32,8 +29,6 @@ def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Float
 
 def pose_covariance(window: Window, axis: int) -> Floats:
     """Covariance (K, K) of all poses of the sliding window along one axis."""
-    along, size, free = basis(window.step.tobytes(), window.turns)[axis], len(window.head), window.accel.shape[1]
-    rate = [] if axis == TURN else [3 + axis]
-    rows = np.concatenate([[FIRST[axis]], rate, np.arange(size + axis, len(window.covariance), free)]).astype(np.int64)
-    used = along if rate else np.delete(along, 1, axis=1)
-    return np.asarray(used @ window.covariance[np.ix_(rows, rows)] @ used.T)
+    design, used = pose_design(window)
+    along = design[:, axis]
+    return np.asarray(along @ window.covariance[np.ix_(used, used)] @ along.T)

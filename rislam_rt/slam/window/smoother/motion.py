@@ -57,17 +57,23 @@ def transition(stay: float) -> Floats:
     return stay * np.eye(count) + (1.0 - stay) * jump / jump.sum(axis=1, keepdims=True)
 
 
-def log_likelihood(accel: Floats, spread: Floats, precision: Floats) -> Floats:
-    """Log likelihoods (K, L) of the motion modes in K steps, from posterior means (K, A) and covariances (K, A, A) of
-    the accelerations and the prior precisions (K,) within these."""
+def log_likelihood(accel: Floats, spread: Floats, precision: Floats, shift: Floats | None = None) -> Floats:
+    """Log likelihoods (..., K, L) of the motion modes in K steps, from posterior means (K, A) and covariances (K, A, A)
+    of the accelerations and the prior precisions (K,) within these; or of accelerations that are larger than those by
+    a `shift` (..., K, A)."""
     spread, vector = principal_axes(spread)
     along = (np.swapaxes(vector, 1, 2) @ accel[..., None])[..., 0] / spread
     # N(m; 0, C + s^2 I) through the cavity's information C^-1, which may be singular
     value = np.maximum(1.0 / spread - precision[:, None], 0.0)
     variance = ladder() ** 2
     total = 1.0 + value[:, None] * variance[:, None]
-    gain = (along**2)[:, None] * variance[:, None] / total
-    return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1))
+    if shift is None:
+        gain = (along**2)[:, None] * variance[:, None] / total
+        return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1))
+    by = (np.swapaxes(vector, 1, 2) @ shift[..., None])[..., 0]
+    gain = ((along + value * by) ** 2)[..., None, :] * variance[:, None] / total
+    less = (by * (along + 0.5 * value * by)).sum(axis=-1)
+    return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1) - less[..., None])
 
 
 def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
@@ -88,6 +94,19 @@ def forward(before: Floats, log_like: Floats, stay: float) -> Floats:
     from those before it."""
     message = (before @ transition(stay)) * np.exp(log_like - log_like.max(axis=1, keepdims=True))
     return np.asarray(message / message.sum(axis=1, keepdims=True))
+
+
+def log_evidence(before: Floats, log_like: Floats, stay: float) -> Floats:
+    """Log marginal likelihoods (N,) of N chains of K steps by log likelihoods (N, K, L) of the motion modes, from one
+    set of probabilities (L,) before them."""
+    top = log_like.max(axis=2)
+    like, move = np.exp(log_like - top[:, :, None]).swapaxes(0, 1), transition(stay)
+    message, found = np.broadcast_to(before, log_like[:, 0].shape), top.sum(axis=1)
+    for own in like:
+        message = (message @ move) * own
+        total = message.sum(axis=1)
+        message, found = message / total[:, None], found + np.log(total)
+    return np.asarray(found)
 
 
 def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Floats]:

@@ -1,10 +1,15 @@
-"""Motion basis: the window's poses as a linear function of the first one, its velocity and the steps' accelerations."""
+"""Motion basis: the window's poses as a linear function of the first one, its velocity and the steps' accelerations.
+
+Over each step the velocity turns by a course change, as the body does whose course follows its heading, and an
+acceleration is added to it: v' = R v + a T, and the place moves by the mean of both velocities, p' = p + (v + v') T / 2
+(a coordinated turn of known rate; Bar-Shalom, Li and Kirubarajan 2001, section 11.7).
+"""
 
 from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 
 HEAD = 7
 """Number of the window's unknowns before the features: first position, its velocity, compass offset."""
@@ -15,24 +20,44 @@ POSE = 4
 
 
 @lru_cache(maxsize=4)
-def basis(steps: bytes, turns: bool) -> Floats:
-    """Matrices (A, K, K + 1) that give K poses along each axis from the first place, the first rate and the
-    accelerations of the steps (a time [s] each, as bytes)."""
-    step = np.frombuffer(steps)
-    count = len(step) + 1
-    time = np.concatenate([[0.0], np.cumsum(step)])
-    after = np.arange(count)[:, None] > np.arange(len(step))
-    reach = np.where(after, 0.5 * step**2 + step * (time[:, None] - time[1:]), 0.0)
-    moved = np.concatenate([np.ones((count, 1)), time[:, None], reach], axis=1)
-    found = np.stack([moved] * (3 + turns))
+def pose_matrix(steps: bytes, course: bytes, turns: bool) -> Floats:
+    """Matrix (K, A, M) that gives K poses along A axes from the first place and rate (`head_order`) and then the
+    accelerations of all steps, for times [s] and course changes [rad] of the steps, as bytes."""
+    step, free = np.frombuffer(steps), 3 + turns
+    count, (_, reach) = len(step) + 1, _horizontal(step, np.frombuffer(course))
+    found = np.zeros((count, free, count + 1, free))
+    for axis in range(2):
+        found[:, axis, 1:, axis] = reach.real
+        found[:, axis, 1:, 1 - axis] = reach.imag if axis else -reach.imag
+    _, straight = _horizontal(step, np.zeros(len(step)))
+    found[:, 2, 1:, 2] = straight.real
+    for axis in range(3):
+        found[:, axis, 0, axis] = 1.0
     if turns:
-        found[TURN, :, 1], found[TURN, :, 2:] = 0.0, np.where(after, step, 0.0)
-    found.flags.writeable = False
-    return found
+        found[:, TURN, 0, TURN], found[:, TURN, 2:, TURN] = 1.0, np.where(_after(count), step, 0.0)
+    used = np.delete(found.reshape(count, free, -1), free + TURN, axis=2) if turns else found.reshape(count, free, -1)
+    used.flags.writeable = False
+    return used
 
 
-ONE, TWO = np.tril_indices(POSE)
-"""Every pair of axes once, those of the room first."""
+def _after(count: int) -> Booleans:
+    """Which of K poses lie after each of K - 1 steps, (K, K - 1)."""
+    return np.asarray(np.arange(count)[:, None] > np.arange(count - 1))
+
+
+def _horizontal(step: Floats, course: Floats) -> tuple[Floats, Floats]:
+    """Horizontal velocities and displacements (K, K), as complex factors of the first velocity and of the accelerations
+    of steps with times (K - 1,) [s] and course changes (K - 1,) [rad]."""
+    count = len(step) + 1
+    angle = np.concatenate([[0.0], np.cumsum(course)])
+    speed = np.zeros((count, count), dtype=np.complex128)
+    speed[:, 0] = np.exp(1j * angle)
+    speed[:, 1:] = np.where(_after(count), step * np.exp(1j * (angle[:, None] - angle[1:])), 0.0)
+    reach = np.zeros((count, count), dtype=np.complex128)
+    reach[1:] = np.cumsum(0.5 * step[:, None] * (speed[1:] + speed[:-1]), axis=0)
+    return speed, reach
+
+
 FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
 """Indices of the head's numbers in the order of a basis: first places, then first rates."""
 
@@ -43,28 +68,52 @@ def head_order(free: int) -> Integers:
     return FIRST if free > TURN else np.arange(6)
 
 
-def step_transition(dt: float, free: int) -> Floats:
+def rotation(course: float) -> Floats:
+    """Rotation (3, 3) of a velocity by a course change [rad]."""
+    cos, sin = np.cos(course), np.sin(course)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def step_transition(dt: float, course: float, free: int) -> Floats:
     """Transition matrix (7, 7 + A) from pose, velocity and compass offset, and a step's accelerations, to those `dt`
-    [s] later."""
+    [s] later, the velocity turning by a course change [rad]."""
     found = np.eye(HEAD, HEAD + free)
-    axes = np.arange(3)
-    found[axes, 3 + axes] = found[3 + axes, HEAD + axes] = dt
-    found[axes, HEAD + axes] = 0.5 * dt**2
+    axes, turn = np.arange(3), rotation(course)
+    found[:3, 3:6], found[3:6, 3:6] = 0.5 * dt * (np.eye(3) + turn), turn
+    found[axes, HEAD + axes], found[3 + axes, HEAD + axes] = 0.5 * dt**2, dt
     if free > TURN:
         found[6, HEAD + TURN] = dt
     return found
 
 
+def step_back(dt: float, course: float, free: int) -> Floats:
+    """Matrix (7, 7 + A) from pose, velocity and compass offset after a step, and its accelerations, to those before it:
+    the inverse of `step_transition`."""
+    found = step_transition(dt, course, free)
+    back = found[3:6, 3:6].T
+    before, push = found.copy(), found[3:6, HEAD:]
+    before[3:6, 3:6], before[3:6, HEAD:] = back, -back @ push
+    mean = found[:3, 3:6]
+    before[:3, 3:6], before[:3, HEAD:] = -mean @ back, mean @ back @ push - found[:3, HEAD:]
+    before[6, HEAD:] = -found[6, HEAD:]
+    return before
+
+
 @lru_cache(maxsize=4)
-def last_pose_matrix(steps: bytes, turns: bool) -> Floats:
+def last_pose_matrix(steps: bytes, course: bytes, turns: bool) -> Floats:
     """Matrix (7, 7 + (K - 1) A) that gives the last pose, velocity and compass offset from the first ones and all
     accelerations."""
-    last, step, free = basis(steps, turns)[:, -1], np.frombuffer(steps), 3 + turns
+    step, free = np.frombuffer(steps), 3 + turns
+    order = head_order(free)
     design = np.eye(HEAD, HEAD + len(step) * free)
-    for axis in range(3):
-        design[axis, 3 + axis] = last[axis, 1]
-        design[axis, HEAD + axis :: free], design[3 + axis, HEAD + axis :: free] = last[axis, 2:], step
-    if turns:
-        design[6, HEAD + TURN :: free] = last[TURN, 2:]
+    columns = np.concatenate([order, np.arange(HEAD, design.shape[1])])
+    places = np.arange(free)
+    design[FIRST[places][:, None], columns] = pose_matrix(steps, course, turns)[-1]
+    speed = _horizontal(step, np.frombuffer(course))[0][-1]
+    whole = np.stack([[speed.real, -speed.imag], [speed.imag, speed.real]])
+    design[3:5, 3:5] = whole[:, :, 0]
+    for axis in range(2):
+        design[3:5, HEAD + axis :: free] = whole[:, axis, 1:]
+    design[5, HEAD + 2 :: free] = step
     design.flags.writeable = False
     return design

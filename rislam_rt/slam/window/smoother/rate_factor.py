@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.slam.window.smoother.motion_basis import rotation
 
 
 class RateFactor(NamedTuple):
@@ -32,12 +33,14 @@ class RateFactor(NamedTuple):
         own = (flat @ (off.ravel() @ flat)).reshape(off.shape)
         return self.gradient + (self.single @ off[..., None])[..., 0] - own
 
-    def first_step(self, dt: float, velocity: Floats, accel: Floats) -> tuple[Floats, Floats]:
+    def first_step(self, dt: float, course: float, velocity: Floats, accel: Floats) -> tuple[Floats, Floats]:
         """Hessian (6, 6) and gradient (6,) of the first step's cost by the velocity after it and its acceleration.
 
-        The step takes `dt` [s], from a velocity (3,) [m/s] with an acceleration (3,) [m/s^2].
+        The step takes `dt` [s], from a velocity (3,) [m/s] that turns by `course` [rad], with an acceleration (3,)
+        [m/s^2].
         """
-        off = dt * velocity + 0.5 * dt**2 * accel - (self.middle[1] - self.middle[0])
-        design = np.concatenate([dt * np.eye(3), -0.5 * dt**2 * np.eye(3)], axis=1)
+        before, turn = np.eye(3), rotation(course)
+        off = 0.5 * dt * (before + turn) @ velocity + 0.5 * dt**2 * accel - (self.middle[1] - self.middle[0])
+        design = np.concatenate([0.5 * dt * (before + turn.T), -0.5 * dt**2 * turn.T], axis=1)
         slope = self.step_gradient + self.step_hessian @ off
         return design.T @ self.step_hessian @ design, design.T @ slope

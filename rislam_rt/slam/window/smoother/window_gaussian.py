@@ -1,8 +1,8 @@
 """The Gaussian of the window: the last K poses and F features, re-linearised by Gauss-Newton.
 
-The motion is white acceleration, constant over each step, so that the whole window's motion is a linear function of its
-first pose and of the accelerations (two or three numbers a step, where poses and velocities would be twice as many and
-their prior singular):
+The motion is white acceleration, constant over each step, beside a turn of the velocity that is given (see
+`motion_basis`), so that the whole window's motion is a linear function of its first pose and of the accelerations (two
+or three numbers a step, where poses and velocities would be twice as many and their prior singular). Without turns
 
     p_k = p_0 + t_k v_0 + sum_{i < k} (T_i^2 / 2 + T_i (t_k - t_{i+1})) a_i .
 
@@ -20,20 +20,18 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.smoother.motion_basis import (
-    FIRST,
     HEAD,
-    ONE,
     POSE,
     TURN,
-    TWO,
-    basis,
     head_order,
     last_pose_matrix,
+    pose_matrix,
+    step_back,
     step_transition,
 )
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
@@ -72,6 +70,8 @@ class Window(NamedTuple):
     `motion_learning`)."""
     step: Floats
     """(K - 1,) [s] times between the poses."""
+    course: Floats
+    """(K - 1,) [rad] course changes: by how much the velocity turns over each step, beside the acceleration."""
     prior: Quadratic
     """Quadratic on the head: what is known beforehand and from poses that left the window."""
     noise: Floats
@@ -111,7 +111,7 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
     none = np.zeros((0, 3 + turns))
     return Window(
-        head, none, none, none, none, np.zeros(0), np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
+        head, none, none, none, none, np.zeros(0), np.zeros(0), np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
         np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
     )  # fmt: skip
 
@@ -130,26 +130,28 @@ def begin_with(
     return alone._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=spread)
 
 
-def _basis(window: Window) -> Floats:
-    """Matrices (A, K, K + 1) that give the window's poses from head and accelerations (see `motion_basis.basis`)."""
-    return basis(window.step.tobytes(), window.turns)
+def pose_design(window: Window) -> tuple[Floats, Integers]:
+    """Matrix (K, A, M) that gives the window's poses from M of its unknowns (see `motion_basis.pose_matrix`), and the
+    indices (M,) of these."""
+    order = head_order(window.accel.shape[1])
+    used = np.concatenate([order, len(window.head) + np.arange(window.accel.size)])
+    return pose_matrix(window.step.tobytes(), window.course.tobytes(), window.turns), used
 
 
 def poses(window: Window) -> Floats:
     """Positions [m] and compass offsets [rad] of the window's poses (K, 4)."""
     free = window.accel.shape[1]
-    numbers, found = np.zeros((free, window.num_poses + 1, 1)), np.empty((window.num_poses, POSE))
-    numbers[:, 0, 0], numbers[:, 2:, 0] = window.head[FIRST[:free]], window.accel.T
-    numbers[:3, 1, 0] = window.head[3:6]
+    design, used = pose_design(window)
+    found = np.empty((window.num_poses, POSE))
     found[:, TURN] = window.head[6]
-    found[:, :free] = (_basis(window) @ numbers)[..., 0].T
+    found[:, :free] = design @ np.concatenate([window.head, window.accel.ravel()])[used]
     return found
 
 
 def _carried(window: Window, rows: Floats) -> Floats:
     """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
     its unknowns."""
-    size, design = len(window.head), last_pose_matrix(window.step.tobytes(), window.turns)
+    size, design = len(window.head), last_pose_matrix(window.step.tobytes(), window.course.tobytes(), window.turns)
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
@@ -221,9 +223,9 @@ def _surplus(precision: Floats, variance: Floats) -> Floats:
     return np.maximum(precision**2 * variance - precision, 0.0)
 
 
-def extend(window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0) -> Window:
+def extend(window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0, course: float = 0.0) -> Window:
     """Append a pose to the sliding window, `dt` [s] after the last, with prior precisions (A,) of the step's
-    acceleration, and its `variance` (A,)."""
+    acceleration, its `variance` (A,) and its `course` change [rad]."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -235,7 +237,8 @@ def extend(window: Window, dt: float, precision: Floats, variance: Floats | floa
         solved=np.concatenate([window.solved, precision[None]]),
         variance=np.concatenate([window.variance, np.broadcast_to(variance, (1, free))]),
         uneven=np.append(window.uneven, precision[2]),
-        step=np.append(window.step, dt), slots=slots, covariance=covariance, rates=None,
+        step=np.append(window.step, dt), course=np.append(window.course, course), slots=slots,
+        covariance=covariance, rates=None,
     )  # fmt: skip
 
 
@@ -248,23 +251,23 @@ def slide(window: Window) -> Window:
     hessian[first[:, None], first] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
     # the next pose and the acceleration in between, instead of the oldest pose
-    dt, accel = float(window.step[0]), window.accel[0]
+    dt, course, accel = float(window.step[0]), float(window.course[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = step_transition(-dt, free)
+    back = step_back(dt, course, free)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     if window.rates:
         at = np.concatenate([[3, 4, 5], size + np.arange(3)])
-        information, pull = window.rates.first_step(dt, window.head[3:6], accel[:3])
+        information, pull = window.rates.first_step(dt, course, window.head[3:6], accel[:3])
         wide[np.ix_(at, at)] += information
         steep[at] += pull
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(_surplus(window.precision[0], window.variance[0]))
-    carry = step_transition(dt, free)
+    carry = step_transition(dt, course, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -275,7 +278,8 @@ def slide(window: Window) -> Window:
     covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
         head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
-        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:], prior=prior,
+        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:], course=window.course[1:],
+        prior=prior,
         noise=eliminated_noise(shaken, size, gain), slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
     )  # fmt: skip
@@ -317,28 +321,17 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
         weight[:, :3, :3] += window.rates.single
         slope[:, :3] += window.rates.slope(spot[:, :3])
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
-    # axis by axis: a pose's place along one does not hang on the accelerations along the others
-    along, start, edge = _basis(window), head_order(free), 2 * free
-    many, back = len(start), np.swapaxes(along, 1, 2)
-    inner = np.empty((steps + 2, free, steps + 2, free))
-    one, two = (axes[: free * (free + 1) // 2] for axes in (ONE, TWO))
-    weight = weight[:, one, two].T[..., None]
-    both = back[0] @ (weight[:6] * along[0])  # the room's axes share one basis
-    if free > TURN:
-        both = np.concatenate([both, back[TURN] @ (weight[6:] * along)])
-    inner[:, one, :, two], inner[:, two, :, one] = both, np.swapaxes(both, 1, 2)
-    pull = (back @ slope[:, :free].T[..., None])[..., 0].T
+    (design, used), count = pose_design(window), (steps + 1) * free
+    flat = design.reshape(count, -1)
+    inner = flat.T @ (weight[:, :free, :free] @ design).reshape(count, -1)
     if window.rates:
-        shared = (back[0] @ window.rates.common.reshape(steps + 1, -1)).reshape(3 * (steps + 2), -1)
-        inner[:, :3, :, :3] -= (shared @ shared.T).reshape(steps + 2, 3, steps + 2, 3)
-    inner = inner.reshape(edge + steps * free, -1)
-    cross = np.swapaxes(back @ np.swapaxes(slots[:, :free, POSE:], 0, 1), 0, 1).reshape(len(inner), size - HEAD)
-    hessian[start[:, None], start], hessian[size:, size:] = inner[:many, :many], inner[edge:, edge:]
-    hessian[start, size:], hessian[size:, start] = inner[:many, edge:], inner[edge:, :many]
-    hessian[start, HEAD:size], hessian[size:, HEAD:size] = cross[:many], cross[edge:]
-    hessian[HEAD:size, start], hessian[HEAD:size, size:] = cross[:many].T, cross[edge:].T
+        shared = flat.T @ window.rates.common.reshape(count, -1)
+        inner -= shared @ shared.T
+    cross = flat.T @ slots[:, :free, POSE:].reshape(count, -1)
+    hessian[used[:, None], used] = inner
+    hessian[used, HEAD:size], hessian[HEAD:size, used] = cross, cross.T
     hessian[HEAD:size, HEAD:size] = slots.sum(axis=0)[POSE:, POSE:]
-    gradient[start], gradient[size:] = pull.ravel()[:many], pull.ravel()[edge:]
+    gradient[used] = slope[:, :free].ravel() @ flat
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
