@@ -19,7 +19,7 @@ from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.scene_overrides import change_room
-from rislam_rt.pipeline.room.true_motion import draw_motion
+from rislam_rt.pipeline.room.true_motion import draw_looks, draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
@@ -70,7 +70,9 @@ def set_scene(scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator) -> 
     check_run(scene, spec)
     seeds = spawn_seeds(rng=rng)
     scene = change_room(cut_scene(scene, spec.cycles), spec.room, rng=np.random.default_rng(seeds.room))
-    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=np.random.default_rng(seeds.motion))
+    motion_rng = np.random.default_rng(seeds.motion)
+    motion = draw_motion(scene, spec.motion.sigma_a_m_s2, rng=motion_rng)
+    motion = draw_looks(motion, np.radians(spec.motion.look_std_deg), rng=motion_rng)
     return replace(scene, agent=tilted_motion(motion, spec.told)), motion.body, seeds
 
 

@@ -1,4 +1,5 @@
-"""The true motion of a run: the scene's trajectory plus white-noise acceleration, as the filter's model has it."""
+"""The true motion of a run: the scene's trajectory plus white-noise acceleration, as the filter's model has it, and a
+body that looks about."""
 
 from dataclasses import replace
 
@@ -52,6 +53,16 @@ def draw_motion(scene: Scene, sigma_a: float, *, rng: np.random.Generator) -> Tr
         f"motion.sigma_a_m_s2: {sigma_a:g} received; none of {BATCH * MAX_BATCHES} draws stays in '{scene.name}' for "
         f"{motion.time[-1] - motion.time[0]:.3g} s, give less, or fewer cycles"
     )
+
+
+def draw_looks(motion: Trajectory, std: float, *, rng: np.random.Generator) -> Trajectory:
+    """True motion of a body that looks about: its heading wanders off the scene's by a standard deviation [rad], as a
+    sum of sines of 3 to 10 s, while the way stays as it is."""
+    if std == 0.0:
+        return motion
+    period, phase = rng.uniform(3.0, 10.0, size=3), rng.uniform(0.0, 2.0 * np.pi, size=3)
+    waves = np.sin(2.0 * np.pi * motion.time[:, None] / period + phase)
+    return replace(motion, heading=motion.heading + std * np.sqrt(2.0 / 3.0) * waves.sum(axis=1))
 
 
 def draw_walks(time: Floats, sigma_a: float, count: int, *, rng: np.random.Generator) -> tuple[Floats, Floats]:

@@ -168,11 +168,14 @@ class StartSection(Section):
 
 
 class MotionSection(Section):
-    """Random accelerations of the true motion beside the scene's trajectory."""
+    """Random accelerations and looks of the true motion beside the scene's trajectory."""
 
     sigma_a_m_s2: NotNegative = 0.0
     """Standard deviation of the white acceleration in the horizontal plane, drawn anew for every seed (see
     `pipeline.room`); 0 leaves the trajectory as it is. Estimators whose own `sigma_a` is not given assume this one."""
+    look_std_deg: NotNegative = 0.0
+    """Standard deviation of slow looks to the sides, by which the body's heading departs from the scene's while the way
+    stays the same; the compass tells the heading as it is."""
 
 
 class PanelSection(Section):

@@ -9,7 +9,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.room.true_motion import CLEARANCE, draw_motion, draw_walks
+from rislam_rt.pipeline.room.true_motion import CLEARANCE, draw_looks, draw_motion, draw_walks
 from rislam_rt.pipeline.run import cut_scene, prepare_setup
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 
@@ -47,6 +47,17 @@ def test_motion_stays_inside_and_keeps_heading_and_height(room):
         np.testing.assert_allclose(moved, 0.5 * (motion.velocity[1:] + motion.velocity[:-1]), atol=1e-9)
 
 
+def test_looks_turn_the_body_and_not_its_way(room):
+    assert draw_looks(room.agent, 0.0, rng=np.random.default_rng(0)) is room.agent
+    looks = [draw_looks(room.agent, 0.3, rng=np.random.default_rng(seed)) for seed in range(300)]
+    off = np.array([look.heading - room.agent.heading for look in looks])
+    # 300 draws of three phases: the mean square over them is known to about 1/sqrt(300) of itself
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(0.3, rel=0.05)
+    assert np.abs(np.diff(off, axis=1) / np.diff(room.agent.time)).max() < 0.3 * np.sqrt(6.0) * 2.0 * np.pi / 3.0
+    np.testing.assert_array_equal(looks[0].position, room.agent.position)
+    np.testing.assert_array_equal(looks[0].velocity, room.agent.velocity)
+
+
 @pytest.mark.slow
 def test_too_much_acceleration_for_the_room_is_refused(room):
     with pytest.raises(ConfigError, match="sigma_a_m_s2: 1000 received"):
@@ -59,6 +70,9 @@ def test_every_seed_has_a_motion_of_its_own_and_keeps_it(room):
     np.testing.assert_array_equal(one.scene.agent.position, again.scene.agent.position)
     np.testing.assert_array_equal(one.paths.tau, again.paths.tau)
     assert (one.scene.agent.position != other.scene.agent.position).any()
+    looked = load_spec(PIPELINE, ["channel=image_source", "cycles=20", "depth=0", "motion.look_std_deg=20"])
+    turned = prepare_setup(room, looked, rng=np.random.default_rng(1)).scene.agent.heading
+    assert np.abs(turned - cut_scene(room, 20).agent.heading).max() > np.radians(1.0)
     still = prepare_setup(
         room, spec.model_copy(update={"motion": load_spec(PIPELINE).motion}), rng=np.random.default_rng(1)
     )
