@@ -227,8 +227,8 @@ class _Followed(NamedTuple):
 def _predicted(state: WindowState, velocity: Floats, dt: float, turn: float, bend: float) -> WindowTracks:
     """Tracks predicted over a step `dt` [s] in which the body turns by `turn` [rad]; `velocity` (3,) [m/s] and `bend`
     [m/s^2] are those of the agent."""
-    agent, course = state.heading[-1], state.window.course[-1:]
-    kept = (rotation(agent).T @ velocity)[:2] if course.any() else np.zeros(2)
+    agent, angle = state.heading[-1], state.window.velocity_turn[-1:]
+    kept = (rotation(agent).T @ velocity)[:2] if angle.any() else np.zeros(2)
     return tracks.advance(state.tracks, dt, turn, np.array([2.0 * bend + velocity @ velocity, 0.1, 0.1]), kept)
 
 

@@ -12,7 +12,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, stranger_density
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import StepInfo
-from rislam_rt.slam.window import course_learning, motion_learning, tracks
+from rislam_rt.slam.window import coordinated_turn, motion_learning, tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again, with_tilts
 from rislam_rt.slam.window.cycle_explanation import (
     beside_panels,
@@ -112,9 +112,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         return state._replace(heading=np.array([heading]))
     window, motion_mode, headings, passed = state.window, state.motion_mode, state.heading, state.passed
     rotation, told = state.attitude, state.attitude_information
-    odds, turn = state.course_log_odds, heading - float(headings[-1])
+    odds, turn = state.coordinated_log_odds, heading - float(headings[-1])
     while window.num_poses >= CONSTANTS.window:
-        odds = course_learning.log_odds_after(state._replace(window=window, heading=headings, course_log_odds=odds))
+        odds = coordinated_turn.log_odds_after(
+            state._replace(window=window, heading=headings, coordinated_log_odds=odds)
+        )
         told_of_first = motion_learning.likelihoods(window, 1, motion_learning.vertical_information(window))[:, 0]
         motion_mode = motion.forward(motion_mode, told_of_first, CONSTANTS.stay)
         passed = np.concatenate([passed, window.head[None, :3]])
@@ -125,11 +127,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
     else:
         precision = motion_learning.precisions(level)
-        course = course_learning.course_change(state, turn)
-        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level), course)
+        velocity_turn = coordinated_turn.velocity_turn(state, turn)
+        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level), velocity_turn)
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
-        course_log_odds=odds,
+        coordinated_log_odds=odds,
         attitude=np.concatenate([rotation, np.zeros((1, 3))]),
         attitude_information=np.concatenate([told, np.zeros((1, *told.shape[1:]))]),
     )  # fmt: skip
@@ -215,7 +217,7 @@ def _solve(
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
     spread = prediction_variance(window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread, _excess_variance(window, left)))
-    state = course_learning.learn_course(motion_learning.learn_motion(state._replace(window=window)))
+    state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window)))
     return state, view, left, float(np.sum(innovation**2)), covariance
 
 

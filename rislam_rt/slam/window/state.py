@@ -41,9 +41,9 @@ class WindowState(NamedTuple):
     """(2, L) or (3, L) filtered probabilities of the motion modes in the last step."""
     is_level: bool
     """Whether the floor is held for level, on which the height does not change."""
-    follows: bool
-    """Whether the agent's course is held to follow its heading (see `course_learning`)."""
-    course_log_odds: float
+    is_coordinated: bool
+    """Whether the agent is held to go where it faces (see `coordinated_turn`)."""
+    coordinated_log_odds: float
     """Log odds of that, from the steps that have left the window."""
     heading: Floats
     """(K,) [rad] headings of the poses as the compass told; without one, what the estimated offsets are relative to."""

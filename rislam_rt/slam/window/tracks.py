@@ -76,7 +76,7 @@ def no_tracks(panels: int = 1) -> WindowTracks:
 
 def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats, velocity: Floats) -> WindowTracks:
     """Kalman prediction of the tracks over `dt` [s] while the body turns by `turn` [rad]; `bend` (3,) is the root of
-    the rates' variance per second. A body whose course follows its heading keeps a `velocity` (2,) [m/s] in its own
+    the rates' variance per second. A body that goes where it faces keeps a `velocity` (2,) [m/s] in its own
     axes, which turns with it: lengths shrink by twice the way towards where a path comes from."""
     move = np.array([[1.0, dt], [0.0, 1.0]])
     noise = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]]) * (bend**2)[:, None, None]

@@ -1,8 +1,8 @@
 """Motion basis: the window's poses as a linear function of the first one, its velocity and the steps' accelerations.
 
-Over each step the velocity turns by a course change, as the body does whose course follows its heading, and an
-acceleration is added to it: v' = R v + a T, and the place moves by the mean of both velocities, p' = p + (v + v') T / 2
-(a coordinated turn of known rate; Bar-Shalom, Li and Kirubarajan 2001, section 11.7).
+Over each step the velocity is turned by a given angle, as that of a body which goes where it faces, and an acceleration
+is added to it: v' = R v + a T. The place moves by the mean of both velocities, p' = p + (v + v') T / 2 (a coordinated
+turn of known rate; Bar-Shalom, Li and Kirubarajan 2001, section 11.7).
 """
 
 from functools import lru_cache
@@ -20,11 +20,11 @@ POSE = 4
 
 
 @lru_cache(maxsize=4)
-def pose_matrix(steps: bytes, course: bytes, turns: bool) -> Floats:
+def pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     """Matrix (K, A, M) that gives K poses along A axes from the first place and rate (`head_order`) and then the
-    accelerations of all steps, for times [s] and course changes [rad] of the steps, as bytes."""
+    accelerations of all steps, for times [s] of the steps and turns [rad] of the velocity over them, as bytes."""
     step, free = np.frombuffer(steps), 3 + turns
-    count, (_, reach) = len(step) + 1, _horizontal(step, np.frombuffer(course))
+    count, (_, reach) = len(step) + 1, _horizontal(step, np.frombuffer(velocity_turn))
     found = np.zeros((count, free, count + 1, free))
     for axis in range(2):
         found[:, axis, 1:, axis] = reach.real
@@ -45,14 +45,14 @@ def _after(count: int) -> Booleans:
     return np.asarray(np.arange(count)[:, None] > np.arange(count - 1))
 
 
-def _horizontal(step: Floats, course: Floats) -> tuple[Floats, Floats]:
+def _horizontal(step: Floats, velocity_turn: Floats) -> tuple[Floats, Floats]:
     """Horizontal velocities and displacements (K, K), as complex factors of the first velocity and of the accelerations
-    of steps with times (K - 1,) [s] and course changes (K - 1,) [rad]."""
+    of steps with times and turns (K - 1,) [s, rad]."""
     count = len(step) + 1
-    angle = np.concatenate([[0.0], np.cumsum(course)])
+    heading = np.concatenate([[0.0], np.cumsum(velocity_turn)])
     speed = np.zeros((count, count), dtype=np.complex128)
-    speed[:, 0] = np.exp(1j * angle)
-    speed[:, 1:] = np.where(_after(count), step * np.exp(1j * (angle[:, None] - angle[1:])), 0.0)
+    speed[:, 0] = np.exp(1j * heading)
+    speed[:, 1:] = np.where(_after(count), step * np.exp(1j * (heading[:, None] - heading[1:])), 0.0)
     reach = np.zeros((count, count), dtype=np.complex128)
     reach[1:] = np.cumsum(0.5 * step[:, None] * (speed[1:] + speed[:-1]), axis=0)
     return speed, reach
@@ -68,17 +68,17 @@ def head_order(free: int) -> Integers:
     return FIRST if free > TURN else np.arange(6)
 
 
-def rotation(course: float) -> Floats:
-    """Rotation (3, 3) of a velocity by a course change [rad]."""
-    cos, sin = np.cos(course), np.sin(course)
+def rotation(angle: float) -> Floats:
+    """Rotation (3, 3) of a velocity by a turn [rad]."""
+    cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-def step_transition(dt: float, course: float, free: int) -> Floats:
+def step_transition(dt: float, angle: float, free: int) -> Floats:
     """Transition matrix (7, 7 + A) from pose, velocity and compass offset, and a step's accelerations, to those `dt`
-    [s] later, the velocity turning by a course change [rad]."""
+    [s] later, the velocity turning by a turn [rad]."""
     found = np.eye(HEAD, HEAD + free)
-    axes, turn = np.arange(3), rotation(course)
+    axes, turn = np.arange(3), rotation(angle)
     found[:3, 3:6], found[3:6, 3:6] = 0.5 * dt * (np.eye(3) + turn), turn
     found[axes, HEAD + axes], found[3 + axes, HEAD + axes] = 0.5 * dt**2, dt
     if free > TURN:
@@ -86,10 +86,10 @@ def step_transition(dt: float, course: float, free: int) -> Floats:
     return found
 
 
-def step_back(dt: float, course: float, free: int) -> Floats:
+def step_back(dt: float, angle: float, free: int) -> Floats:
     """Matrix (7, 7 + A) from pose, velocity and compass offset after a step, and its accelerations, to those before it:
     the inverse of `step_transition`."""
-    found = step_transition(dt, course, free)
+    found = step_transition(dt, angle, free)
     back = found[3:6, 3:6].T
     before, push = found.copy(), found[3:6, HEAD:]
     before[3:6, 3:6], before[3:6, HEAD:] = back, -back @ push
@@ -100,7 +100,7 @@ def step_back(dt: float, course: float, free: int) -> Floats:
 
 
 @lru_cache(maxsize=4)
-def last_pose_matrix(steps: bytes, course: bytes, turns: bool) -> Floats:
+def last_pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     """Matrix (7, 7 + (K - 1) A) that gives the last pose, velocity and compass offset from the first ones and all
     accelerations."""
     step, free = np.frombuffer(steps), 3 + turns
@@ -108,8 +108,8 @@ def last_pose_matrix(steps: bytes, course: bytes, turns: bool) -> Floats:
     design = np.eye(HEAD, HEAD + len(step) * free)
     columns = np.concatenate([order, np.arange(HEAD, design.shape[1])])
     places = np.arange(free)
-    design[FIRST[places][:, None], columns] = pose_matrix(steps, course, turns)[-1]
-    speed = _horizontal(step, np.frombuffer(course))[0][-1]
+    design[FIRST[places][:, None], columns] = pose_matrix(steps, velocity_turn, turns)[-1]
+    speed = _horizontal(step, np.frombuffer(velocity_turn))[0][-1]
     whole = np.stack([[speed.real, -speed.imag], [speed.imag, speed.real]])
     design[3:5, 3:5] = whole[:, :, 0]
     for axis in range(2):

@@ -70,8 +70,8 @@ class Window(NamedTuple):
     `motion_learning`)."""
     step: Floats
     """(K - 1,) [s] times between the poses."""
-    course: Floats
-    """(K - 1,) [rad] course changes: by how much the velocity turns over each step, beside the acceleration."""
+    velocity_turn: Floats
+    """(K - 1,) [rad] by how much the velocity turns over each step, beside the acceleration."""
     prior: Quadratic
     """Quadratic on the head: what is known beforehand and from poses that left the window."""
     noise: Floats
@@ -135,7 +135,7 @@ def pose_design(window: Window) -> tuple[Floats, Integers]:
     indices (M,) of these."""
     order = head_order(window.accel.shape[1])
     used = np.concatenate([order, len(window.head) + np.arange(window.accel.size)])
-    return pose_matrix(window.step.tobytes(), window.course.tobytes(), window.turns), used
+    return pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns), used
 
 
 def poses(window: Window) -> Floats:
@@ -151,7 +151,10 @@ def poses(window: Window) -> Floats:
 def _carried(window: Window, rows: Floats) -> Floats:
     """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
     its unknowns."""
-    size, design = len(window.head), last_pose_matrix(window.step.tobytes(), window.course.tobytes(), window.turns)
+    size, design = (
+        len(window.head),
+        last_pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns),
+    )
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
@@ -223,9 +226,11 @@ def _surplus(precision: Floats, variance: Floats) -> Floats:
     return np.maximum(precision**2 * variance - precision, 0.0)
 
 
-def extend(window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0, course: float = 0.0) -> Window:
+def extend(
+    window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0, velocity_turn: float = 0.0
+) -> Window:
     """Append a pose to the sliding window, `dt` [s] after the last, with prior precisions (A,) of the step's
-    acceleration, its `variance` (A,) and its `course` change [rad]."""
+    acceleration, its `variance` (A,) and its `velocity_turn` [rad]."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -237,7 +242,7 @@ def extend(window: Window, dt: float, precision: Floats, variance: Floats | floa
         solved=np.concatenate([window.solved, precision[None]]),
         variance=np.concatenate([window.variance, np.broadcast_to(variance, (1, free))]),
         uneven=np.append(window.uneven, precision[2]),
-        step=np.append(window.step, dt), course=np.append(window.course, course), slots=slots,
+        step=np.append(window.step, dt), velocity_turn=np.append(window.velocity_turn, velocity_turn), slots=slots,
         covariance=covariance, rates=None,
     )  # fmt: skip
 
@@ -251,23 +256,23 @@ def slide(window: Window) -> Window:
     hessian[first[:, None], first] += oldest.hessian
     gradient[first] += oldest.slope(window.head[first])
     # the next pose and the acceleration in between, instead of the oldest pose
-    dt, course, accel = float(window.step[0]), float(window.course[0]), window.accel[0]
+    dt, angle, accel = float(window.step[0]), float(window.velocity_turn[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = step_back(dt, course, free)
+    back = step_back(dt, angle, free)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
     steep[size:] += window.precision[0] * accel
     if window.rates:
         at = np.concatenate([[3, 4, 5], size + np.arange(3)])
-        information, pull = window.rates.first_step(dt, course, window.head[3:6], accel[:3])
+        information, pull = window.rates.first_step(dt, angle, window.head[3:6], accel[:3])
         wide[np.ix_(at, at)] += information
         steep[at] += pull
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(_surplus(window.precision[0], window.variance[0]))
-    carry = step_transition(dt, course, free)
+    carry = step_transition(dt, angle, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -278,8 +283,8 @@ def slide(window: Window) -> Window:
     covariance = np.concatenate([covariance[:size], covariance[size + free :]])
     return window._replace(
         head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
-        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:], course=window.course[1:],
-        prior=prior,
+        variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:],
+        velocity_turn=window.velocity_turn[1:], prior=prior,
         noise=eliminated_noise(shaken, size, gain), slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
     )  # fmt: skip

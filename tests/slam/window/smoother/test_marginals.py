@@ -16,8 +16,8 @@ def drawn(turns):
     for _ in range(2):
         window = window_features.add_feature(window, rng.standard_normal(3), no_holds())
     for _ in range(4):
-        step, course = rng.uniform(0.05, 0.2), rng.uniform(-0.5, 0.5)
-        window = window_gaussian.extend(window, float(step), np.ones(3 + turns), course=float(course))
+        step, angle = rng.uniform(0.05, 0.2), rng.uniform(-0.5, 0.5)
+        window = window_gaussian.extend(window, float(step), np.ones(3 + turns), velocity_turn=float(angle))
     root = rng.standard_normal(window.covariance.shape)
     return window._replace(covariance=root @ root.T)
 

@@ -24,7 +24,7 @@ def test_the_cost_by_the_windows_numbers_is_that_by_the_positions():
     rng, count = np.random.default_rng(1), 5
     window = window_gaussian.begin(np.zeros(3), np.ones(3), np.full(7, 0.1))
     for _ in range(count - 1):
-        window = window_gaussian.extend(window, STEP, np.full(3, 1e2), course=0.3)
+        window = window_gaussian.extend(window, STEP, np.full(3, 1e2), velocity_turn=0.3)
     factor, place = _factor(count, rng), window_gaussian.poses(window)[:, :3]
     alone, told = window_gaussian.solve(window), window_gaussian.solve(window._replace(rates=factor))
 
@@ -49,14 +49,14 @@ def test_the_cost_by_the_windows_numbers_is_that_by_the_positions():
     np.testing.assert_allclose(slope(window, told) - slope(window, alone), wanted, atol=1e-7)
 
 
-@pytest.mark.parametrize("course", [0.0, 0.5])
-def test_a_first_step_that_leaves_tells_the_velocity(course):
+@pytest.mark.parametrize("angle", [0.0, 0.5])
+def test_a_first_step_that_leaves_tells_the_velocity(angle):
     """A window whose velocity is uncertain by 0.05 m/s; the step that leaves was measured within 0.1 mm in 0.1 s, on
     top of where it is linearised by as much as 0.01 m/s: of the mean of the velocities before and after a turn."""
     velocity, std = np.array([0.2, 0.1, 0.0]), np.array([1e-3, 1e-3, 1e-3, 0.05, 0.05, 0.05, 0.0])
     window = window_gaussian.begin(np.zeros(3), velocity, std)
     for _ in range(2):
-        window = window_gaussian.extend(window, STEP, np.full(3, 1e4), course=course)
+        window = window_gaussian.extend(window, STEP, np.full(3, 1e4), velocity_turn=angle)
     window = window_gaussian.solve(window)
     place, off, information = window_gaussian.poses(window)[:, :3], STEP * np.array([0.01, 0.0, 0.0]), 1e-4**-2
     none = np.zeros((3, 3, 3))
@@ -65,6 +65,6 @@ def test_a_first_step_that_leaves_tells_the_velocity(course):
     after = window_gaussian.solve(window_gaussian.slide(window._replace(rates=told)))
     assert np.sqrt(np.diag(before.covariance)[3:6]).min() > 0.03
     assert np.sqrt(np.diag(after.covariance)[3:6]).max() < 2e-3
-    turn = rotation(course)
+    turn = rotation(angle)
     faster = np.linalg.solve(0.5 * (np.eye(3) + turn), off / STEP)
     np.testing.assert_allclose(after.head[3:6], turn @ (velocity + faster), atol=2e-4)

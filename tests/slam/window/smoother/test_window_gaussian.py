@@ -18,7 +18,7 @@ def _sighting(rng):
     return rows, rng.standard_normal(3), rng.uniform(1.0, 100.0, 3)
 
 
-def _filtered(sightings, start, std, keep, course):
+def _filtered(sightings, start, std, keep, turned):
     """The window's answer, at most `keep` poses long."""
     window = window_gaussian.begin(start[:3], start[3:6], std)
     nothing = DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
@@ -27,7 +27,7 @@ def _filtered(sightings, start, std, keep, course):
         if cycle:
             while window.num_poses >= keep:
                 window = window_gaussian.slide(window)
-            window = window_gaussian.extend(window, DT, np.full(3, SIGMA_A**-2.0), course=course[cycle])
+            window = window_gaussian.extend(window, DT, np.full(3, SIGMA_A**-2.0), velocity_turn=turned[cycle])
         hessian, gradient, middle = (field.copy() for field in window.slots)
         spot = np.concatenate([window_gaussian.poses(window)[-1], window.features[0]])
         hessian[-1] = rows.T @ (weight[:, None] * rows)
@@ -36,7 +36,7 @@ def _filtered(sightings, start, std, keep, course):
     return window_gaussian.now(window)
 
 
-def _batch(sightings, start, std, course):
+def _batch(sightings, start, std, turned):
     """All cycles at once, in positions, velocities and the feature, from the motion's own recursion."""
     free = np.flatnonzero(std > 0.0)
     count = len(sightings)
@@ -55,7 +55,7 @@ def _batch(sightings, start, std, course):
             at = len(free) + 3 * (cycle - 1)
             push = np.zeros((3, size))
             push[:, at : at + 3] = np.eye(3)
-            cos, sin = np.cos(course[cycle]), np.sin(course[cycle])
+            cos, sin = np.cos(turned[cycle]), np.sin(turned[cycle])
             turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
             later, offset = turn @ velocity + DT * push, turn @ offset_v
             position = position + 0.5 * DT * (velocity + later)
@@ -74,14 +74,14 @@ def _batch(sightings, start, std, course):
 @pytest.mark.parametrize("turning", [0.0, 0.6])
 @pytest.mark.parametrize("keep", [20, 4])
 def test_a_linear_window_is_the_batch_and_loses_nothing_when_it_slides(keep, turning):
-    """Straight on, and with a course that turns by up to 34 degrees a step."""
+    """Straight on, and with a velocity that turns by up to 34 degrees a step."""
     rng = np.random.default_rng(3)
     start, std = rng.standard_normal(7), np.array([1.0, 0.5, 0.8, 0.3, 0.2, 0.4, 0.0])
     start[6] = 0.0
     sightings = [_sighting(rng) for _ in range(CYCLES)]
-    course = rng.uniform(-turning, turning, CYCLES)
-    mean, covariance = _filtered(sightings, start, std, keep, course)
-    wanted, spread = _batch(sightings, start, std, course)
+    turned = rng.uniform(-turning, turning, CYCLES)
+    mean, covariance = _filtered(sightings, start, std, keep, turned)
+    wanted, spread = _batch(sightings, start, std, turned)
     place = np.array([0, 1, 2, 3, 4, 5, HEAD, HEAD + 1, HEAD + 2])
     # what is held (the compass) is held to 1e-6, which moves the rest by less than that
     np.testing.assert_allclose(mean[place], wanted, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Whether the agent's course follows its heading is learnt, and a curve that nothing measures is carried on."""
+"""Whether the agent goes where it faces is learnt, and a curve that nothing measures is carried on."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from rislam_rt.model import Body, Measurement, RadioConfig, SensorModel
 from rislam_rt.slam import SlamConfig, StartPrior, estimate, init, step
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window import course_learning, filter, motion_learning, tracks
+from rislam_rt.slam.window import coordinated_turn, filter, motion_learning, tracks
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
@@ -18,12 +18,12 @@ CONFIG = SlamConfig(height="known")
 
 
 def walk(turn, facing):
-    """Positions (K, 3) and headings (K,) of an agent at constant speed whose course turns by `turn` (K - 1,) [rad] a
-    step, and which faces `facing` (K,) [rad] to the left of it."""
-    course = np.concatenate([[0.0], np.cumsum(turn)])
-    velocity = SPEED * np.exp(1j * course)
+    """Positions (K, 3) and headings (K,) of an agent at constant speed whose velocity turns by `turn` (K - 1,) [rad] a
+    step, and which faces `facing` (K,) [rad] to the left of that."""
+    way = np.concatenate([[0.0], np.cumsum(turn)])
+    velocity = SPEED * np.exp(1j * way)
     place = np.concatenate([[0.0], np.cumsum(0.5 * DT * (velocity[1:] + velocity[:-1]))])
-    return np.stack([place.real, place.imag, np.zeros(len(place))], axis=1), course + facing
+    return np.stack([place.real, place.imag, np.zeros(len(place))], axis=1), way + facing
 
 
 def followed(place, heading, config=CONFIG):
@@ -35,7 +35,7 @@ def followed(place, heading, config=CONFIG):
         hessian, gradient, middle = (field.copy() for field in state.window.slots)
         hessian[-1, :3, :3], middle[-1, :3] = SEEN**-2.0 * np.eye(3), seen
         window = window_gaussian.solve(state.window._replace(slots=Quadratic(hessian, gradient, middle)))
-        state = course_learning.learn_course(motion_learning.learn_motion(state._replace(window=window)))
+        state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window)))
         state = state._replace(cycle=state.cycle + 1)
         found.append(state)
     return found
@@ -49,7 +49,7 @@ def lively(state):
 def test_a_curve_along_which_the_agent_faces_is_calm():
     curve = np.full(60, 0.05)  # 0.5 rad/s at 0.5 m/s: 0.25 m/s^2 to the side
     along = followed(*walk(curve, np.zeros(61)))
-    assert all(state.follows for state in along)
+    assert all(state.is_coordinated for state in along)
     aside = followed(walk(curve, np.zeros(61))[0], np.zeros(61))  # the body does not turn: nothing to follow
     assert lively(along[-1]) < 0.02
     assert lively(aside[-1]) > 0.1
@@ -60,23 +60,23 @@ def test_who_looks_about_keeps_the_velocity():
     look = np.concatenate([np.zeros(5), np.sin(np.arange(60) * 2.0 * np.pi / 40.0), np.zeros(61)])
     curve = np.concatenate([np.zeros(65), np.full(60, 0.05)])
     states = followed(*walk(curve, look))
-    assert states[5].follows
-    assert not any(state.follows for state in states[15:65])
-    assert all(state.follows for state in states[105:])  # a window after the last look
+    assert states[5].is_coordinated
+    assert not any(state.is_coordinated for state in states[15:65])
+    assert all(state.is_coordinated for state in states[105:])  # a window after the last look
     assert lively(states[64]) < 0.02
     assert lively(states[-1]) < 0.02
 
 
-def test_other_course_changes_are_the_same_motion():
+def test_other_turns_of_the_velocity_are_the_same_motion():
     rng = np.random.default_rng(2)
     turn = rng.uniform(-0.3, 0.3, 30)
     window = followed(*walk(turn, np.zeros(31)))[-1].window
-    assert window.course.any()
-    other = course_learning.with_course(window, np.zeros(30))
+    assert window.velocity_turn.any()
+    other = coordinated_turn.with_velocity_turn(window, np.zeros(30))
     np.testing.assert_allclose(window_gaussian.poses(other), window_gaussian.poses(window), atol=1e-12)
     last = window_gaussian.mean_now(window)
     np.testing.assert_allclose(window_gaussian.mean_now(other), last, atol=1e-12)
-    back = course_learning.with_course(other, window.course)
+    back = coordinated_turn.with_velocity_turn(other, window.velocity_turn)
     np.testing.assert_allclose(back.accel, window.accel, atol=1e-12)
 
 
@@ -132,7 +132,7 @@ def test_a_track_of_a_wall_goes_on_along_a_curve():
     mean = found.mean.copy()
     mean[0, 0, 1] = rate
     after = tracks.advance(found._replace(mean=mean), DT, turn, np.zeros(3), velocity)
-    course = np.exp(1j * turn)
-    assert after.mean[0, 0, 1] == pytest.approx(-2.0 * SPEED * (normal * course.conjugate()).real, rel=1e-9)
+    ahead = np.exp(1j * turn)
+    assert after.mean[0, 0, 1] == pytest.approx(-2.0 * SPEED * (normal * ahead.conjugate()).real, rel=1e-9)
     kept = tracks.advance(found._replace(mean=mean), DT, turn, np.zeros(3), np.zeros(2))
     assert kept.mean[0, 0, 1] == pytest.approx(rate)
