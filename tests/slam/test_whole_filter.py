@@ -226,7 +226,7 @@ def test_prediction_is_the_belief_without_a_measurement(clear: tuple[Heard, Cour
     rng = np.random.default_rng(1)
     state = init(heard.start, heard.scene.agent.body, None, heard.sensor, CONFIG, rng=rng)
     none = Measurement(*(np.zeros(shape) for shape in (0, (0, 2), 0, 0, (0, 2), 0)))
-    after, info = step(state, none, None, 0.5, 0.0, CONFIG, rng=rng)
+    after, info = step(state, none, None, 0.5, heard.start.heading, CONFIG, rng=rng)
     belief = estimate(after, CONFIG)
     np.testing.assert_allclose(belief.position, heard.start.position + 0.5 * heard.start.velocity, atol=1e-12)
     # the calm mode moves the estimate, and what a lively one adds is told as well: the variance of both together
