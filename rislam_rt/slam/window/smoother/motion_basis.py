@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 
 HEAD = 7
 """Number of the window's unknowns before the features: first position, its velocity, compass offset."""
@@ -45,7 +45,7 @@ def _after(count: int) -> Booleans:
     return np.asarray(np.arange(count)[:, None] > np.arange(count - 1))
 
 
-def _horizontal(step: Floats, velocity_turn: Floats) -> tuple[Floats, Floats]:
+def _horizontal(step: Floats, velocity_turn: Floats) -> tuple[Complexes, Complexes]:
     """Horizontal velocities and displacements (K, K), as complex factors of the first velocity and of the accelerations
     of steps with times and turns (K - 1,) [s, rad]."""
     count = len(step) + 1
