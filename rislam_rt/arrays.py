@@ -51,6 +51,19 @@ def phasor(phase: ArrayLike) -> Complexes:
     return found
 
 
+def cross(a: ArrayLike, b: ArrayLike) -> Floats:
+    """Cross products (..., 3) of arrays of vectors (..., 3), to the bit numpy's own, which for a few takes thrice as
+    long."""
+    one, other = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    x, y, z, u, v, w = *(one[..., i] for i in range(3)), *(other[..., i] for i in range(3))
+    first = y * w - z * v
+    found = np.empty((*first.shape, 3))
+    found[..., 0] = first
+    found[..., 1] = z * u - x * w
+    found[..., 2] = x * v - y * u
+    return found
+
+
 def show_point(point: ArrayLike) -> str:
     """Text of an array of three coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
     return f"({', '.join(f'{value:.4g}' for value in np.asarray(point))})"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import Scene
 
@@ -84,13 +84,13 @@ def _crosses(start: Floats, end: Floats, triangles: Floats) -> Booleans:
     # differ in sign alone.
     normal, offset = triangle_planes(triangles)
     a, b = start @ normal.T - offset, end @ normal.T - offset
-    direction, moment = end - start, np.cross(start, end)
+    direction, moment = end - start, cross(start, end)
     length = np.linalg.norm(direction, axis=-1)[:, None]
     least, most = np.full(a.shape, np.inf), np.full(a.shape, -np.inf)
     for corner in range(3):
         tail, head = triangles[:, corner], triangles[:, (corner + 1) % 3]
         edge = head - tail
-        side = direction @ np.cross(tail, head).T + moment @ edge.T
+        side = direction @ cross(tail, head).T + moment @ edge.T
         side /= np.maximum(length * np.linalg.norm(edge, axis=-1), np.finfo(np.float64).tiny)
         least, most = np.minimum(least, side), np.maximum(most, side)
     inside: Booleans = (least >= -SEAM) | (most <= SEAM)

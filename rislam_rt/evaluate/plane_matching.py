@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.evaluate.set_distances import match_nearest
 
 NEAR_WALL = 0.5
@@ -39,7 +39,7 @@ def plane_distance(surfaces: Surfaces, normal: Floats, offset: Floats) -> Floats
 
 def plane_angle(surfaces: Surfaces, normal: Floats) -> Floats:
     """Angles (W, M) [deg], 0 to 90, between W true walls and M planes of unit normals (M, 3)."""
-    across = np.cross(surfaces.normal[:, None], normal[None])
+    across = cross(surfaces.normal[:, None], normal[None])
     return np.asarray(np.degrees(np.arctan2(np.linalg.norm(across, axis=-1), np.abs(surfaces.normal @ normal.T))))
 
 

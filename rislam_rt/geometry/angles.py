@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, cross
 
 
 def unit(vector: Floats) -> Floats:
@@ -25,7 +25,7 @@ def wrap(angle: Floats) -> Floats:
 
 def angle_between(a: Floats, b: Floats) -> Floats:
     """Angle (...,) [rad] between directions (..., 3), exact for small angles too (atan2 of cross and dot)."""
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(np.asarray(a) * np.asarray(b), axis=-1))
+    return np.arctan2(np.linalg.norm(cross(a, b), axis=-1), np.sum(np.asarray(a) * np.asarray(b), axis=-1))
 
 
 def rotation_about(axis: Floats, angle: float) -> Floats:

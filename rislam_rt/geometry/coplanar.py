@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.constants import COPLANAR_ANGLE, RAY_OFFSET
 from rislam_rt.geometry.planes import signed_distance
 from rislam_rt.geometry.triangles import triangle_areas
@@ -81,8 +81,8 @@ def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
 
     Two triangles are apart if their shadows on a normal to one of their six edges are (separating axes).
     """
-    right = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    frame = np.stack([right / np.linalg.norm(right), np.cross(normal, right) / np.linalg.norm(right)], axis=-1)
+    right = cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    frame = np.stack([right / np.linalg.norm(right), cross(normal, right) / np.linalg.norm(right)], axis=-1)
     flat_a, flat_b = a @ frame, b @ frame
     low, high = flat_b.min(axis=(0, 1)), flat_b.max(axis=(0, 1))
     flat_a = flat_a[((flat_a.max(axis=1) > low) & (flat_a.min(axis=1) < high)).all(axis=-1)]
@@ -116,7 +116,7 @@ def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) 
         if len(near) == 0:
             break
         i, j = order[near], order[near + step]
-        turn = np.linalg.norm(np.cross(normal[i], normal[j]), axis=-1)
+        turn = np.linalg.norm(cross(normal[i], normal[j]), axis=-1)
         far = np.abs(signed_distance(corner[i], normal[j], offset[j]))
         also = np.abs(signed_distance(corner[j], normal[i], offset[i]))
         keep = (turn <= COPLANAR_ANGLE) & (np.minimum(far, also) <= gap)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.geometry.triangles import triangle_heights, triangle_planes
 
 FLOAT32_ROUNDING = 2.0**-24
@@ -41,7 +41,7 @@ class _Mesh(NamedTuple):
         """Rows of the triangles in a plane: normals within `slack + turn`, all corners within `offset` [m]."""
         here, widest = abs(float(_GENERIC @ normal)), float(self.slack.max()) + turn
         low, high = np.searchsorted(self.key, [here - widest, here + widest])
-        angle = np.linalg.norm(np.cross(self.normal[low:high], normal), axis=-1)
+        angle = np.linalg.norm(cross(self.normal[low:high], normal), axis=-1)
         rows = low + np.flatnonzero(angle <= self.slack[low:high] + turn)
         return rows[np.abs(self.triangles[rows] @ normal - distance).max(axis=1, initial=0.0) <= offset]
 
@@ -96,7 +96,9 @@ def _grown(mesh: _Mesh, seed: int, free: Booleans, angle: float, offset: float) 
     members = np.array([seed])
     while True:
         found = mesh.in_plane(normal, distance, turn, offset)
-        found = np.union1d(found[free[found]], seed)
+        found = found[free[found]]
+        if seed not in found:
+            found = np.sort(np.append(found, seed))
         if len(found) <= len(members):
             return members if len(found) < len(members) else found
         members, turn = found, 0.0

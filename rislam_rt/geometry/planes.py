@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, cross
 from rislam_rt.geometry.angles import unit
 
 
@@ -44,8 +44,8 @@ def plane_between(point: Floats, image: Floats) -> tuple[Floats, Floats]:
 
 def plane_tangents(normal: Floats) -> tuple[Floats, Floats]:
     """Two orthogonal unit vectors (3,) that span the plane of a unit normal (3,)."""
-    first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
-    return first, np.cross(normal, first)
+    first = unit(cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
+    return first, cross(normal, first)
 
 
 class MirrorChain(NamedTuple):

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.geometry.angles import unit
 
 
 def triangle_cross(triangles: Floats) -> Floats:
     """Normals (T, 3) [m^2] of triangles (T, 3, 3), cross products as long as twice the triangle's area."""
-    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
 
 
 def triangle_areas(triangles: Floats) -> Floats:
@@ -20,7 +20,7 @@ def triangle_heights(triangles: Floats) -> Floats:
     """Heights (T,) [m] of triangles (T, 3, 3) over their longest edges; zero of a point."""
     edge = np.roll(triangles, -1, axis=1) - triangles
     longest = np.linalg.norm(edge, axis=-1).max(axis=1)
-    return np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=-1) / np.where(longest > 0.0, longest, 1.0)
+    return np.linalg.norm(cross(edge[:, 0], edge[:, 1]), axis=-1) / np.where(longest > 0.0, longest, 1.0)
 
 
 def triangle_planes(triangles: Floats) -> tuple[Floats, Floats]:
@@ -36,7 +36,7 @@ def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
     triangle is degenerate the normals are zero and the offset is infinite: nothing lies inside.
     """
     normal, _ = triangle_planes(triangles)
-    inward = unit(np.cross(normal[:, None, :], np.roll(triangles, -1, axis=1) - triangles))
+    inward = unit(cross(normal[:, None, :], np.roll(triangles, -1, axis=1) - triangles))
     solid = np.linalg.norm(inward, axis=-1) > 0.0
     return inward, np.where(solid, np.einsum("tei,tei->te", inward, triangles), np.inf)
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, cross
 
 WIDTH, MARGIN = 300.0, 12.0
 """Width and margin [px] of a plan's picture."""
@@ -73,7 +73,7 @@ def _open_edges(vertices: Floats, faces: Integers) -> Floats:
     ends = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, edge = np.unique(ends, axis=0, return_inverse=True)
     first, second, third = (points[corners[:, number]] for number in range(3))
-    normal = np.cross(second - first, third - first)
+    normal = cross(second - first, third - first)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     normal *= np.where(normal @ (1.0, 1e-3, 1e-6) < 0.0, -1.0, 1.0)[:, None]  # which side is the front does not matter
     total, count = np.zeros((len(edges), 3)), np.bincount(edge.reshape(-1), minlength=len(edges))

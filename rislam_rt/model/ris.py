@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, freeze
+from rislam_rt.arrays import Complexes, Floats, cross, freeze
 from rislam_rt.errors import ConfigError, SceneError
 
 
@@ -59,7 +59,7 @@ class RisSpec:
     @property
     def right(self) -> Floats:
         """Unit vector (3,) along a row of a RIS panel's elements."""
-        return np.cross(self.up, self.normal)
+        return cross(self.up, self.normal)
 
     @property
     def diagonal(self) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, cross
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.geometry.triangles import triangle_areas
@@ -100,7 +100,7 @@ def _icosahedron() -> Floats:
     i, j, k = (index.ravel() for index in np.indices((12, 12, 12)))
     faces = (i < j) & (j < k) & joined[i, j] & joined[j, k] & joined[i, k]
     triangles = unit(corners[np.stack([i, j, k], axis=-1)[faces]])
-    inward = np.einsum("fi,fi->f", np.cross(triangles[:, 0], triangles[:, 1]), triangles[:, 2]) < 0.0
+    inward = np.einsum("fi,fi->f", cross(triangles[:, 0], triangles[:, 1]), triangles[:, 2]) < 0.0
     triangles[inward] = triangles[inward][:, ::-1]
     return triangles
 

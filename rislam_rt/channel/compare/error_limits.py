@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.channel.cross_section import cross_section
 from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permittivity
 from rislam_rt.channel.walls import Walls, build_walls
@@ -174,7 +174,7 @@ def coherent_scale(
             toward = _landmark_directions(paths, cycle[rows], path[rows], trajectory)
             rcs = cross_section(scatterer, precision.radio.wavelength, *toward)
             axis = scatterer.axis
-            across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+            across = cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
             across = across / np.linalg.norm(across)
             broadside = cross_section(scatterer, precision.radio.wavelength, across, across)
             scale[rows] *= np.sqrt(broadside / np.maximum(rcs, np.finfo(np.float64).tiny))

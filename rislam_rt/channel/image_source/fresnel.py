@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, cross
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.planes import mirror_direction
 from rislam_rt.model import Material
@@ -158,13 +158,13 @@ def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
 
 def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
     """Unit vectors for Fresnel reflection: across the plane of incidence, and in it across either ray."""
-    across = np.cross(incident, normal)
+    across = cross(incident, normal)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     level: Booleans = length < 1e-12  # normal incidence: any direction in the wall serves, TE and TM agree there
-    fallback = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    fallback = cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     across = np.where(level, fallback, across)
     across = across / np.linalg.norm(across, axis=-1, keepdims=True)
-    return across, np.cross(across, incident), np.cross(across, reflected)
+    return across, cross(across, incident), cross(across, reflected)
 
 
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.constants import SURFACE_TOLERANCE
 
 SAME = 1e-9
@@ -53,7 +53,7 @@ def bounding_rectangles(corners: Floats, first: Integers, normal: Floats, offset
         along = lead[:, (corner + 1) % 3] - lead[:, corner]
         along -= np.einsum("wi,wi->w", along, normal)[:, None] * normal
         along /= np.linalg.norm(along, axis=-1, keepdims=True)
-        across = np.cross(normal, along)
+        across = cross(normal, along)
         spans = [_span(points, owner, 3 * first[:-1], side) for side in (along, across)]
         area = spans[0][1] * spans[1][1]
         better = area < best * (1.0 - SAME)
@@ -84,7 +84,7 @@ def _filled(rectangles: Rectangles, corners: Floats, wall: Integers) -> Booleans
     count = len(rectangles.offset)
     sides = np.roll(corners, -1, axis=1) - corners
     area = np.zeros(count)
-    np.add.at(area, wall, 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=-1))
+    np.add.at(area, wall, 0.5 * np.linalg.norm(cross(sides[:, 0], sides[:, 1]), axis=-1))
     full = 4.0 * rectangles.sizes[0] * rectangles.sizes[1]
     whole = np.abs(area - full) <= SAME * full
     mine = np.flatnonzero(whole[wall])

@@ -15,7 +15,7 @@ import sionna.rt as rt
 from sionna.rt import antenna_pattern
 from sionna.rt.utils import spectrum_to_matrix_4f
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, cross
 from rislam_rt.channel.traced.leg_query import LegEndpoints
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
 from rislam_rt.channel.traced.radio_materials import ConstantReflection
@@ -63,7 +63,7 @@ def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -
     if isinstance(material, ConstantReflection):
         return incidence_jones(material, np.ones(1))
     along = np.vecdot(incident, normal)
-    across = np.cross(incident, normal)
+    across = cross(incident, normal)
     sine = np.linalg.norm(across, axis=-1, keepdims=True)
     # at normal incidence any direction in the wall will do: across and along the plane are alike there
     across = np.where(sine > POLE, across / np.where(sine > POLE, sine, 1.0), spherical_basis(incident)[0])

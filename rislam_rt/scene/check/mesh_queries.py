@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers, row_blocks
+from rislam_rt.arrays import Floats, Integers, cross, row_blocks
 from rislam_rt.geometry.triangles import edge_planes, triangle_planes
 
 
@@ -64,7 +64,7 @@ def winding(point: Floats, triangles: Floats) -> float:
     """
     a, b, c = np.moveaxis(triangles - point, 1, 0)
     na, nb, nc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-    top = np.einsum("ti,ti->t", a, np.cross(b, c))
+    top = np.einsum("ti,ti->t", a, cross(b, c))
     dot = np.einsum
     below = na * nb * nc + dot("ti,ti->t", a, b) * nc + dot("ti,ti->t", b, c) * na + dot("ti,ti->t", c, a) * nb
     return float(np.sum(np.arctan2(top, below)) / (2.0 * np.pi))

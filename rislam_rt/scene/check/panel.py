@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rislam_rt.arrays import cross
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
@@ -119,7 +120,7 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
         yield room.error(f"{key}.center", message, "move the panel onto its host")
         return
     normal, _ = triangle_planes(room.triangles[[t for t in near if room.name(int(t)) == panel.host]])
-    turn = np.linalg.norm(np.cross(normal, panel.spec.normal), axis=-1).min()
+    turn = np.linalg.norm(cross(normal, panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
         message = f"{angle:.2f} degrees from the normal of '{panel.host}'"

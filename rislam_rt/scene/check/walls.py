@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
@@ -98,5 +98,5 @@ def _flattest(triangles: Floats, part: PlanarRegions) -> float:
     order = np.lexsort((wall, edge))
     same = (edge[order][1:] == edge[order][:-1]) & (wall[order][1:] != wall[order][:-1])
     a, b = wall[order][:-1][same], wall[order][1:][same]
-    turn = np.linalg.norm(np.cross(part.normal[a], part.normal[b]), axis=-1)
+    turn = np.linalg.norm(cross(part.normal[a], part.normal[b]), axis=-1)
     return float(turn.min(initial=np.inf))

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, cross
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.geometry.triangles import triangle_planes
@@ -93,7 +93,7 @@ def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomD
     """Whether the corners of a RIS panel proposed for the draft lie on one host and are seen from the middle of the
     agent's line."""
     mesh, _ = draft.reflectors[host]
-    down = np.cross(normal, right)
+    down = cross(normal, right)
     corners = center + FROM_EDGE * np.array([right + down, right - down, -right + down, -right - down])
     middle = free.way.mean(axis=0)
     hits = ray_hits(middle, unit(corners - middle), draft.triangles)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, cross
 from rislam_rt.scene.findings import Fault
 
 SHARPEST = np.radians(170.0)
@@ -61,7 +61,7 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
         raise Fault(f"waypoints {pair} and {pair + 1} are the same point", "leave one out")
     along = legs / length[:, None]
     before, after = along[:-1], along[1:]
-    turn = np.arctan2(np.linalg.norm(np.cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
+    turn = np.arctan2(np.linalg.norm(cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
     if (turn > SHARPEST).any():
         raise Fault(
             f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {int(np.argmax(turn)) + 1}",

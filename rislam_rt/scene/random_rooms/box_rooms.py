@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, cross
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory
 from rislam_rt.scene.shapes import block, hexahedron, sphere_mesh
@@ -94,7 +94,7 @@ def _panel(corners: Floats, size: Floats, rng: np.random.Generator) -> RisPanel:
         axis, side = rng.integers(2, size=2)
         wall, share[1] = np.moveaxis(corners, axis, 0)[side], rng.uniform(0.5, 0.85)
         host, (a, b, c) = f"wall_{'xy'[axis]}{side}", (wall[0, 0], wall[1, 0], wall[0, 1])
-    normal = unit(np.cross(c - a, b - a))
+    normal = unit(cross(c - a, b - a))
     center = a + share[0] * (b - a) + share[1] * (c - a)
     normal = normal if (0.5 * size - center) @ normal > 0.0 else -normal
     elements = int(rng.integers(ELEMENTS[0], ELEMENTS[1] + 1))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.connected_parts import connected
 from rislam_rt.geometry.triangles import triangle_cross, triangle_heights
@@ -120,7 +120,7 @@ def _edges(faces: Integers, normal: Floats) -> Edges:
     same = (ends[order][1:] == ends[order][:-1]).all(axis=1)
     a, b = owner[order][:-1][same], owner[order][1:][same]
     cosine = np.abs(np.einsum("ei,ei->e", normal[a], normal[b]))
-    sine = np.linalg.norm(np.cross(normal[a], normal[b]), axis=1)
+    sine = np.linalg.norm(cross(normal[a], normal[b]), axis=1)
     return Edges(a, b, np.arctan2(sine, cosine))
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.importing.import_options import ImportOptions
@@ -137,7 +137,7 @@ def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Inte
         if group[i] != i:
             continue
         later = rows[place + 1 :]
-        turn = np.linalg.norm(np.cross(facets.normal[later], facets.normal[i]), axis=1)
+        turn = np.linalg.norm(cross(facets.normal[later], facets.normal[i]), axis=1)
         sign = np.sign(facets.normal[later] @ facets.normal[i])
         apart = np.abs(sign * facets.offset[later] - facets.offset[i])
         same = (turn < 0.1 * FLAT_ANGLE) & (part[later] == part[i]) & (group[later] == later)
