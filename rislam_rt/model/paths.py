@@ -139,8 +139,8 @@ class Paths:
 
     def identity(self, path: int) -> tuple[int, int, tuple[int, ...], tuple[int, ...]]:
         """Identity (kind, landmark, tx_walls, rx_walls) of one propagation path, without padding."""
-        tx = tuple(int(w) for w in self.tx_walls[path] if w >= 0)
-        rx = tuple(int(w) for w in self.rx_walls[path] if w >= 0)
+        tx = tuple(w for w in self.tx_walls[path].tolist() if w >= 0)
+        rx = tuple(w for w in self.rx_walls[path].tolist() if w >= 0)
         return int(self.kind[path]), int(self.landmark[path]), tx, rx
 
     def label(self, path: int) -> str:

@@ -1,6 +1,7 @@
 """What the adviser says of a room, held against the receiver's draws, against codes tried out, and against geometry."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,9 @@ def settings(*changed: str) -> Settings:
     return build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
 
 
+@cache
 def look(scene: Scene, *changed: str, places: int = 3) -> tuple[Survey, dict[tuple[str, str], LandmarkLink]]:
+    """What is said of a room at a few places; of those that several tests look at, once."""
     looked = survey(scene, settings(*changed), places)
     return looked, {(link.landmark, link.code): link for link in link_budget(looked, rng=np.random.default_rng(1))}
 

@@ -47,9 +47,9 @@ def test_doppler_is_the_rate_of_the_delay(case):
     sides = [channel.paths(later(motion, sign * step)) for sign in (1.0, -1.0)]
     shift = doppler_shift(paths, motion, RADIO.wavelength)
     assert not shift[~paths.valid].any()
-    seen = 0
+    seen, places = 0, [columns_of(other) for other in sides]
     for p in range(paths.num_paths):
-        ahead, behind = (columns_of(other, paths.identity(p)) for other in sides)
+        ahead, behind = (columns.get(paths.identity(p)) for columns in places)
         if ahead is None or behind is None:
             continue
         both = paths.valid[:, p] & sides[0].valid[:, ahead] & sides[1].valid[:, behind]
@@ -62,9 +62,8 @@ def test_doppler_is_the_rate_of_the_delay(case):
     assert np.abs(shift).max() > 20.0
 
 
-def columns_of(paths, identity):
-    found = [p for p in range(paths.num_paths) if paths.identity(p) == identity]
-    return found[0] if found else None
+def columns_of(paths):
+    return {paths.identity(p): p for p in range(paths.num_paths)}
 
 
 def test_line_of_sight_of_a_rigid_body_has_no_shift(rooms):

@@ -39,12 +39,18 @@ def names(paths, cycle):
     return set(labels)
 
 
+@pytest.fixture(scope="module")
+def bare_paths(rooms):
+    """The room without anything on its walls: positions, and the paths there."""
+    trajectory = random_poses(rooms.paper(), 15, rng=np.random.default_rng(2))
+    return trajectory, paths_of(rooms.paper(), trajectory)
+
+
 @pytest.mark.parametrize("gap", GAPS)
-def test_a_poster_reflects_in_the_walls_stead_where_it_lies(rooms, gap):
+def test_a_poster_reflects_in_the_walls_stead_where_it_lies(rooms, bare_paths, gap):
     scene = rooms.paper()
     corners = [(gap, 1, 0.5), (gap, 2.5, 0.5), (gap, 2.5, 2), (gap, 1, 2)]
-    trajectory = random_poses(scene, 15, rng=np.random.default_rng(2))
-    bare = paths_of(scene, trajectory)
+    trajectory, bare = bare_paths
     hung = paths_of(with_parts(scene, rooms.polygon("poster", corners, DIM)), trajectory)
     seen = 0
     for cycle in range(15):
@@ -64,15 +70,15 @@ def test_a_poster_reflects_in_the_walls_stead_where_it_lies(rooms, gap):
 
 @pytest.mark.parametrize("gap", [0.0, 1e-6, 1e-5])
 @pytest.mark.parametrize("wall", ["wall_x0", "ceiling"])
-def test_a_wall_given_twice_reflects_once(rooms, wall, gap):
+def test_a_wall_given_twice_reflects_once(rooms, bare_paths, wall, gap):
     """Also the one that the panel hangs on. The first of the two reflects."""
     scene = rooms.paper()
     first = next(r for r in scene.reflectors if r.name == wall)
     shift = np.array([gap, 0, 0] if wall == "wall_x0" else [0, 0, -gap])
     again = Reflector("again", first.vertices + shift, first.faces[::-1], DIM)
-    trajectory = random_poses(scene, 8, rng=np.random.default_rng(2))
-    bare, twice = (paths_of(s, trajectory) for s in (scene, with_parts(scene, again)))
-    for cycle in range(8):
+    trajectory, bare = bare_paths
+    twice = paths_of(with_parts(scene, again), trajectory)
+    for cycle in range(15):
         assert names(bare, cycle) == names(twice, cycle)
 
 

@@ -1,10 +1,21 @@
 """A command, run as a user would."""
 
 import sys
+from collections.abc import Iterator
+from functools import cache
 
 import pytest
+import typer
 
 from rislam_rt.cli import main
+
+
+@pytest.fixture(scope="session", autouse=True)
+def parser_built_once() -> Iterator[None]:
+    """Typer makes the parser of all commands anew for every command that it runs; one serves them all."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
+        yield
 
 
 @pytest.fixture

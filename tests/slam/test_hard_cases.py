@@ -108,7 +108,7 @@ def test_a_picture_that_moves_while_no_time_passes_is_said(heading: str) -> None
 
 @pytest.mark.parametrize(("seed", "heading"), [(4, "estimated"), (5, "known")])
 def test_nothing_wrong_is_not_called_lost(seed: int, heading: str) -> None:
-    assert not _led("nothing wrong", seed, 20, heading=heading).said
+    assert not _led("nothing wrong", seed, heading=heading).said
 
 
 def test_a_picture_turned_about_ends_the_map_and_begins_another() -> None:

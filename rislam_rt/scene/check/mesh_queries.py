@@ -20,6 +20,8 @@ def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Intege
 
 def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, Integers]:
     """Query to a mesh: pairs (segment, triangle) where `start` to `end` (K, 3) passes through a triangle (T, 3, 3)."""
+    place = _around(start, end, triangles)
+    triangles = triangles[place]
     normal, offset = triangle_planes(triangles)
     edges = edge_planes(triangles)
     found = []
@@ -29,7 +31,7 @@ def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, 
         fraction = (a[k, t] / (a[k, t] - b[k, t]))[:, None]
         point = start[rows][k] * (1.0 - fraction) + end[rows][k] * fraction
         inside = _depth(point, edges, t) >= 0.0
-        found.append((k[inside] + rows.start, t[inside]))
+        found.append((k[inside] + rows.start, place[t[inside]]))
     return _joined(found)
 
 
@@ -77,6 +79,15 @@ def sphere_directions(count: int) -> Floats:
     phi = k * np.pi * (3.0 - np.sqrt(5.0))
     r = np.sqrt(1.0 - z**2)
     return np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
+
+
+def _around(start: Floats, end: Floats, triangles: Floats) -> Integers:
+    """Query to a mesh: triangles that reach into the box around all segments; no other is met."""
+    if not len(start):
+        return np.arange(len(triangles))
+    low = np.minimum(start.min(axis=0), end.min(axis=0)) - 1e-6
+    high = np.maximum(start.max(axis=0), end.max(axis=0)) + 1e-6
+    return np.flatnonzero(((triangles.max(axis=1) >= low) & (triangles.min(axis=1) <= high)).all(axis=1))
 
 
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:

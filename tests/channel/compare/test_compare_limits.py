@@ -29,6 +29,14 @@ def both(rooms):
     return scene, trajectory, replace(paths, source="traced"), paths
 
 
+@pytest.fixture(scope="module", params=["traced", "traced, refined"])
+def fine(request, both):
+    """One side said to be the tracer's own, or refined, and its comparison without any error put in."""
+    scene, trajectory, traced, analytic = both
+    traced = replace(traced, source=request.param)
+    return traced, compare_paths(traced, analytic, scene, trajectory)
+
+
 def worse(paths, label, cycle, quantity, size):
     """The paths with one error put in."""
     path = [paths.label(p) for p in range(paths.num_paths)].index(label)
@@ -48,13 +56,10 @@ def worse(paths, label, cycle, quantity, size):
     return replace(paths, tau=tau, gain=gain, departure=departure, arrival=arrival)
 
 
-@pytest.mark.parametrize("source", ["traced", "traced, refined"])
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("label", ["LOS", "VT wall_x0 floor", "VS sphere | ceiling", "VRIS floor ris"])
-def test_an_error_beyond_its_limit_names_the_path(both, label, quantity, source):
-    scene, trajectory, traced, analytic = both
-    traced = replace(traced, source=source)
-    fine = compare_paths(traced, analytic, scene, trajectory)
+def test_an_error_beyond_its_limit_names_the_path(both, fine, label, quantity):
+    (scene, trajectory, _, analytic), (traced, fine) = both, fine
     assert fine.passed
     row = next(r for r in range(fine.matched) if fine.cycle[r] == 1 and fine.labels[fine.path[r]] == label)
     limit = fine.judged[quantity][1][row]

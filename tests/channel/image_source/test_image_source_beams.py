@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rislam_rt.channel.compare import random_poses
@@ -104,6 +104,7 @@ def test_no_ray_from_the_ball_through_the_wall_leaves_the_beam(seed):
         assert ((height >= -1e-6).all(axis=1).any(axis=0) | ~alive).all()
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_rectangles_are_told_from_other_walls(seed):
     """`contains` by the rectangle is that of the triangles; a wall with a gap or a doubled part is no rectangle."""
