@@ -14,7 +14,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-SHORT = ("--set", "channel=image_source", "--set", "cycles=6", "--set", "receiver.estimator=bound")
+SHORT = ("--set", "channel=image_source", "--set", "depth=1", "--set", "cycles=4", "--set", "receiver.estimator=bound",
+         "--set", "design.iterations=5")  # fmt: skip
 
 
 def test_new_room_from_corners(run):
@@ -94,10 +95,10 @@ def test_run_report_and_json(run, tmp_path, monkeypatch):
     assert code == 0
     assert "agent" in out
     content = json.loads((tmp_path / "run.json").read_text())
-    assert (content["seed"], content["cycles"]) == (7, 6)
+    assert (content["seed"], content["cycles"]) == (7, 4)
     for scheme in content["schemes"].values():
         assert {"rmse_m", "landmarks", "walls", "diverged", "seconds"} <= set(scheme)
-        assert (scheme["diverged"], sum(scheme["outcomes"].values())) == (False, 6)
+        assert (scheme["diverged"], sum(scheme["outcomes"].values())) == (False, 4)
         # the start's own deviation, 0.01 m an axis: nothing measured tells where it was
         assert scheme["bound_m"] == pytest.approx(np.sqrt(2.0) * 0.01, rel=1e-2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "run.json"]

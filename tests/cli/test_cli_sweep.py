@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
-TINY = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "receiver.estimator=bound",
+TINY = ("--set", "channel=image_source", "--set", "depth=1", "--set", "cycles=3", "--set", "receiver.estimator=bound",
         "--set", "slam.num_samples=20", "--set", 'schemes=["random"]')  # fmt: skip
 
 

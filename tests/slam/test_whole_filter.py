@@ -20,7 +20,7 @@ from rislam_rt.slam.window.smoother import motion as model
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 CYCLES = slice(180, 270)
-"""From 1.8 m to 1.0 m beside the panel."""
+"""From 1.6 m to 0.7 m beside the panel."""
 CONFIG = SlamConfig()
 
 

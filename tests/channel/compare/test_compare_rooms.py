@@ -21,7 +21,7 @@ DEPTH = {"office": 2, "imported_glb": 2, "large_hall": 1}
 def test_no_difference_is_unexplained_and_refined_numbers_agree(name):
     scene = load_scene(SCENES / name)
     depth = DEPTH.get(name, 3)
-    report = compare_channels(scene, RadioConfig(), poses=25, depth=depth, rng=np.random.default_rng(20))
+    report = compare_channels(scene, RadioConfig(), poses=16, depth=depth, rng=np.random.default_rng(20))
     assert report.unexplained == 0
     assert report.matched > 100
     # losses need a reason each, and there are few: a thousandth of the paths at most
@@ -38,7 +38,7 @@ def test_the_tracers_own_vertices_agree_to_float32(name):
     """Refinement repeats the image construction; the tracer's own lengths are the independent evidence."""
     scene = load_scene(SCENES / name)
     rng = np.random.default_rng(21)
-    report = compare_channels(scene, RadioConfig(), poses=25, depth=DEPTH.get(name, 2), rng=rng, refine=False)
+    report = compare_channels(scene, RadioConfig(), poses=16, depth=DEPTH.get(name, 2), rng=rng, refine=False)
     assert report.unexplained == 0
     # float32 about the room's middle: 1e-6 m a vertex, a few of them, amplified by slanting bounces
     assert report.length_error.max() <= 2e-5
