@@ -12,7 +12,7 @@ from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
-from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam import SlamConfig, StartPrior, StepOutcome
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import recovery
 from rislam_rt.slam.window.relinearisation import residuals
@@ -43,6 +43,27 @@ def run():
         state, info = slam.step(state, heard, None, dt, float(motion.heading[cycle]), CONFIG, rng=rng)
         found.append((slam.estimate(state, CONFIG), info))
     return found, motion, shift, slam.smoothed(state), (state, paths, radio)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_agent_that_sets_out_from_rest_was_told_right(seed):
+    """The told velocity is noise about zero, whose direction says nothing about the compass."""
+    scene, count, rng = load_scene(ROOM), 9, np.random.default_rng(seed)
+    time = 0.1 * np.arange(count)
+    way = np.array([np.cos(0.7), np.sin(0.7), 0.0])
+    place = np.array([2.2, 1.6, 0.9]) + 0.5 * 0.15 * time[:, None] ** 2 * way
+    motion = replace(scene.agent[:count], position=place, velocity=0.15 * time[:, None] * way)
+    radio = with_reference_snr(RadioConfig(), 13.0)
+    paths = without_panel(ImageSourceChannel(replace(scene, agent=motion), radio, 2).paths(motion))
+    told = 0.01 * rng.standard_normal(3) * [1.0, 1.0, 0.0]
+    start = StartPrior(place[0], told, float(motion.heading[0]))
+    state = slam.init(start, motion.body, None, SensorModel(radio), CONFIG, rng=rng)
+    for cycle in range(count):
+        heard, _ = measure(paths, cycle, float(motion.heading[cycle]), radio, RECEIVER, rng=rng)
+        dt, angle = (0.1 if cycle else 0.0), float(motion.heading[cycle])
+        state, info = slam.step(state, heard, None, dt, angle, CONFIG, rng=rng)
+        assert info.outcome != StepOutcome.DIVERGED
+    assert not state.window.turns  # the compass is trusted
 
 
 def test_walls_are_found_and_nothing_else_is_a_wall(run):

@@ -5,8 +5,8 @@ Whatever throws it, a wall, a point, or two walls at right angles, a return grow
 agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What goes to and fro between opposite walls
 keeps its length, from both sides alike; what comes over a wall on one leg alone does neither. So a velocity is wanted
 that many tracks agree on, each of them with a probability of its own of being none of these. The told velocity is one
-such, with its own deviation; if it was told wrong, any other within walking speed is as good. Laplace evidences of both
-decide.
+such, with its own deviation and what manoeuvres since may have made of it; if it was told wrong, any other within
+walking speed is as good. Laplace evidences of both decide.
 """
 
 from typing import NamedTuple
@@ -38,6 +38,21 @@ class Rates(NamedTuple):
     """(T,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
+    bend: Floats | None = None
+    """(T,) [m/s^2] at which the rates change."""
+    bend_variance: Floats | None = None
+    """(T,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+
+
+class Manoeuvres(NamedTuple):
+    """Accelerations since a velocity was told, constant and as likely as motion modes are, of which there are M."""
+
+    share: Floats
+    """(M,) probabilities of the modes."""
+    std: Floats
+    """(M,) [m/s^2] standard deviations of each component of the acceleration."""
+    time: float
+    """[s] since the velocity was told, over which the rates are means."""
 
 
 class StartCheck(NamedTuple):
@@ -101,16 +116,28 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     doubt = total((log.std[rows, 1:] ** 2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
     blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
     turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
-    return Rates(toward[enough], rate[enough], variance[enough], blur[enough], turning)
+    # the quadratic part of each length over time, beside its line
+    u = x - (sx / s)[which]
+    u2 = u**2 - (total(weight * u**2) / s)[which] - (total(weight * u**3) / spread * s)[which] * u
+    square = np.maximum(total(weight * u2**2), 1e-300)
+    bend = 2.0 * total(weight * u2 * log.seen[rows, 0]) / square
+    passing = np.sum((place[-1] - place[0]) ** 2) / span**2 * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
+    bend_variance = 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
+    return Rates(
+        toward[enough], rate[enough], variance[enough], blur[enough], turning, bend[enough], bend_variance[enough]
+    )
 
 
-def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
+def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None = None) -> StartCheck:
     """Log evidence of the told velocity (3,) [m/s] within `std` (3,), from the rates of path lengths, against any other
-    velocity and against the told one turned by a wrong compass."""
+    velocity and against the told one turned by a wrong compass; `manoeuvres` may have changed it since, which bends
+    the lengths over time."""
     near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + CONSTANTS.walk**2)
     # the told velocity has a maximum of its own near it, which others, if louder, would draw to themselves
     starts = _starts(found, told)
     right = float(_find_modes(found, starts, told, near).evidence.max())
+    if manoeuvres:
+        right = float(np.logaddexp(right, _log_manoeuvred(found, starts, told, near, manoeuvres)))
     every = _find_modes(found, starts, told, anywhere)
     speed, spread = every.evidence, every.covariance + near
     length, aim = np.linalg.norm(every.velocity, axis=1), float(np.linalg.norm(told[:2]))
@@ -128,6 +155,26 @@ def weigh(found: Rates, told: Floats, std: Floats) -> StartCheck:
         max(float(speed.max()), float(compass.max())) - right + CONSTANTS.log_rare, is_compass, velocity,
         float(np.sqrt(np.trace(variance) / 2.0)), float((turn + np.pi) % (2.0 * np.pi) - np.pi),
     )  # fmt: skip
+
+
+def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, manoeuvres: Manoeuvres) -> float:
+    """Log evidence that the told velocity was right and a manoeuvre changed it, over that of constant velocities, by
+    the rates of path lengths, which are those of the mean velocity, and by their bends."""
+    half, total = 0.5 * manoeuvres.time, -np.inf
+    if found.bend is None or found.bend_variance is None or half <= 0.0:
+        return total
+    for share, std in zip(manoeuvres.share, manoeuvres.std, strict=True):
+        if share <= 0.0:
+            continue
+        every = _find_modes(found, starts, told, near + (half * std) ** 2 * np.eye(2))
+        best = int(np.argmax(every.evidence))
+        close, all_ways = _agreeing(found, every.velocity[best : best + 1], told[2])
+        wanted = found.toward[:, :2] @ ((every.velocity[best] - told[:2]) / half)
+        ratio = np.exp(np.clip((found.bend - 0.5 * wanted) * wanted / found.bend_variance, -300.0, 300.0))
+        agrees = close[0] / all_ways[0]
+        bent = float(np.log(agrees * ratio + 1.0 - agrees).sum())
+        total = float(np.logaddexp(total, np.log(share) + every.evidence[best] + bent))
+    return total
 
 
 def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
@@ -189,6 +236,13 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     close = likely.sum(axis=0)
     kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
     return close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk)), likely, either_way
+
+
+def _agreeing(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
+    """Likelihoods (S, T) of the tracks' rates under horizontal velocities (S, 2), if they agree with these, and in
+    all."""
+    every, likely, _ = _likelihoods(found, velocity, climb)
+    return likely.sum(axis=0), every
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

@@ -36,7 +36,11 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
         return None
     share = window.step.mean() / step
     std = np.sqrt(np.diag(window.covariance)[3:6])
-    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6)
+    # who starts from rest has another velocity soon, for which neither the told one nor the compass was wrong
+    learnt = state.config.motion == "learnt"
+    time = step * len(window.step)
+    manoeuvres = egomotion.Manoeuvres(state.level[0], share**2 * motion.ladder(), time) if learnt else None
+    told = egomotion.weigh(found, share * window.head[3:6], share * std + 1e-6, manoeuvres)
     return told._replace(velocity=told.velocity / share if share > 0.0 else window.head[3:6])
 
 

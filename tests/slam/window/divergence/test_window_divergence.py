@@ -13,7 +13,7 @@ from rislam_rt.slam.window.divergence.egomotion import Rates
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.smoother import window_features, window_gaussian
+from rislam_rt.slam.window.smoother import motion, window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
@@ -73,6 +73,29 @@ def test_a_turned_compass_is_told_from_a_wrong_speed():
     assert told.turn == pytest.approx(turn, abs=5.0 * 0.01 / np.linalg.norm(TOLD))
 
 
+def _bent(accel, rng, *, time=0.5):
+    """Tracks of an agent that sets out as told, with an acceleration (3,) [m/s^2] from then on; what tells how the
+    lengths bend errs as six measurements of 2 mm make it."""
+    found, error = _rates(TOLD + 0.5 * time * accel, rng), 0.2
+    bend = np.where(np.arange(len(found.rate)) < 4, 0.0, found.toward @ accel) + error * rng.standard_normal(12)
+    return found._replace(bend=bend, bend_variance=np.full(12, error**2))
+
+
+def test_who_sets_out_has_another_velocity_soon_and_was_told_right():
+    """Lengths that bend as the rates say tell a manoeuvre from a start told wrong, whose lengths change evenly."""
+    rng, time = np.random.default_rng(6), 0.5
+    moved = egomotion.Manoeuvres(motion.first_motion_mode(0.01), motion.ladder(), time)
+    for size in (0.15, 0.3, 0.6, 1.0):
+        for angle in rng.uniform(-np.pi, np.pi, 6):
+            accel = size * np.array([np.cos(angle), np.sin(angle), 0.0])
+            found = _bent(accel, rng)
+            assert egomotion.weigh(found, TOLD, STD, moved).log_odds < 0.0
+            even = found._replace(bend=0.2 * rng.standard_normal(12))
+            if size >= 0.6:
+                assert egomotion.weigh(found, TOLD, STD).log_odds > 0.0
+                assert egomotion.weigh(even, TOLD, STD, moved).log_odds > 0.0
+
+
 @pytest.mark.parametrize("heading", [0.0, 0.4])
 @pytest.mark.parametrize("bend", [0.0, 1.0])
 def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
@@ -86,6 +109,14 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     velocity = (place[-1] - place[0]) / (step * (count - 1))
     # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
     np.testing.assert_allclose(found.rate, found.toward @ velocity, atol=2e-3 * (1.0 + 2.0 * bend))
+    # and its rate bends by (0.2 m/s)^2 / 2 m, or as foreseen
+    wanted = found.toward @ (bend * np.array([0.3, 1.0, 0.0]))
+    assert (np.abs(found.bend - wanted) < 0.05 * (1.0 + bend)).all()
+    # the highest power of time in eight lengths of 1 mm, each counted for `crowd`
+    column = np.vander(step * np.arange(count), 3)
+    spread = 4.0 * CONSTANTS.crowd * 1e-6 * np.linalg.inv(column.T @ column)[0, 0]
+    assert (found.bend_variance > spread * (1.0 - 1e-9)).all()
+    assert found.bend_variance[0] == pytest.approx(spread, abs=(4.0 * velocity @ velocity / 2.0) ** 2)
 
 
 def _log(place, heading):
