@@ -1,7 +1,7 @@
 """A run of the pipeline: find all paths along the trajectory once, then simulate every scheme with the same noise."""
 
 import platform
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
@@ -156,7 +156,7 @@ def result_of(
     return SlamResult(
         name=spec.name, scene=setup.scene, paths=replace(setup.paths, ris=None), schemes=schemes,
         config=spec.model_dump(mode="json"), seed=seed, versions=library_versions(), seconds={"trace": setup.seconds},
-        warnings=panel_warnings(setup.scene, spec),
+        warnings=run_warnings(setup.scene, spec),
     )  # fmt: skip
 
 
@@ -208,14 +208,31 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
     return scene if cycles is None else replace(scene, agent=scene.agent[:cycles])
 
 
-def panel_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings of a run, one line each, where a RIS panel is so large that the band resolves its elements' delays.
+def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
+    """Warnings of a run, one line each, where a RIS panel is so large that the band resolves its elements' delays, or
+    the agent faster than the receiver reckons with as it tells the panel's paths from others.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.
     """
     if not any(SCHEMES[name].panel for name in spec.schemes):
         return ()
+    return (*_large_panels(scene, spec), *_fast_agent(scene, spec))
+
+
+def _fast_agent(scene: Scene, spec: PipelineSpec) -> Iterator[str]:
+    """Warning of a run whose agent is faster than its receiver assumes (1 % over that is within what paths allow)."""
+    fastest, receiver = float(np.linalg.norm(scene.agent.velocity, axis=1).max()), spec.receiver
+    if receiver.alternation and fastest > 1.01 * receiver.top_speed:
+        yield (
+            f"receiver.top_speed: {receiver.top_speed:g} m/s, and the agent of scene '{scene.name}' moves at up to "
+            f"{fastest:.2g}: paths over walls and scatterers will pass for the panel's; give receiver.top_speed = "
+            f"{np.ceil(10.0 * fastest) / 10.0:g}"
+        )
+
+
+def _large_panels(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
+    """Warnings of a run about panels whose elements' delays the band resolves."""
     bandwidth, agent = spec.radio.bandwidth_ghz * 1e9, scene.agent
     each = (delay_spread_warnings(panel.spec, panel.center, agent.tx, agent.rx, bandwidth) for panel in scene.panels)
     return tuple(line for lines in each for line in lines)

@@ -1,6 +1,7 @@
 """Conclusions on a run in sentences, for the head of its page: errors, what was mapped, and why a landmark was not."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
+from rislam_rt.pipeline.scores.audible_paths import audible_paths
 from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
@@ -89,12 +91,16 @@ def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]
     threshold = build_sensor(settings.radio, settings.receiver).threshold
     paths = result.paths
     snr = np.where(paths.valid, settings.radio.integrated_snr(scheme.gain), 0.0)
+    # what comes from below the array, or outside the receiver's window, is not heard however strong it is
+    audible = audible_paths(replace(paths, gain=scheme.gain), settings, use_vt=True)
+    valid = paths.valid & (audible | (snr < threshold))
+    snr[~valid] = 0.0
     for number, (name, entry) in enumerate(scores["landmarks"].items()):
         panel = "cycles_identified" in entry
         if entry["final_m"] is not None or (panel and not scheme.levels):
             continue
         own = (paths.landmark == number) & (paths.kind != PathKind.LOS) & (paths.kind != PathKind.VT)
-        yield f"{name}: {why_not(snr[:, own], paths.valid[:, own], threshold)}"
+        yield f"{name}: {why_not(snr[:, own], valid[:, own], threshold)}"
 
 
 def why_not(snr: Any, valid: Booleans, threshold: float) -> str:

@@ -1,17 +1,22 @@
 """A panel that is not what its data sheet says, a link that damages codes, and warnings that reach the result."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RisCode, RisSpec
+from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.control_link import check_control, open_link, send_code
+from rislam_rt.pipeline.run import run_warnings
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.pipeline_spec import ControlSection
 from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run, read_run
 
 SPEC = RisSpec(20, 30, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), 4)
+PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
 RANDOM = 'schemes=["random"]'
 
 
@@ -65,6 +70,22 @@ def test_bits_need_a_power_of_two():
         check_control(odd, ControlSection(), 0.1)
     check_control(odd, ControlSection(levels=2), 0.1)
     check_control(odd, ControlSection(), 0.0)
+
+
+def test_an_agent_faster_than_the_receiver_reckons_with_is_said(room):
+    from dataclasses import replace
+
+    scene = replace(room, agent=replace(room.agent, velocity=8.0 * room.agent.velocity))  # 0.8 m/s
+
+    def said(*settings):
+        return run_warnings(scene, load_spec(PIPELINE, settings))
+
+    assert len(said()) == 1
+    assert "receiver.top_speed: 0.5 m/s" in said()[0]
+    assert "give receiver.top_speed = 0.8" in said()[0]
+    assert not said("receiver.top_speed=0.8")
+    assert not said('schemes=["no_ris"]')
+    assert not said("receiver.alternation=false")
 
 
 def test_a_panel_too_wide_for_the_band_is_said_and_kept(run_short, room, short_spec, short_result, tmp_path):

@@ -69,6 +69,21 @@ def test_why_something_is_missing(snr, valid, said):
     assert said in why_not(snr, valid, 10.0)
 
 
+def test_what_comes_from_below_the_array_is_not_called_heard(result):
+    """The scatterer, of which the map holds nothing, as it is and turned upside down in the last four of six cycles."""
+    summary = summarise(result)
+    summary["schemes"]["random"]["landmarks"]["sphere"]["final_m"] = None
+
+    def said(cycles):
+        arrival = result.paths.arrival.copy()
+        arrival[cycles, :, 2] = -np.abs(arrival[cycles, :, 2]) - 1e-3
+        turned = replace(result, paths=replace(result.paths, arrival=arrival))
+        return " ".join(judge_run(turned, summary).missing["random"])
+
+    assert "heard in 100 %" in said(np.s_[:0])
+    assert "heard in 33 %" in said(np.s_[2:])
+
+
 def test_a_scheme_that_ends_a_metre_away_is_called_lost(result):
     scheme = result.schemes["random"]
     astray = replace(scheme, position=scheme.position + np.linspace(0.0, 1.0, 6)[:, None] * [0.0, 1.0, 0.0])

@@ -55,6 +55,9 @@ def test_usual_names_need_no_naming_and_a_heading_follows_the_way() -> None:
     assert turned.position[0, 0] == 1.0
     courses = np.array([[0.0, 0, 1], [0, 2, 0], [0, 0, 0], [-1, 0, 0]])
     np.testing.assert_allclose(along_heading(courses), [np.pi / 2, np.pi / 2, np.pi / 2, np.pi])
+    still = np.array([[1e-17, 0, 0], [0.3, 0, 0], [-1e-17, 1e-17, 0], [0, 1e-16, 0], [0, 0.3, 0]])  # rounding at a stop
+    np.testing.assert_allclose(along_heading(still), [0.0, 0.0, 0.0, 0.0, np.pi / 2])
+    assert not along_heading(np.zeros((3, 3))).any()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.tally import Tally
-from rislam_rt.pipeline.run import library_versions, panel_warnings, set_scene
+from rislam_rt.pipeline.run import library_versions, run_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise, summary_table
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
@@ -73,7 +73,7 @@ def run_long(
         _remove_unfinished(store)
     about = {
         "name": spec.name, "seed": spec.seed, "cycles": cycles, "schemes": list(spec.schemes),
-        "seconds": {"trace": seconds}, "warnings": list(panel_warnings(scene, spec)),
+        "seconds": {"trace": seconds}, "warnings": list(run_warnings(scene, spec)),
         "config": spec.model_dump(mode="json"), "slices": len(slices.slice_bounds(cycles)),
     }  # fmt: skip
     found = _gather(folder, scene, {**about, "versions": library_versions()}, run)

@@ -93,8 +93,13 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
 
 
 def along_heading(course: Floats) -> Floats:
-    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one, its neighbour's."""
-    level = np.hypot(course[:, 0], course[:, 1]) > 1e-9 * np.maximum(np.linalg.norm(course, axis=1), 1e-300)
+    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one or a standstill, its
+    neighbour's."""
+    length = np.linalg.norm(course, axis=1)
+    # beside a millionth of the highest speed there is only rounding, which points anywhere
+    level = np.hypot(course[:, 0], course[:, 1]) > np.maximum(
+        1e-9 * length, max(1e-6 * length.max(initial=0.0), 1e-300)
+    )
     if not level.any():
         return np.zeros(len(course))
     last = np.maximum.accumulate(np.where(level, np.arange(len(course)), -1))
