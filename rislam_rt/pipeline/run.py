@@ -221,12 +221,12 @@ def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
 
 
 def _fast_agent(scene: Scene, spec: PipelineSpec) -> Iterator[str]:
-    """Warning of a run whose agent is faster than its receiver assumes (1 % over that is within what paths allow)."""
+    """Warning of a run whose agent is faster than its receiver assumes, but for rounding."""
     fastest, receiver = float(np.linalg.norm(scene.agent.velocity, axis=1).max()), spec.receiver
-    if receiver.alternation and fastest > 1.01 * receiver.top_speed:
+    if receiver.alternation and fastest > (1.0 + 1e-6) * receiver.top_speed:
         yield (
             f"receiver.top_speed: {receiver.top_speed:g} m/s, and the agent of scene '{scene.name}' moves at up to "
-            f"{fastest:.2g}: paths over walls and scatterers will pass for the panel's; give receiver.top_speed = "
+            f"{fastest:.2g}: paths over walls and scatterers may pass for the panel's; give receiver.top_speed = "
             f"{np.ceil(10.0 * fastest) / 10.0:g}"
         )
 

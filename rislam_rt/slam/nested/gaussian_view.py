@@ -12,7 +12,7 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, last_pose_matrix, pose_matrix
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, head_order, last_pose_matrix, pose_matrix
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
@@ -51,23 +51,15 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
 def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool) -> tuple[Floats, Floats]:
     """Gaussian view's smoothest motion along the particles' trail (K, 4) to now: window head (7 + 3F,), accelerations
     (K - 1, A)."""
-    count, head = len(trail), mean.copy()
-    accel = np.zeros((count - 1, len(std)))
+    count, free, head = len(trail), len(std), mean.copy()
+    straight, order = np.zeros(count - 1), head_order(free)
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)
-    design = pose_matrix(step.tobytes(), np.zeros(count - 1).tobytes(), turns)
-    for axis in range(len(std)):
-        along = np.zeros((count, count + 1))
-        along[:, 0], along[:, 2:] = design[:, axis, axis], design[:, axis, (2 * len(std) - turns) + axis :: len(std)]
-        if axis < TURN:
-            along[:, 1] = design[:, axis, len(std) + axis]
-        speed = np.concatenate([[0.0, 1.0], step]) / MET
-        calm = np.eye(count - 1, count + 1, 2) / std[axis]
-        rows = np.concatenate([weight[:, None] * along, speed[None], calm])
-        values = np.concatenate([weight * trail[:, axis], [mean[3 + axis] / MET if axis < TURN else 0.0]])
-        if axis == TURN:
-            rows[count] = 0.0
-        found = np.linalg.lstsq(rows, np.append(values, np.zeros(count - 1)), rcond=None)[0]
-        head[6 if axis == TURN else axis], accel[:, axis] = found[0], found[2:]
-        if axis < TURN:
-            head[3 + axis] = found[1]
-    return head, accel
+    design = weight[:, None, None] * pose_matrix(step.tobytes(), straight.tobytes(), turns)
+    used = np.append(order, HEAD + np.arange((count - 1) * free))
+    speed = last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[3:6, used] / MET
+    calm = np.eye(len(used))[len(order) :] / np.tile(std, count - 1)[:, None]
+    rows = np.concatenate([design.reshape(-1, len(used)), speed, calm])
+    values = np.concatenate([(weight[:, None] * trail[:, :free]).ravel(), mean[3:6] / MET, np.zeros(len(calm))])
+    found = np.linalg.lstsq(rows, values, rcond=None)[0]
+    head[order] = found[: len(order)]
+    return head, found[len(order) :].reshape(-1, free)

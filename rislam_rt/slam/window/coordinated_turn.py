@@ -8,10 +8,12 @@ changes as rarely as motion modes do, from the one to the other and back.
 """
 
 import numpy as np
+import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother.motion_basis import horizontal
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
 
@@ -32,28 +34,28 @@ def learn_coordinated_turn(state: WindowState) -> WindowState:
     turn = np.diff(state.heading)
     if not is_asked(state) or len(turn) != len(state.window.step) or not turn.any():
         return state
-    like = _log_likelihoods(state, turn)
-    odds = state.coordinated_log_odds + np.subtract(*motion.log_evidence(state.motion_mode[0], like, CONSTANTS.stay))
-    if (odds > 0.0) == state.is_coordinated:
+    follows = state.coordinated_log_odds + _log_ratio(state, turn) > 0.0
+    if follows == state.is_coordinated:
         return state
-    angle = turn if odds > 0.0 else np.zeros(len(turn))
-    return state._replace(
-        window=window_gaussian.solve(with_velocity_turn(state.window, angle)), is_coordinated=bool(odds > 0.0)
-    )
+    window = with_velocity_turn(state.window, turn if follows else np.zeros(len(turn)))
+    return state._replace(window=window_gaussian.solve(window), is_coordinated=follows)
 
 
 def log_odds_after(state: WindowState) -> float:
     """Log odds that the agent goes where it faces after the window's first step, which is to leave it, from those
     before it and what it tells."""
-    turn = np.diff(state.heading[:2])
-    odds = state.coordinated_log_odds
+    turn, odds = np.diff(state.heading[:2]), state.coordinated_log_odds
     if is_asked(state) and turn.any():
-        like = _log_likelihoods(state, turn)
-        odds += float(np.subtract(*motion.log_evidence(state.motion_mode[0], like, CONSTANTS.stay)))
-    stays = CONSTANTS.stay
-    share = 1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0)))
-    share = share * stays + (1.0 - share) * (1.0 - stays)
-    return float(np.log(share / (1.0 - share)))
+        odds += _log_ratio(state, turn)
+    share, stays = scipy.special.expit(odds), CONSTANTS.stay
+    return float(scipy.special.logit(share * stays + (1.0 - share) * (1.0 - stays)))
+
+
+def _log_ratio(state: WindowState, turn: Floats) -> float:
+    """Log likelihood ratio of going where one faces against keeping the velocity, by the window's first K steps, over
+    which the body turned by `turn` (K,) [rad]."""
+    coordinated, kept = motion.log_evidence(state.motion_mode[0], _log_likelihoods(state, turn), CONSTANTS.stay)
+    return float(coordinated - kept)
 
 
 def _log_likelihoods(state: WindowState, turn: Floats) -> Floats:
@@ -79,11 +81,11 @@ def _asked_for(window: Window, angle: Floats) -> Floats:
     return np.stack([by.real, by.imag], axis=1)
 
 
-def _velocities(window: Window) -> Floats:
+def _velocities(window: Window) -> Complexes:
     """Horizontal velocities (K,) [m/s] of the window's poses, as complex numbers."""
-    turned = np.exp(1j * np.concatenate([[0.0], np.cumsum(window.velocity_turn)]))
-    first, accel = complex(*window.head[3:5]), window.accel[:, 0] + 1j * window.accel[:, 1]
-    return np.asarray(turned * np.concatenate([[first], first + np.cumsum(window.step * accel * turned[1:].conj())]))
+    accel = window.accel[:, 0] + 1j * window.accel[:, 1]
+    speed, _ = horizontal(window.step.tobytes(), window.velocity_turn.tobytes())
+    return np.asarray(speed @ np.append(complex(*window.head[3:5]), accel))
 
 
 def with_velocity_turn(window: Window, angle: Floats) -> Window:

@@ -135,9 +135,11 @@ def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None
     near, anywhere = np.diag(std[:2] ** 2), np.diag(std[:2] ** 2 + CONSTANTS.walk**2)
     # the told velocity has a maximum of its own near it, which others, if louder, would draw to themselves
     starts = _starts(found, told)
-    right = float(_find_modes(found, starts, told, near).evidence.max())
-    if manoeuvres:
-        right = float(np.logaddexp(right, _log_manoeuvred(found, starts, told, near, manoeuvres)))
+    right = (
+        _log_manoeuvred(found, starts, told, near, manoeuvres)
+        if manoeuvres
+        else float(_find_modes(found, starts, told, near).evidence.max())
+    )
     every = _find_modes(found, starts, told, anywhere)
     speed, spread = every.evidence, every.covariance + near
     length, aim = np.linalg.norm(every.velocity, axis=1), float(np.linalg.norm(told[:2]))
@@ -158,22 +160,24 @@ def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None
 
 
 def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, manoeuvres: Manoeuvres) -> float:
-    """Log evidence that the told velocity was right and a manoeuvre changed it, over that of constant velocities, by
-    the rates of path lengths, which are those of the mean velocity, and by their bends."""
+    """Log evidence that the told velocity was right and what manoeuvres made of it since, by the rates of path lengths,
+    which are those of the mean velocity, and by their bends: over those of constant velocities, which bend no length.
+    """
+    assert found.bend is not None
     half, total = 0.5 * manoeuvres.time, -np.inf
-    if found.bend is None or found.bend_variance is None or half <= 0.0:
-        return total
     for share, std in zip(manoeuvres.share, manoeuvres.std, strict=True):
-        if share <= 0.0:
-            continue
-        every = _find_modes(found, starts, told, near + (half * std) ** 2 * np.eye(2))
-        best = int(np.argmax(every.evidence))
-        close, all_ways = _agreeing(found, every.velocity[best : best + 1], told[2])
-        wanted = found.toward[:, :2] @ ((every.velocity[best] - told[:2]) / half)
-        ratio = np.exp(np.clip((found.bend - 0.5 * wanted) * wanted / found.bend_variance, -300.0, 300.0))
-        agrees = close[0] / all_ways[0]
-        bent = float(np.log(agrees * ratio + 1.0 - agrees).sum())
-        total = float(np.logaddexp(total, np.log(share) + every.evidence[best] + bent))
+        if share > 0.0:
+            spread = near + (half * std) ** 2 * np.eye(2)
+            every = _find_modes(found, starts, told, spread)
+            best = int(np.argmax(every.evidence))
+            likely, agreeing, _ = _likelihoods(found, every.velocity[best : best + 1], told[2])
+            agrees = np.maximum(agreeing.sum(axis=0)[0] / likely[0], 1e-300)
+            # what is not the told velocity's own error
+            accel = half * std**2 * np.linalg.solve(spread, every.velocity[best] - told[:2])
+            wanted = found.toward[:, :2] @ accel
+            ratio = (found.bend - 0.5 * wanted) * wanted / found.bend_variance
+            bent = np.logaddexp(np.log(agrees) + ratio, np.log(np.maximum(1.0 - agrees, 1e-300))).sum()
+            total = float(np.logaddexp(total, np.log(share) + every.evidence[best] + bent))
     return total
 
 
@@ -236,13 +240,6 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     close = likely.sum(axis=0)
     kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
     return close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk)), likely, either_way
-
-
-def _agreeing(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats]:
-    """Likelihoods (S, T) of the tracks' rates under horizontal velocities (S, 2), if they agree with these, and in
-    all."""
-    every, likely, _ = _likelihoods(found, velocity, climb)
-    return likely.sum(axis=0), every
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

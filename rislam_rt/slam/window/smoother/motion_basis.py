@@ -24,13 +24,12 @@ def pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     """Matrix (K, A, M) that gives K poses along A axes from the first place and rate (`head_order`) and then the
     accelerations of all steps, for times [s] of the steps and turns [rad] of the velocity over them, as bytes."""
     step, free = np.frombuffer(steps), 3 + turns
-    count, (_, reach) = len(step) + 1, _horizontal(step, np.frombuffer(velocity_turn))
+    count, (_, reach) = len(step) + 1, horizontal(steps, velocity_turn)
     found = np.zeros((count, free, count + 1, free))
     for axis in range(2):
         found[:, axis, 1:, axis] = reach.real
         found[:, axis, 1:, 1 - axis] = reach.imag if axis else -reach.imag
-    _, straight = _horizontal(step, np.zeros(len(step)))
-    found[:, 2, 1:, 2] = straight.real
+    found[:, 2, 1:, 2] = horizontal(steps, np.zeros(len(step)).tobytes())[1].real
     for axis in range(3):
         found[:, axis, 0, axis] = 1.0
     if turns:
@@ -45,11 +44,13 @@ def _after(count: int) -> Booleans:
     return np.asarray(np.arange(count)[:, None] > np.arange(count - 1))
 
 
-def _horizontal(step: Floats, velocity_turn: Floats) -> tuple[Complexes, Complexes]:
+@lru_cache(maxsize=8)
+def horizontal(steps: bytes, velocity_turn: bytes) -> tuple[Complexes, Complexes]:
     """Horizontal velocities and displacements (K, K), as complex factors of the first velocity and of the accelerations
-    of steps with times and turns (K - 1,) [s, rad]."""
+    of steps with times and turns (K - 1,) [s, rad], as bytes."""
+    step = np.frombuffer(steps)
     count = len(step) + 1
-    heading = np.concatenate([[0.0], np.cumsum(velocity_turn)])
+    heading = np.concatenate([[0.0], np.cumsum(np.frombuffer(velocity_turn))])
     speed = np.zeros((count, count), dtype=np.complex128)
     speed[:, 0] = np.exp(1j * heading)
     speed[:, 1:] = np.where(_after(count), step * np.exp(1j * (heading[:, None] - heading[1:])), 0.0)
@@ -109,7 +110,7 @@ def last_pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     columns = np.concatenate([order, np.arange(HEAD, design.shape[1])])
     places = np.arange(free)
     design[FIRST[places][:, None], columns] = pose_matrix(steps, velocity_turn, turns)[-1]
-    speed = _horizontal(step, np.frombuffer(velocity_turn))[0][-1]
+    speed = horizontal(steps, velocity_turn)[0][-1]
     whole = np.stack([[speed.real, -speed.imag], [speed.imag, speed.real]])
     design[3:5, 3:5] = whole[:, :, 0]
     for axis in range(2):

@@ -151,10 +151,8 @@ def poses(window: Window) -> Floats:
 def _carried(window: Window, rows: Floats) -> Floats:
     """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
     its unknowns."""
-    size, design = (
-        len(window.head),
-        last_pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns),
-    )
+    size = len(window.head)
+    design = last_pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns)
     return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
 
 
