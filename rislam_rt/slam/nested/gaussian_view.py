@@ -12,7 +12,7 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, head_order, last_pose_matrix, pose_matrix
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, head_order, last_pose_matrix, pose_matrix, pose_unknowns
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
@@ -55,7 +55,7 @@ def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool)
     straight, order = np.zeros(count - 1), head_order(free)
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)
     design = weight[:, None, None] * pose_matrix(step.tobytes(), straight.tobytes(), turns)
-    used = np.append(order, HEAD + np.arange((count - 1) * free))
+    used = pose_unknowns(HEAD, (count - 1) * free, free)
     speed = last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[3:6, used] / MET
     calm = np.eye(len(used))[len(order) :] / np.tile(std, count - 1)[:, None]
     rows = np.concatenate([design.reshape(-1, len(used)), speed, calm])

@@ -69,6 +69,15 @@ def head_order(free: int) -> Integers:
     return FIRST if free > TURN else np.arange(6)
 
 
+@lru_cache(maxsize=16)
+def pose_unknowns(head: int, accelerations: int, free: int) -> Integers:
+    """Indices (M,) of the window's unknowns that a pose matrix of so many axes multiplies, after a head of so many
+    numbers so many accelerations."""
+    found = np.append(head_order(free), head + np.arange(accelerations))
+    found.flags.writeable = False
+    return found
+
+
 def rotation(angle: float) -> Floats:
     """Rotation (3, 3) of a velocity by a turn [rad]."""
     cos, sin = np.cos(angle), np.sin(angle)
@@ -105,11 +114,9 @@ def last_pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     """Matrix (7, 7 + (K - 1) A) that gives the last pose, velocity and compass offset from the first ones and all
     accelerations."""
     step, free = np.frombuffer(steps), 3 + turns
-    order = head_order(free)
     design = np.eye(HEAD, HEAD + len(step) * free)
-    columns = np.concatenate([order, np.arange(HEAD, design.shape[1])])
-    places = np.arange(free)
-    design[FIRST[places][:, None], columns] = pose_matrix(steps, velocity_turn, turns)[-1]
+    columns = pose_unknowns(HEAD, len(step) * free, free)
+    design[FIRST[:free, None], columns] = pose_matrix(steps, velocity_turn, turns)[-1]
     speed = horizontal(steps, velocity_turn)[0][-1]
     whole = np.stack([[speed.real, -speed.imag], [speed.imag, speed.real]])
     design[3:5, 3:5] = whole[:, :, 0]

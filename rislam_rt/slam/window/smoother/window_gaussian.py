@@ -28,9 +28,9 @@ from rislam_rt.slam.window.smoother.motion_basis import (
     HEAD,
     POSE,
     TURN,
-    head_order,
     last_pose_matrix,
     pose_matrix,
+    pose_unknowns,
     step_back,
     step_transition,
 )
@@ -133,9 +133,8 @@ def begin_with(
 def pose_design(window: Window) -> tuple[Floats, Integers]:
     """Matrix (K, A, M) that gives the window's poses from M of its unknowns (see `motion_basis.pose_matrix`), and the
     indices (M,) of these."""
-    order = head_order(window.accel.shape[1])
-    used = np.concatenate([order, len(window.head) + np.arange(window.accel.size)])
-    return pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns), used
+    design = pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns)
+    return design, pose_unknowns(len(window.head), window.accel.size, window.accel.shape[1])
 
 
 def poses(window: Window) -> Floats:
