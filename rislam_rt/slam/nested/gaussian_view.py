@@ -12,7 +12,14 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, head_order, last_pose_matrix, pose_matrix, pose_unknowns
+from rislam_rt.slam.window.smoother.motion_basis import (
+    HEAD,
+    POSE,
+    head_order,
+    last_pose_matrix,
+    pose_matrix,
+    pose_unknowns,
+)
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
