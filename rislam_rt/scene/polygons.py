@@ -1,18 +1,23 @@
 """Polygons in a plane: outlines of triangles, simplified to fewer corners, and triangulated."""
 
+from collections import Counter
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 
 
 def outline_loops(faces: Integers) -> list[list[int]]:
-    """Closed loops of corners that outline triangles (T, 3), turned like them; around holes the other way."""
+    """Closed loops of corners that outline triangles (T, 3), turned like them; around holes the other way.
+
+    Sheets that lie on each other have each its outline, also where the outlines share edges; alike ones have one.
+    """
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there = {(int(a), int(b)) for a, b in edges}
+    there = Counter((int(a), int(b)) for a, b in edges)
     follow: dict[int, list[int]] = {}
     for a, b in sorted(there):
-        if (b, a) not in there:
-            follow.setdefault(a, []).append(b)
+        follow.setdefault(a, []).extend([b] * max(there[a, b] - there[b, a], 0))
+    follow = {a: ways for a, ways in follow.items() if ways}
     loops = []
     while follow:
         start = next(iter(follow))
@@ -33,7 +38,7 @@ def outline_loops(faces: Integers) -> list[list[int]]:
                 loop = loop[:cut]
             loop.append(after)
             here = after
-    return [loop for loop in loops if len(loop) > 2]
+    return list({frozenset(loop): loop for loop in loops if len(loop) > 2}.values())
 
 
 def signed_area(corners: Floats) -> float:

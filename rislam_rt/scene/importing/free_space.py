@@ -19,7 +19,12 @@ OFF_SURFACE = 1e-5
 """Distance [m] before a surface at which a line of sight to it ends: nearer than any two that are drawn apart."""
 ENOUGH = 3
 """Lines of sight that make a surface visible: a single one may have slipped through the seam of two triangles."""
-_GRID, _RAYS, _STATIONS = 14, 100, 40
+LEVEL = 0.05
+"""Difference of height [m] up to which two places are on one level."""
+CLOSED = 0.9
+"""Share of rays that meet something, to that of the most closed part, from which on a part of the free space may be the
+room: one with its windows open, but not what is outside of it."""
+_GRID, _RAYS, _STATIONS, _EYES = 14, 100, 40, 24
 
 
 class FreeSpace(NamedTuple):
@@ -35,42 +40,79 @@ class FreeSpace(NamedTuple):
     """Share of rays from the start of `way` that meet something."""
 
 
-def find_free(triangles: Floats, floor: float) -> FreeSpace | None:
-    """Find the free space of a room of triangles (T, 3, 3) [m] above its floor [m]; None where nothing is free.
+def find_free(triangles: Floats) -> FreeSpace | None:
+    """Find the free space of a room of triangles (T, 3, 3) [m], whose floor may rise; None where nothing is free.
 
-    Of all places of a grid those count from which the fewest rays escape: they are inside. Of these, the longest
-    straight way up to `LONGEST` that keeps off all surfaces is taken.
+    Places to stand are tried above every surface that has something above it, on a grid: the steps of a lecture hall
+    as well as its lowest floor, and hollows beneath them. The largest part of them that straight free lines join and
+    that is about as closed as any is the room. On the level where most of its places are, the longest straight way up
+    to `LONGEST` that keeps off all surfaces is taken.
     """
-    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     for height in HEIGHTS:
-        z = floor + min(height, 0.5 * (float(high[2]) - floor))
-        across = [low[i] + (np.arange(_GRID) + 0.47) / _GRID * (high[i] - low[i]) for i in (0, 1)]
-        x, y = (axis.ravel() for axis in np.meshgrid(*across))
-        points = np.stack([x, y, np.full(len(x), z)], axis=-1)
+        places, headroom = _places(triangles, height)
+        gap = distance_to_triangles(places, triangles)
         for clearance in CLEARANCES:
-            free = _free_at(points, triangles, clearance)
+            rows = gap >= clearance
+            free = _free_at(places[rows], headroom[rows], gap[rows], triangles, clearance)
             if free is not None:
                 return free
     return None
 
 
-def _free_at(points: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
-    """Free space of a room among points (N, 3) at one clearance [m]; None where there is none."""
-    gap = distance_to_triangles(points, triangles)
-    points, gap = points[gap >= clearance], gap[gap >= clearance]
-    if len(points) < 2:
+def _places(triangles: Floats, height: float) -> tuple[Floats, Floats]:
+    """Places to stand (N, 3) on a grid, `height` [m] above each surface or halfway to the next one above it, and the
+    headroom (N,) [m] between the two; beneath the lowest and above the highest surface it ends with the room."""
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    across = [low[i] + (np.arange(_GRID) + 0.47) / _GRID * (high[i] - low[i]) for i in (0, 1)]
+    x, y = (axis.ravel() for axis in np.meshgrid(*across))
+    under, over = (np.stack([x, y, np.full(len(x), z)], axis=-1) for z in (low[2] - 1.0, high[2] + 1.0))
+    column, triangle = crossings(under, over, triangles)
+    normal, offset = triangle_planes(triangles)
+    met = (offset[triangle] - normal[triangle, 0] * x[column] - normal[triangle, 1] * y[column]) / normal[triangle, 2]
+    column, met = np.append(column, np.arange(len(x))), np.append(met, np.full(len(x), low[2]))
+    order = np.lexsort((met, column))
+    column, met = column[order], met[order]
+    above = np.append(met[1:], high[2])
+    above[np.append(column[1:] != column[:-1], True)] = high[2]
+    wide = above - met >= 2.0 * CLEARANCES[-1]
+    column, met, headroom = column[wide], met[wide], (above - met)[wide]
+    return np.stack([x[column], y[column], met + np.minimum(height, 0.5 * headroom)], axis=-1), headroom
+
+
+def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
+    """Free space of a room among places (N, 3) at one clearance [m]; None where there is none."""
+    if len(places) < 2:
         return None
     directions = sphere_directions(_RAYS)
-    share = np.array([(ray_hits(p, directions, triangles) >= 0).mean() for p in points])
-    inside = share >= share.max() - 0.02
-    points, gap, share = points[inside], gap[inside], share[inside]
-    best = int(np.argmax(np.minimum(gap, 1.0)))
-    stations = points[reachable(points[best], points, triangles)]
-    way = _longest_way(stations, triangles, clearance)
+    share = np.array([(ray_hits(p, directions, triangles) >= 0).mean() for p in places])
+    room = _largest_part(places, headroom, share, triangles)
+    room &= share >= share[room].max() - 0.02
+    places, gap, share = places[room], gap[room], share[room]
+    near = np.abs(places[:, 2] - places[:, 2, None]) < LEVEL
+    level = near[int(np.argmax(near.sum(axis=1)))]
+    ground = places[level]
+    ground[:, 2] = np.median(ground[:, 2])
+    way = _longest_way(ground, triangles, clearance)
     if way is None:
         return None
-    order = np.argsort(np.linalg.norm(stations - way[0], axis=1), kind="stable")
-    return FreeSpace(stations[order], way, clearance, float(share[best]))
+    best = int(np.argmax(np.where(level, np.minimum(gap, 1.0), -1.0)))
+    order = np.argsort(np.linalg.norm(places - way[0], axis=1), kind="stable")
+    return FreeSpace(places[order], way, clearance, float(share[best]))
+
+
+def _largest_part(places: Floats, headroom: Floats, share: Floats, triangles: Floats) -> Booleans:
+    """Which of a room's places (N, 3) are in the part of most volume that free straight lines join, of those from which
+    few rays escape."""
+    best, volume, left = np.arange(0), -1.0, np.ones(len(places), dtype=np.bool_)
+    for start in np.argsort(-headroom, kind="stable"):
+        if not left[start]:
+            continue
+        rows = np.flatnonzero(left)
+        part = rows[reachable(places[start], places[rows], triangles)]
+        left[part] = False
+        if share[part].max() >= CLOSED * share.max() and headroom[part].sum() > volume:
+            best, volume = part, float(headroom[part].sum())
+    return np.isin(np.arange(len(places)), best)
 
 
 def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
@@ -106,10 +148,10 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
     """Whether each group of triangles (T, 3, 3) is visible from any station (S, 3) in the free space, past all
     `triangles` (A, 3, 3).
 
-    Looked at are points spread over each group, from some twenty stations and what is freely above and below them: a
-    wall of which but a crack is seen may count as unseen.
+    Looked at are points spread over each group, from some twenty stations far from each other and what is freely above
+    and below them: a wall of which but a crack is seen may count as unseen.
     """
-    eyes = _eyes(stations[np.linspace(0, len(stations) - 1, min(len(stations), 20)).astype(int)], triangles)
+    eyes = _eyes(_far_apart(stations, _EYES), triangles)
     seen = np.zeros(len(groups), dtype=np.bool_)
     for number, group in enumerate(groups):
         points, normal = _spread(group, 16)
@@ -123,6 +165,16 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
                 seen[number] = True
                 break
     return seen
+
+
+def _far_apart(stations: Floats, count: int) -> Floats:
+    """Viewpoints in free space (count, 3) among stations (S, 3), the first, and then ever the one farthest from all
+    before it."""
+    chosen, gap = [0], np.linalg.norm(stations - stations[0], axis=1)
+    while len(chosen) < min(count, len(stations)):
+        chosen.append(int(np.argmax(gap)))
+        gap = np.minimum(gap, np.linalg.norm(stations - stations[chosen[-1]], axis=1))
+    return stations[chosen]
 
 
 def _eyes(stations: Floats, triangles: Floats) -> Floats:

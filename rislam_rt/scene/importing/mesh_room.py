@@ -54,7 +54,8 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     if not found.surfaces:
         what = f"nothing in it is flat and wider than {100 * found.narrow:.2g} cm"
         raise Fault(what, "check --units, or lower --detail")
-    surfaces, unseen = _visible_surfaces(found)
+    surfaces, hidden = _visible_surfaces(found)
+    unseen = _unseen(hidden, pieces, parts)
     palette = MaterialAssignment(options.materials, options.rest)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     occluders = _occluders(found, pieces, list(reflectors))
@@ -64,16 +65,32 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     return RoomDraft(reflectors, occluders, remarks + palette.remarks())
 
 
-def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], float]:
-    """Surfaces of a mesh that an agent in the room can see, and the area [m^2] of the others, as outer skins."""
+def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], list[Surface]]:
+    """Surfaces of a mesh that an agent in the room can see, and the others, as outer skins."""
     triangles = np.concatenate([s.mesh.triangles for s in found.surfaces] + [c.triangles for c in found.clutter])
-    free = find_free(triangles, float(triangles[..., 2].min()))
+    free = find_free(triangles)
     if free is None:
-        return found.surfaces, 0.0
+        return found.surfaces, []
     seen = is_seen(free.stations, [s.mesh.triangles for s in found.surfaces], triangles)
-    hidden = sum(surface.area for surface, visible in zip(found.surfaces, seen, strict=True) if not visible)
     kept = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if visible]
-    return (kept, hidden) if kept else (found.surfaces, 0.0)
+    hidden = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if not visible]
+    return (kept, hidden) if kept else (found.surfaces, [])
+
+
+def _unseen(hidden: list[Surface], pieces: list[RegionGroup], parts: list[MeshPart]) -> list[str]:
+    """Report of an import: which surfaces are left out because nobody inside can see them, the widest by name."""
+    if not hidden:
+        return []
+    corners = np.concatenate([s.mesh.vertices for s in hidden])
+    room = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    area: dict[str, float] = {}
+    for s in hidden:
+        own = pieces[s.piece].name or own_name(parts[s.part].node)
+        name = own or wall_name(s.normal, s.mesh.triangles.mean(axis=(0, 1)), room)
+        area[name] = area.get(name, 0.0) + s.area
+    few = ", ".join(f"{name} {area[name]:.3g}" for name in sorted(area, key=lambda name: -area[name])[:6])
+    more = f" and {len(area) - 6} more" if len(area) > 6 else ""
+    return [f"{sum(area.values()):.3g} m^2 are left out that nobody inside can see: {few}{more}"]
 
 
 def _reflectors(
@@ -113,7 +130,7 @@ def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str
 
 
 def _summary(
-    facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: float, reflectors: dict[str, Any],
+    facets: FlatRegions, found: SortedSurfaces, surfaces: list[Surface], unseen: list[str], reflectors: dict[str, Any],
     occluders: dict[str, Mesh], options: ImportOptions, *, scanned: bool,
 ) -> list[str]:  # fmt: skip
     """Report of an import: numbers, areas and errors of what became of a mesh, one line each."""
@@ -143,8 +160,7 @@ def _summary(
         remarks.append(f"{many} of {radius:.3g} m became {sides} flat sides within {off} that {what}")
     if found.gone > 1e-4 * total:
         remarks.append(f"{found.gone:.3g} m^2 are left out: faces that stand on walls, things below the detail")
-    if unseen > 0.0:
-        remarks.append(f"{unseen:.3g} m^2 are left out that nobody inside can see")
+    remarks += unseen
     if found.narrow > options.narrow * (1.0 + 1e-9):
         remarks.append(f"the {options.max_walls} widest walls reflect (--max-walls)")
     return remarks

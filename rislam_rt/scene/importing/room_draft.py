@@ -46,7 +46,7 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     Fault
         There is no place for an agent.
     """
-    free = find_free(draft.triangles, float(draft.triangles[..., 2].min()))
+    free = find_free(draft.triangles)
     if free is None:
         mend = "check --units and --up; a room wants walls around a free way of 0.3 m"
         raise Fault("no free place inside is found for the agent", mend)

@@ -117,7 +117,7 @@ def test_the_free_way_is_inside_and_what_is_behind_is_unseen() -> None:
     crate, core = block([3.5, 2.5, 0.01], [4.5, 3.5, 1.0]), block([3.6, 2.6, 0.1], [4.4, 3.4, 0.9])
     groups = [mesh.vertices[mesh.faces] for mesh in (inner, skin, crate, core)]
     triangles = np.concatenate(groups)
-    free = find_free(triangles, 0.0)
+    free = find_free(triangles)
     assert free is not None
     assert ((free.way > 0.0) & (free.way < [5.0, 4.0, 2.6])).all()
     assert len(crossings(free.way[:1], free.way[1:], triangles)[0]) == 0

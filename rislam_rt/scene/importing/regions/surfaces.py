@@ -171,10 +171,10 @@ def _with_clutter(
             prisms.append(ClutterMesh(thing, mesh.triangles))
     gone = float(facets.area[resting].sum())
     shell = [s for s in surfaces if s.piece == 0 and len(s.mesh.faces) < 200]
-    raw, planes = [], [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in shell]
+    raw = []
     for number, piece in enumerate(pieces):
         regions = piece.regions[rest[piece.regions]]
-        triangles = off_planes(facets.mesh.vertices[facets.faces_of(regions)], planes)
+        triangles = off_walls(facets.mesh.vertices[facets.faces_of(regions)], shell)
         if len(triangles) and np.ptp(triangles.reshape(-1, 3), axis=0).max() >= narrow:
             raw.append(ClutterMesh(number, triangles))
         else:
@@ -182,7 +182,7 @@ def _with_clutter(
             rest[regions] = False
     thin, error, cell = in_cells(raw, wavelength)
     shading = float(facets.area[rest].sum()) + sum(float(triangle_areas(clutter.triangles).sum()) for clutter in prisms)
-    thin = [ClutterMesh(c.piece, off_planes(c.triangles, planes)) for c in (*prisms, *thin)]
+    thin = [ClutterMesh(c.piece, off_walls(c.triangles, shell)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
     return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
 
@@ -199,9 +199,11 @@ def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], fl
     return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
 
 
-def off_planes(triangles: Floats, planes: list[tuple[Floats, float]]) -> Floats:
+def off_walls(triangles: Floats, walls: list[Surface]) -> Floats:
     """Clutter triangles (T, 3, 3) without those that lie flat on a wall of an imported room's shell."""
     keep = has_area(triangles)
-    for normal, offset in planes:
-        keep &= np.abs(triangles @ normal - offset).max(axis=1) > RESTING
+    for wall in walls:
+        flat = np.abs((triangles - wall.mesh.vertices[0]) @ wall.normal).max(axis=1) <= RESTING
+        rows = np.flatnonzero(keep & flat)
+        keep[rows] = distance_to_triangles(triangles[rows].mean(axis=1), wall.mesh.triangles) > RESTING
     return triangles[keep]

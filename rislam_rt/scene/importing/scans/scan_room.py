@@ -7,7 +7,7 @@ from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, Welded
-from rislam_rt.scene.importing.regions.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_planes
+from rislam_rt.scene.importing.regions.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_walls
 from rislam_rt.scene.importing.scans.point_cloud import downsample_mesh
 from rislam_rt.scene.importing.scans.scan_outline import BRIDGE, CELL, Outline, outline_planes
 from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_planes
@@ -46,9 +46,8 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     ]  # fmt: skip
     rest = _unexplained(mesh, surfaces, max(CLOSE, 2.0 * WIDTHS * cloud.noise))
     triangles = mesh.vertices[mesh.faces[rest]]
-    walls = [(s.normal, float(s.mesh.vertices[0] @ s.normal)) for s in surfaces]
     clutter, error, cell = in_cells([ClutterMesh(0, triangles)] if len(triangles) else [], 2.0 * options.wavelength)
-    clutter = [ClutterMesh(0, off_planes(c.triangles, walls)) for c in clutter]
+    clutter = [ClutterMesh(0, off_walls(c.triangles, surfaces)) for c in clutter]
     clutter = [c for c in clutter if len(c.triangles)]
     shading = float(triangle_areas(triangles).sum())
     found = SortedSurfaces(surfaces, clutter, error, cell, options.narrow, shading, 0.0, [])
