@@ -12,10 +12,10 @@ from rislam_rt.channel.compare.comparison_report import PathReport
 from rislam_rt.channel.compare.path_matching import compare_paths
 from rislam_rt.channel.compare.unmatched_paths import SHORTEST_SEGMENT
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permittivity
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.model import Paths, RadioConfig, Scene, Trajectory
+from rislam_rt.model.slab import slab_coefficients, slab_permittivity
 
 SAMPLES = 100_000
 """Rays shot from each device: enough for rooms of a few dozen faces; a hall of 186 walls takes a million."""

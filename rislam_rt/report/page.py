@@ -20,6 +20,7 @@ from rislam_rt.report.terminal_tables import summary_rows
 from rislam_rt.report.time_curves import draw_agent_error, draw_landmark_errors, draw_levels, draw_timing
 from rislam_rt.report.view.page import view_fragment, view_script, view_style
 from rislam_rt.report.view.run_data import run_data
+from rislam_rt.scene.check import faint_slabs
 from rislam_rt.storage.files import write_atomic
 
 PAGE = "report.html"
@@ -113,7 +114,10 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
         f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
         for name, picture in pictures.items()
     )
-    warnings = "".join(f'<p class="note">Warning: {html.escape(line)}</p>\n' for line in result.warnings)
+    radio = build_settings(PipelineSpec.model_validate(dict(result.config))).radio
+    faint = (finding.line for finding in faint_slabs(result.scene, "scene/scene.toml", radio))
+    lines = [*result.warnings, *faint]
+    warnings = "".join(f'<p class="note">Warning: {html.escape(line)}</p>\n' for line in lines)
     versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8">

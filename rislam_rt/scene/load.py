@@ -11,7 +11,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
-from rislam_rt.scene.check import find_errors, find_warnings, material_errors
+from rislam_rt.scene.check import faint_slabs, find_errors, find_warnings, material_errors
 from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_placement import MeshFiles
@@ -74,7 +74,8 @@ def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Find
     errors = find_errors(scene, file)
     if radio is not None:
         errors += material_errors(scene, file, radio)
-    return errors or find_warnings(scene, file, radio or RadioConfig())
+    faint = [] if radio is None else faint_slabs(scene, file, radio)
+    return errors or [*find_warnings(scene, file, radio or RadioConfig()), *faint]
 
 
 def _plain_table(file: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.model import PathKind
+from rislam_rt.model import Material, PathKind
 from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
@@ -139,6 +139,15 @@ def test_warnings_stand_on_the_page(result):
     warned = replace(result, warnings=("ris: too wide for <the band>",))
     assert "Warning: ris: too wide for &lt;the band&gt;" in build_page(warned, summarise(warned), {})
     assert "Warning" not in build_page(result, summarise(result), {})
+
+
+def test_a_pane_that_the_carrier_passes_stands_on_the_page(result):
+    scene = result.scene
+    pane = replace(scene.reflectors[0], material=Material(itu="glass", thickness=0.006))
+    glazed = replace(result, scene=replace(scene, reflectors=(pane, *scene.reflectors[1:])))
+    said = "6 mm of &#x27;glass&#x27; reflect 0.04 of the amplitude at 10 GHz"
+    assert said in build_page(glazed, summarise(result), {})
+    assert said not in build_page(result, summarise(result), {})
 
 
 def test_page_says_what_is_lost_and_what_held_itself_for_lost():

@@ -21,11 +21,11 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.image_source.fresnel import slab_coefficients, slab_permittivity
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Paths, RadioConfig, Scene, Trajectory
+from rislam_rt.model.slab import slab_coefficients, slab_permittivity
 
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53
 """Unit roundoff of float32 and float64."""

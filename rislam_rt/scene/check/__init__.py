@@ -2,14 +2,21 @@
 
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
-from rislam_rt.scene.check.meshes import face_errors, material_errors, mesh_warnings, name_errors, scatterer_errors
+from rislam_rt.scene.check.meshes import (
+    face_errors,
+    faint_slabs,
+    material_errors,
+    mesh_warnings,
+    name_errors,
+    scatterer_errors,
+)
 from rislam_rt.scene.check.occluders import cylinder_warnings, occluder_errors, occluder_face_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
 from rislam_rt.scene.check.triangle_array import build_triangle_array
 from rislam_rt.scene.check.walls import wall_findings
 from rislam_rt.scene.findings import Finding
 
-__all__ = ["find_errors", "find_warnings", "material_errors"]
+__all__ = ["faint_slabs", "find_errors", "find_warnings", "material_errors"]
 
 
 def find_errors(scene: Scene, file: str) -> list[Finding]:

@@ -8,9 +8,13 @@ import numpy as np
 from rislam_rt.errors import SceneError
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.model.itu import ITU_MATERIALS, itu_parameters
+from rislam_rt.model.slab import normal_reflection
 from rislam_rt.scene.check.mesh_queries import touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
+
+FAINT = 10.0 ** (-10.0 / 20.0)
+"""Reflection coefficient of a slab, to that of the same material without a back, below which its thickness hides it."""
 
 
 def name_errors(room: TriangleArray) -> Iterator[Finding]:
@@ -76,3 +80,25 @@ def material_errors(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Fin
             message = f"'{name}' is not specified at the carrier of {ghz:g} GHz, only from {ranges}"
             field = f"reflector[{number}].material.itu ({reflector.name})"
             yield Finding("error", file, field, message, "take another material, or radio.carrier_ghz in that range")
+
+
+def faint_slabs(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Finding]:
+    """Scene check: warnings of materials as thick as half waves of the carrier in them, at normal incidence: the two
+    faces' reflections cancel, and the radio hardly hears the wall (ITU-R P.2040, single-layer slab)."""
+    ghz, warned = radio.carrier / 1e9, set()
+    for number, reflector in enumerate(scene.reflectors):
+        material, found = reflector.material, normal_reflection(reflector.material, radio.carrier)
+        if found is None or found.slab >= FAINT * found.half_space or material in warned:
+            continue
+        warned.add(material)
+        others = sum(other.material == material for other in scene.reflectors) - 1
+        name = f"'{material.itu}'" if material.itu else f"permittivity {material.permittivity:g}"
+        thick, half = 1e3 * material.thickness, 1e3 * found.half_wave
+        other = thick + (0.5 if thick < 0.75 * half else -0.5) * half
+        message = (
+            f"{thick:.3g} mm of {name} reflect {found.slab:.2g} of the amplitude at {ghz:g} GHz and normal incidence, "
+            f"a thick slab {found.half_space:.2g}: it is {thick / half:.2f} half waves thick, and hardly heard"
+        )
+        mend = f"check the thickness ({other:.2g} mm reflect most), or give reflection = {found.half_space:.2g} instead"
+        field = f"reflector[{number}].material.thickness_m ({reflector.name}{f' and {others} more' if others else ''})"
+        yield Finding("warning", file, field, message, mend)

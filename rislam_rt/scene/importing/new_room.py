@@ -101,9 +101,9 @@ def write_room(
     with tempfile.TemporaryDirectory() as place:
         trial = write_files(files, Path(place) / "room")
         carrier = 1e9 * options.carrier_ghz
-        errors = [f for f in check_scene(trial, RadioConfig(carrier=carrier, bandwidth=min(1e9, carrier)))
-                  if f.severity == "error"]  # fmt: skip
+        findings = check_scene(trial, RadioConfig(carrier=carrier, bandwidth=min(1e9, carrier)))
+        errors = [finding for finding in findings if finding.severity == "error"]
     if errors:
         raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", errors[0].mend)
     write_files(files, folder, overwrite=overwrite)
-    return remarks
+    return remarks + [f"{f.field}: {f.message}; {f.mend}" for f in findings if ".material." in f.field]

@@ -9,10 +9,10 @@ import pytest
 from rislam_rt.channel.compare import compare_paths
 from rislam_rt.channel.compare.error_limits import DOUBLE, SINGLE, RoomPrecision, field_error
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Material, RadioConfig, RisCode
 from rislam_rt.model.itu import ITU_MATERIALS
+from rislam_rt.model.slab import relative_permittivity, slab_coefficients
 
 RADIO = RadioConfig()
 POSES = [[1.1, 2.3, 1.2], [2.4, 4.7, 0.5]]

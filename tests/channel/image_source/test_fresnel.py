@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.fresnel import polarisation_basis, relative_permittivity, slab_coefficients
+from rislam_rt.channel.image_source.fresnel import polarisation_basis
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, PathKind, RadioConfig
 from rislam_rt.model.itu import ITU_MATERIALS
+from rislam_rt.model.slab import relative_permittivity, slab_coefficients
 
 CARRIER = 10e9
 materials_at_10_ghz = sorted(n for n, rows in ITU_MATERIALS.items() if any(r[0] <= 10.0 <= r[1] for r in rows))

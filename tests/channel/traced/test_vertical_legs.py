@@ -5,9 +5,9 @@ import pytest
 
 from rislam_rt.channel.compare.path_matching import named_identity
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.channel.image_source.fresnel import relative_permittivity, slab_coefficients
 from rislam_rt.channel.traced import TracedChannel
 from rislam_rt.model import Material, RadioConfig, Scatterer
+from rislam_rt.model.slab import relative_permittivity, slab_coefficients
 
 RADIO = RadioConfig()
 SIZES = {"hall": (60.0, 50.0, 40.0), "room": (6.0, 6.0, 3.0)}

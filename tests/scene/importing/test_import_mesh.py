@@ -117,6 +117,13 @@ def test_a_wrong_unit_is_named_and_nothing_is_written(mesh_file: Callable[..., P
     assert [path.name for path in file.parent.iterdir()] == [file.name]
 
 
+@pytest.mark.parametrize(("carrier_ghz", "faint"), [(10.0, True), (7.5, False)])
+def test_an_import_remarks_on_a_pane_of_half_a_wave(node_file: Path, carrier_ghz: float, faint: bool) -> None:
+    glass = parse_choices(["wall_north=itu:glass", "wall_east=itu:glass"])
+    _, remarks = imported(node_file, materials=glass, carrier_ghz=carrier_ghz)
+    assert sum("and 1 more): 6 mm of 'glass' reflect 0.04" in remark for remark in remarks) == faint
+
+
 def test_names_speak_of_materials() -> None:
     names = {"Oak.003": "wood", "itu_concrete": "concrete", "Window Glass": "glass", "Stahl-blank": "metal",
              "M_Ceiling_Board": "ceiling_board", "Material.004": None, "": None}  # fmt: skip
