@@ -2,8 +2,11 @@
 
 import os
 import re
+from collections import Counter
+from collections.abc import Iterable
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 _PACKAGE = Path(__file__).parent
 _ROOT = _PACKAGE / "shipped" if (_PACKAGE / "shipped").is_dir() else _PACKAGE.parent
@@ -39,6 +42,33 @@ def room_beside(folder: Path, name: str) -> Path:
     comes with the package; the folder comes first."""
     given = Path(os.path.normpath(folder / name))
     return given if given.exists() else shipped_rooms().get(name, given)
+
+
+def beside_of(folder: Path, value: Any, key: str) -> Any:
+    """What a pipeline file in a folder calls what a setting of the command line names, as seen from the working folder:
+    shipped scenes and scene folders under the keys `scene` and `scenes`, the folder `results`; other values stay.
+
+    The name of a shipped scene stays as well, where no folder has it: a pipeline file may name it, too.
+    """
+    if isinstance(value, list):
+        return [beside_of(folder, item, key) for item in value]
+    if isinstance(value, dict):
+        return {name: beside_of(folder, item, name) for name, item in value.items()}
+    if key not in ("scene", "scenes", "results") or not isinstance(value, str) or os.path.isabs(value):
+        return value
+    built_in = None if Path(value).exists() or key == "results" else shipped_rooms().get(value)
+    if built_in is None:
+        return os.path.relpath(value, folder)
+    return value if room_beside(folder, value) == built_in else str(built_in)
+
+
+def short_names(scenes: Iterable[str]) -> dict[str, str]:
+    """Short name of each scene's path, for tables of shipped and other scenes: its last part, and as many before it as
+    tell it from the others."""
+    paths = list(dict.fromkeys(scenes))
+    tails = {path: [os.sep.join(Path(path).parts[-n:]) for n in range(1, len(Path(path).parts) + 1)] for path in paths}
+    every = Counter(tail for found in tails.values() for tail in found)
+    return {path: next((tail for tail in tails[path] if every[tail] == 1), path) for path in paths}
 
 
 def name_from_here(folder: Path) -> str:

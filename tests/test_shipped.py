@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.shipped import (
     find_pipeline,
@@ -19,7 +20,11 @@ from rislam_rt.shipped import (
     room_beside,
     shipped_pipelines,
     shipped_rooms,
+    short_names,
 )
+from rislam_rt.studies import load_any
+from rislam_rt.studies.pipeline_sweep import slam_sweep
+from rislam_rt.sweeps import build_cells
 
 ROOT = Path(__file__).parents[1]
 
@@ -52,6 +57,43 @@ def test_a_pipeline_may_name_a_built_in_room_and_its_own_folder_comes_first(tmp_
     assert room_beside(tmp_path, "../scenes/office") == tmp_path.parent / "scenes" / "office", "no folder, no name"
     (tmp_path / "office").mkdir()
     assert room_beside(tmp_path, "office") == tmp_path / "office"
+
+
+def test_a_scene_of_the_command_line_is_as_seen_from_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same for a setting, the list of a study, its table of rooms, and a sweep's axis."""
+    here, beside = tmp_path / "here", tmp_path / "beside"
+    beside.mkdir()
+    for name in ("mine", "l_room"):
+        shutil.copytree(ROOT / "scenes" / "empty_box", here / name)
+    for name in ("trace_then_slam", "rooms", "compare_channels"):
+        shutil.copy(ROOT / "pipelines" / f"{name}.toml", beside)
+    monkeypatch.chdir(here)
+
+    def found(name: str) -> Path:
+        return room_beside(beside, name).resolve()
+
+    assert found(str(load_spec(beside / "trace_then_slam.toml", ["scene=mine"]).scene)) == here / "mine"
+    assert found(load_any(beside / "rooms.toml", ["scenes=['./mine']"]).scenes[0]) == here / "mine"
+    rooms = load_any(beside / "compare_channels.toml", ["rooms=[{scene='mine'}, {scene='office'}]"]).rooms
+    assert [found(room.scene) for room in rooms] == [here / "mine", ROOT / "scenes" / "office"]
+    few = ["cycles=2", 'schemes=["no_ris"]', "channel=image_source"]
+    sweep = slam_sweep(beside / "trace_then_slam.toml", few, ["scene=mine,l_room,office"])
+    axis = [found(str(name)) for name in sweep.axes[0].values]
+    assert axis == [here / "mine", here / "l_room", ROOT / "scenes" / "office"], "a folder here comes before a name"
+    assert sweep.axes[0].values[2] == "office"
+    shutil.copytree(here / "mine", beside / "office")  # beside the file, which the command line does not mean
+    assert found(str(load_spec(beside / "trace_then_slam.toml", ["scene=office"]).scene)) == ROOT / "scenes" / "office"
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError, match="no such scene file"):
+        build_cells(slam_sweep(beside / "trace_then_slam.toml", few, ["scene=mine"]))
+
+
+def test_scenes_of_one_name_are_told_apart_by_the_folders_they_are_in() -> None:
+    names = short_names(["../a/hall", "../b/hall", "office", "../../x/mine", "../a/hall"])
+    assert list(names.values()) == ["a/hall", "b/hall", "office", "mine"]
+    assert short_names(["hall", "../hall"]) == {"hall": "hall", "../hall": "../hall"}
 
 
 def test_a_folder_is_called_what_finds_it_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from rislam_rt.model import PathKind, Paths, Scene
+from rislam_rt.shipped import short_names
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -161,11 +162,12 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
     """Print the scores of a sweep as a table, a line for each point of the axes and scheme."""
     keys = [key.rpartition(".")[2] for key in scores[0].point if key != "schemes"]
     table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")
+    rooms = short_names(str(score.point["scene"]) for score in scores if "scene" in score.point)
     for score in scores:
         interval = f"{score.interval[0]:.3f}-{score.interval[1]:.3f}" if score.interval else ""
         overall = f"{score.overall:.3f} m" if score.overall is not None else "none"
         counts = (str(len(score.rmse)), str(score.diverged), str(score.failed))
-        point = (str(value) for key, value in score.point.items() if key != "schemes")
+        point = (rooms.get(str(value), str(value)) for key, value in score.point.items() if key != "schemes")
         table.add_row(*point, score.scheme, overall, interval, *counts)
     _show("sweep", table)
 

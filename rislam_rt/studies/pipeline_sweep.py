@@ -20,7 +20,7 @@ from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_s
 from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.specification.section import Positive, Section
 from rislam_rt.scene import load_scene
-from rislam_rt.shipped import room_beside
+from rislam_rt.shipped import beside_of, room_beside
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes, rows_by_point
 from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
@@ -98,7 +98,7 @@ def slam_sweep(
     overrides
         `key=value` settings, for all cells.
     axes
-        `key=v1,v2,...`, over those of the file.
+        `key=v1,v2,...`, over those of the file; scenes as seen from the working folder.
     scene
         Scene folder, instead of the one that the pipeline names.
     repeat
@@ -111,7 +111,8 @@ def slam_sweep(
     """
     section = load_section(path, overrides)
     found = {key: Axis(key, tuple(values)) for key, values in section.axes.items()}
-    given = [parse_axis(text) for text in axes]
+    typed = map(parse_axis, axes)
+    given = [Axis(axis.key, tuple(beside_of(path.parent, [*axis.values], axis.key))) for axis in typed]
     twice = [axis.key for number, axis in enumerate(given) if axis.key in {other.key for other in given[:number]}]
     if twice:
         raise ConfigError(f"--axis {twice[0]}: given twice; give all its values in one, as {twice[0]}=V1,V2")
@@ -128,9 +129,9 @@ def slam_sweep(
     if "scene" not in table.content:
         raise ConfigError(f"{path}: scene: not given; add it, or give --scene DIR")
     spec = build_spec(table, PipelineSpec, build_settings)
-    typed = tuple(typed_axis(axis) for axis in found.values())
+    values = tuple(typed_axis(axis) for axis in found.values())
     return Sweep(
-        FUNCTION, typed, spec.model_dump(mode="json", exclude={"seed", "description"}), repeat or section.repeat,
+        FUNCTION, values, spec.model_dump(mode="json", exclude={"seed", "description"}), repeat or section.repeat,
         spec.seed, tuple(section.paired if section.paired is not None else found),
         {"beside": os.path.abspath(path.parent)}, _depends(path, tuple(found)), spec.name,
     )  # fmt: skip

@@ -136,7 +136,7 @@ def test_a_changed_room_is_another_cell(tmp_path):
 
 
 def test_rooms_are_an_axis():
-    sweep = slam_sweep(PIPELINE, TINY, ["scene=../scenes/paper_room,../scenes/two_scatterers"], repeat=1)
+    sweep = slam_sweep(PIPELINE, TINY, ["scene=paper_room,two_scatterers"], repeat=1)
     digests = {cell.depends["scene_sha256"] for cell in build_cells(sweep)}
     assert len(digests) == 2
 

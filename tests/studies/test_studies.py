@@ -95,7 +95,7 @@ def test_specification_survives_its_own_dump(path):
         (FIG4A, "elements=['tang','tang']", "at most once"),
         (FIG4A, "design.population=3", "design.population"),
         (FIG4A, "closest_m=50.0", "closest_m"),
-        (FIG4A, "scene=../scenes/empty_box", "panel"),
+        (FIG4A, "scene=empty_box", "panel"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(run, tmp_path, pipeline, setting, field):

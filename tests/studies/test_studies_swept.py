@@ -81,7 +81,7 @@ def test_bad_files_are_refused_with_the_field(name, setting, wanted):
 
 def test_a_room_that_does_not_fit_is_refused_before_anything_runs():
     with pytest.raises(ConfigError, match=r"empty_box.*needs a panel"):
-        cells_of("rooms", "scenes=['../scenes/empty_box']")
+        cells_of("rooms", "scenes=['empty_box']")
     with pytest.raises(ConfigError, match="10000 received; the scene has 600"):
         cells_of("fig4c", "run.cycles=10000")
 

@@ -13,7 +13,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.section import Section
-from rislam_rt.shipped import shipped_pipelines
+from rislam_rt.shipped import beside_of, shipped_pipelines
 from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
 
 MAX_BYTES = 1_000_000
@@ -69,6 +69,8 @@ def load_radio(overrides: Sequence[str]) -> RadioConfig:
 def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     """Read a pipeline file of any kind as an unchecked table, with `key=value` settings (dotted keys) put over it.
 
+    A scene that a setting names is as seen from the working folder, one that the file names as seen from its folder.
+
     Raises
     ------
     ConfigError
@@ -76,7 +78,7 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     """
     path = Path(path)
     content = _read_toml(path)
-    changed = tuple(_override(content, setting) for setting in overrides)
+    changed = tuple(_override(content, setting, path.parent) for setting in overrides)
     table = Table(path, content, changed, content.pop("sweep", None))
     make_way(table, changed)
     return table
@@ -155,8 +157,8 @@ def _near_pipeline(path: Path) -> str:
     return did_you_mean(nearest(path.stem, known)) or f"give one, or a built-in one: {', '.join(known)}"
 
 
-def _override(table: dict[str, Any], setting: str) -> str:
-    """Put one `--set key=value` into a pipeline's table; returns the key."""
+def _override(table: dict[str, Any], setting: str, folder: Path = Path()) -> str:
+    """Put one `--set key=value` into the table of a pipeline file in a folder; returns the key."""
     key, equals, text = setting.partition("=")
     parts = key.strip().split(".")
     if not equals or len(parts) > MAX_LEVELS or not all(part.isidentifier() for part in parts):
@@ -165,7 +167,7 @@ def _override(table: dict[str, Any], setting: str) -> str:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
             raise ConfigError(f"--set {setting[:80]!r}: '{part}' is not a section; mend the key")
-    table[parts[-1]] = parse_value(text.strip())
+    table[parts[-1]] = beside_of(folder, parse_value(text.strip()), parts[-1])
     return ".".join(parts)
 
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from rislam_rt.input_messages import unit_of
 from rislam_rt.report.style import save_figure, scheme_colour, styled
 from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.shipped import short_names
 from rislam_rt.studies.pipeline_sweep import SchemeScore
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -51,7 +52,7 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
             label = ", ".join(part for part in (scheme, others) if part)
             axis.errorbar(x, middle, np.abs(ends.T - middle), color=scheme_colour(scheme), label=label, **style)
         if not numeric:
-            axis.set_xticks(range(len(ticks)), ticks)
+            axis.set_xticks(range(len(ticks)), [*short_names(ticks).values()] if along == "scene" else ticks)
         axis.set_yscale("log")
         mark_metres(axis.yaxis)
         unit = unit_of(along)
