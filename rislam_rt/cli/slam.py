@@ -136,14 +136,18 @@ def _new_folder(folder: Path) -> Path:
 def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dict[str, Any]:
     import numpy as np
 
+    from rislam_rt.pipeline.scores.loss_causes import LossTally, words_of_loss
+
     last = answers.estimates[-1]
-    outcomes = [str(info.outcome) for info in answers.infos]
+    outcomes, tally = [str(info.outcome) for info in answers.infos], LossTally()
+    tally.add(inputs.time, outcomes, [getattr(info, "cause", 0) for info in answers.infos])
     panels = 1 if inputs.panel is None else len(inputs.panel.panels)
     found: dict[str, Any] = {
         "cycles": len(inputs.time),
         "components": sum(len(m) for m in inputs.measurements),
         "ended": outcomes[-1],
         "cycles_diverged": outcomes.count("diverged"),
+        **({"lost_because": words_of_loss(tally.scores(float(inputs.time[0])))} if tally.causes else {}),
         "last_position_m": [round(float(value), 4) for value in last.position],
         "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
         "landmarks": int(np.sum(last.map.parent < 0)),

@@ -10,8 +10,10 @@ from rislam_rt.arrays import Booleans
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
+from rislam_rt.pipeline.scores.loss_causes import words_of_loss
 from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.slam.step_info import StepOutcome
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
 """Schemes in words; others are called by their names."""
@@ -29,16 +31,19 @@ class Conclusions(NamedTuple):
     """Results of each scheme, by name."""
     missing: dict[str, list[str]]
     """Landmarks that each scheme did not map, and why, by name."""
+    lost: dict[str, list[str]]
+    """When and why each scheme's filter held itself for lost, by name; empty where it never was."""
 
 
 def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
     """Conclusions on a run in sentences, from its scores and from the SNR of its paths."""
-    found, missing = {}, {}
+    found, missing, lost = {}, {}, {}
     for name, scheme in result.schemes.items():
         scores = summary["schemes"][name]
         found[name] = f"{_words(name)}: {_found(result, scheme, scores)}."
         missing[name] = list(_missing(result, scheme, scores))
-    return Conclusions(_headline(summary["schemes"]), found, missing)
+        lost[name] = list(_lost(scores))
+    return Conclusions(_headline(summary["schemes"]), found, missing, lost)
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
@@ -82,6 +87,21 @@ def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> 
     first = int(gaps[-1]) + 1 if len(gaps) else 0
     time = result.scene.agent.time
     return float(time[first] - time[0])
+
+
+def _lost(scores: Mapping[str, Any]) -> Iterator[str]:
+    """Conclusions on the loss of one scheme: when and why its filter held itself for lost, and what it did not hear."""
+    lost, outcomes = scores.get("lost"), scores["outcomes"]
+    silent = outcomes.get(StepOutcome.NO_MEASUREMENTS, 0)
+    if silent:
+        yield f"nothing was heard in {silent} of {sum(outcomes.values())} cycles"
+    if lost is None:  # of an earlier version
+        return
+    if lost["times"]:
+        often = "once, after" if lost["times"] == 1 else f"{lost['times']} times, first after"
+        yield f"held itself for lost {often} {lost['first_s']:.1f} s: {words_of_loss(lost)}"
+    elif scores["diverged"]:
+        yield "lost without noticing: nothing that it heard spoke against its map and its motion"
 
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:

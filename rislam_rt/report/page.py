@@ -106,9 +106,8 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in summary_rows(summary))
     rows = "".join(f"<tr>{row}</tr>" for row in cells)
     said = judge_run(result, summary)
-    sentences = "".join(
-        f"<li>{html.escape(text)}{_bullets(said.missing[name])}</li>" for name, text in said.schemes.items()
-    )
+    lacks = {name: [*said.lost[name], *(f"not found: {one}" for one in said.missing[name])] for name in said.schemes}
+    sentences = "".join(f"<li>{html.escape(text)}{_bullets(lacks[name])}</li>" for name, text in said.schemes.items())
     figures = "".join(
         f'<figure><img alt="{html.escape(CAPTIONS[name])}" src="data:image/png;base64,'
         f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
@@ -149,5 +148,5 @@ time of each step on this machine.</p>
 
 
 def _bullets(lines: Sequence[str]) -> str:
-    """HTML list of the landmarks that were not found; empty without any."""
-    return f"<ul>{''.join(f'<li>not found: {html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""
+    """HTML list of what a scheme lacks: why it was lost, landmarks not found; empty without any."""
+    return f"<ul>{''.join(f'<li>{html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from rislam_rt.model import PathKind, Paths, Scene
+from rislam_rt.pipeline.scores.loss_causes import words_of_loss
 from rislam_rt.shipped import short_names
 
 if TYPE_CHECKING:
@@ -50,6 +51,9 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     rows.append(["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
     rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])
+    lost = [s.get("lost", {"times": 0}) for s in schemes]
+    if any(one["times"] for one in lost):
+        rows.append(["because", *(words_of_loss(one) if one["times"] else "-" for one in lost)])
     return rows
 
 

@@ -1,6 +1,6 @@
 """Diagnostics that a filter's step returns about its cycle (`StepInfo`)."""
 
-from enum import StrEnum
+from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 from rislam_rt.arrays import Integers
@@ -20,6 +20,25 @@ class StepOutcome(StrEnum):
     """The map holds no landmark."""
     DIVERGED = "diverged"
     """The filter holds itself for lost."""
+
+
+class LossCause(IntEnum):
+    """Why a filter holds itself for lost in a cycle: what speaks most against its map, by the cycle's own evidence."""
+
+    NONE = 0
+    """The cycle itself speaks for the map, or the filter gives no reason."""
+    START = 1
+    """The rates of the first tracks contradict the velocity or the compass that was told of the start."""
+    JUMP = 2
+    """What is heard fits the map from another position."""
+    TRACKS = 3
+    """More tracks ended at once than faint ones do."""
+    MAP = 4
+    """Clutter explains what is heard better than the map does."""
+    MOTION = 5
+    """Path lengths change as under another motion than the estimated one."""
+    RESTART = 6
+    """The filter has begun anew with an empty map."""
 
 
 class StepInfo(NamedTuple):
@@ -42,3 +61,5 @@ class StepInfo(NamedTuple):
     """Number of landmarks that the map holds."""
     outcome: StepOutcome
     """How the cycle went."""
+    cause: LossCause = LossCause.NONE
+    """Why the filter holds itself for lost, if it does."""

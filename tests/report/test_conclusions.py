@@ -43,6 +43,28 @@ def test_a_lost_scheme_is_named(result):
     assert judge_run(result, summary).headline.endswith("lost with random codes.")
 
 
+def test_why_a_scheme_is_lost_is_said(result):
+    summary = summarise(result)
+    scores = summary["schemes"]["random"]
+    scores["lost"] = {"times": 3, "first_s": 1.25, "causes": {"motion": 2, "jump": 1}}
+    scores["outcomes"] = {"ok": 4, "no measurements": 2}
+    said = judge_run(result, summary).lost
+    assert said["no_ris"] == []
+    assert said["random"][0] == "nothing was heard in 2 of 6 cycles"
+    assert said["random"][1].startswith(
+        "held itself for lost 3 times, first after 1.2 s: the lengths of the paths change"
+    )
+    assert said["random"][1].endswith("(2 times); what it hears fits its map from another place")
+    scores["lost"], scores["outcomes"], scores["diverged"] = (
+        {"times": 0, "first_s": None, "causes": {}},
+        {"ok": 6},
+        True,
+    )
+    assert judge_run(result, summary).lost["random"][0].startswith("lost without noticing")
+    del scores["lost"]
+    assert judge_run(result, summary).lost["random"] == []
+
+
 def test_the_panel_is_found_from_when_it_stays(result):
     scheme, centre = result.schemes["random"], result.scene.ris.center
     held = np.array([[False], [True], [False], [True], [True], [True]])

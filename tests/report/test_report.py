@@ -10,6 +10,7 @@ import pytest
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import Material, PathKind
 from rislam_rt.pipeline import load_spec, run_slam
+from rislam_rt.pipeline.scores.loss_causes import WORDS
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
 from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
@@ -18,6 +19,7 @@ from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.terminal_tables import summary_rows
 from rislam_rt.report.time_curves import strongest_db
 from rislam_rt.scene import load_scene
+from rislam_rt.slam.step_info import LossCause
 
 ROOT = Path(__file__).parents[2]
 
@@ -161,9 +163,12 @@ def test_page_says_what_is_lost_and_what_held_itself_for_lost():
         page = build_page(lost, summarise(lost), {})
         assert ("lost with no panel." in page) == (scale == 100)
         assert f"<td>{rows[scale]['held itself for lost']}</td>" in page
+        assert ("told at the start</li>" in page) == (scale == 100)
     whole, shape = (float(rows[1][key].removesuffix(" cm")) for key in ("agent", "agent, path aligned"))
     assert shape < whole, "most of an honest run's error is the start's"
     assert "within 1 cm an axis" in page
     assert (rows[1]["diverged"], rows[1]["held itself for lost"]) == ("no", "never")
     assert rows[100]["diverged"] == "yes"
     assert re.fullmatch("in [1-9] of 10 cycles", rows[100]["held itself for lost"])
+    assert rows[100]["because"] == WORDS[LossCause.START]
+    assert "because" not in rows[1]

@@ -14,6 +14,7 @@ from rislam_rt.evaluate import association_fractions, position_errors
 from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
+from rislam_rt.pipeline.scores.loss_causes import LossTally
 from rislam_rt.pipeline.scores.summary import has_diverged, landmark_track, map_score, nees_per_dof, over_budget
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
 
@@ -30,6 +31,7 @@ class Tally:
         self.diverged = False
         self.nees: list[float] | None = [0.0]
         self.outcomes: Counter[str] = Counter()
+        self.lost, self.start = LossTally(), 0.0
         self.pairs: Counter[tuple[int, Any]] = Counter()
         self.seconds = np.zeros(len(STEPS))
         count = len(scene.landmarks)
@@ -58,7 +60,9 @@ class Tally:
             self.nees = None
         else:
             self.nees[0] += float(np.sum(squares))
+        self.start = self.start if self.outcomes else float(scheme.time[0])
         self.outcomes.update(scheme.outcome)
+        self.lost.add(scheme.time, scheme.outcome, scheme.info.get("cause"))
         self.seconds += scheme.seconds.sum(axis=0)
         self.map, self.panel = scheme.map, bool(scheme.levels)
         self.overlap.add(scheme.position, truth)
@@ -81,6 +85,7 @@ class Tally:
             "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
             "diverged": self.diverged,
             "outcomes": dict(sorted(self.outcomes.items())),
+            "lost": self.lost.scores(self.start),
             "landmarks": self._landmarks(),
             "walls": walls,
             "ghost_walls": count_ghosts(self.scene, self.map),

@@ -11,6 +11,7 @@ from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
+from rislam_rt.pipeline.scores.loss_causes import LossTally
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
@@ -75,6 +76,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
         "diverged": has_diverged(errors, limit),
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
+        "lost": loss_scores(scheme),
         "landmarks": landmark_scores(scene, scheme, least),
         "walls": walls,
         "ghost_walls": count_ghosts(scene, scheme.map),
@@ -84,6 +86,13 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "over_budget": over_budget(seconds, result.config["budget"]),
         "seconds": float(scheme.seconds.sum()),
     }
+
+
+def loss_scores(scheme: SchemeResult) -> dict[str, Any]:
+    """Score of divergence by the filter's own word: how often it began to hold itself for lost, when, and why."""
+    tally = LossTally()
+    tally.add(scheme.time, scheme.outcome, scheme.info.get("cause"))
+    return tally.scores(float(scheme.time[0]))
 
 
 def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:

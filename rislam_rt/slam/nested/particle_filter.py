@@ -34,7 +34,7 @@ from rislam_rt.slam.nested_config import NestedConfig
 from rislam_rt.slam.observations import PANEL, free_space, stranger_density
 from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_info import REMOVED, StepInfo
+from rislam_rt.slam.step_info import REMOVED, LossCause, StepInfo, StepOutcome
 from rislam_rt.slam.window import WindowState
 from rislam_rt.slam.window import init as window_init
 from rislam_rt.slam.window import revisit as window_revisit
@@ -48,6 +48,7 @@ from rislam_rt.slam.window.cycle_explanation import (
     remove_or_add_features,
     unexplained,
 )
+from rislam_rt.slam.window.divergence.divergence_monitor import cause_of_loss
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.measurement_log import Log, squares
 from rislam_rt.slam.window.relinearisation import relinearise
@@ -125,6 +126,7 @@ def step(
     front = _refresh_view(front, told.belief, config)
     left = relinearise(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
     left = left._replace(square=squares(left.row, left.left, front.log, 0.0))
+    before = front.lost_log_odds
     front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED
@@ -139,7 +141,10 @@ def step(
     outcome = outcome_of(len(measurement), len(grown.landmarks.ident), grown.lost_log_odds >= 0.0)
     front = _refresh_view(grown._replace(cycle=grown.cycle + 1), belief, config)
     count = len(front.landmarks.points)
-    info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome)
+    cause = LossCause.NONE
+    if outcome == StepOutcome.DIVERGED:
+        cause = cause_of_loss(before, grown.lost_log_odds, grown.lost_log_odds, view.score)
+    info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome, cause)
     return NestedState(front, belief), info
 
 

@@ -11,7 +11,7 @@ from rislam_rt.slam.input_checks import check_sides, check_step
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, stranger_density
 from rislam_rt.slam.start_prior import StartPrior
-from rislam_rt.slam.step_info import StepInfo
+from rislam_rt.slam.step_info import LossCause, StepInfo, StepOutcome
 from rislam_rt.slam.window import coordinated_turn, motion_learning, tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again, with_tilts
 from rislam_rt.slam.window.cycle_explanation import (
@@ -80,7 +80,7 @@ def step(
         heading = float(state.heading[-1])
     else:
         heading += state.turned
-    turn = heading - float(state.heading[-1])
+    turn, restarted = heading - float(state.heading[-1]), state.lost_log_odds == 0.0
     state = with_rates(_move(state, dt, heading))
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
@@ -93,16 +93,21 @@ def step(
     state, used = log_associations(state, observed, view)
     state, view, left, nis, uncertain = _solve(state, view, used)
     heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
-    jumped = state.lost_log_odds == 0.0
+    jumped, before = state.lost_log_odds == 0.0, state.lost_log_odds
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
     if state.cycle % REFRESH == 0 and scene.use_vt:  # without wall returns the fit is too free to show a scatter
         state = state._replace(log=reweigh_wall_returns(state.log, left, state.window.num_poses))
+    heard_odds = state.lost_log_odds
     state, wrong = recovery.check_motion(state)
+    cause = divergence_monitor.cause_of_loss(before, heard_odds, state.lost_log_odds, view.score)
+    if wrong or jumped:
+        cause = LossCause.START if wrong else LossCause.RESTART if restarted else LossCause.JUMP
     state = remove_or_add_features(state, left, view)
     outcome = outcome_of(len(measurement), len(state.landmarks.ident), wrong or jumped or state.lost_log_odds >= 0.0)
     if divergence_monitor.is_lost(state.lost_log_odds) and len(state.landmarks.ident):
         state = recovery.restart(state)
-    info = StepInfo(landmark, 1.0, False, nis, 3 * len(view.row), 0.0, len(state.landmarks.points), outcome)
+    cause = cause if outcome == StepOutcome.DIVERGED else LossCause.NONE
+    info = StepInfo(landmark, 1.0, False, nis, 3 * len(view.row), 0.0, len(state.landmarks.points), outcome, cause)
     return state._replace(cycle=state.cycle + 1), info
 
 

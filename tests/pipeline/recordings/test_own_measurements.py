@@ -292,7 +292,9 @@ def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
         with (tmp_path / f"out{off}" / "estimate.csv").open() as lines:
             said = [row["outcome"] for row in csv.DictReader(lines)].count("diverged")
         assert (said > 0) == (off > 0.0)
-        assert f"cycles_diverged: {said}\n" in capsys.readouterr().out
+        shown = capsys.readouterr().out
+        assert f"cycles_diverged: {said}\n" in shown
+        assert ("lost_because: the first paths tell of another speed" in shown) == (off > 0.0)
 
 
 @pytest.mark.parametrize(

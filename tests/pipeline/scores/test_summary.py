@@ -131,6 +131,9 @@ def test_a_run_whose_start_is_told_wrong_is_lost_and_says_so(run_short):
     assert right["diverged"] is False
     assert wrong["outcomes"].get("diverged", 0) >= 1  # by the filter's own word, which knows no truth
     assert "diverged" not in right["outcomes"]
+    assert (wrong["lost"]["times"], wrong["lost"]["causes"]) == (1, {"start": 1})
+    assert 0.0 < wrong["lost"]["first_s"] < 1.0
+    assert right["lost"] == {"times": 0, "first_s": None, "causes": {}}
     assert sum(wrong["outcomes"].values()) == 10
 
 

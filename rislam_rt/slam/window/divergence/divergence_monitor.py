@@ -12,6 +12,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.predicted_returns import TX
+from rislam_rt.slam.step_info import LossCause
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.egomotion import Rates
@@ -160,3 +161,15 @@ def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
 def is_lost(log_odds: float) -> bool:
     """Whether the log odds of being lost are such that the map is given up."""
     return log_odds > CONSTANTS.log_born
+
+
+def cause_of_loss(before: float, heard: float, checked: float, score: float) -> LossCause:
+    """What adds most to the log odds of being lost in a cycle: tracks that ended, a map that explains the cycle worse
+    than clutter (by `score`), or another motion.
+
+    The log odds are those `before` the cycle, when it has been `heard`, and when its motion has been `checked`.
+    """
+    map_share = -score if heard != before else 0.0
+    shares = {LossCause.TRACKS: heard - before - map_share, LossCause.MAP: map_share, LossCause.MOTION: checked - heard}
+    cause = max(shares, key=lambda one: shares[one])
+    return cause if shares[cause] > 0.0 else LossCause.NONE

@@ -205,6 +205,20 @@ def test_tracks_that_are_heard_now_and_then_end_without_a_jump():
     assert odds == pytest.approx(CONSTANTS.log_lost)
 
 
+@pytest.mark.parametrize(
+    ("score", "ended", "motion", "cause"),
+    [(0.4, 17, 0.0, "TRACKS"), (-9.0, 0, 2.0, "MAP"), (2.0, 0, 9.0, "MOTION")],
+)
+def test_a_cycle_of_loss_names_what_speaks_most_against_the_map(score, ended, motion, cause):
+    before = -1.0
+    heard = divergence_monitor.advance(before, score, np.full(ended, 0.95), 20 - ended)
+    assert divergence_monitor.cause_of_loss(before, heard, heard + motion, score).name == cause
+
+
+def test_a_cycle_in_which_nothing_is_weighed_names_no_cause():
+    assert divergence_monitor.cause_of_loss(1.0, 1.0, 1.0, -5.0).name == "NONE"
+
+
 def test_a_rate_whose_direction_is_not_told_counts_for_little():
     log = _log(0.1 * np.arange(8)[:, None] * np.array([0.2, -0.1, 0.0]), 0.0)
     vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.9))
