@@ -16,7 +16,7 @@ from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets, weld
-from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, numbered, own_name, wall_name
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, numbered, plain_name, wall_name
 from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.room_draft import RoomDraft
@@ -85,7 +85,7 @@ def _unseen(hidden: list[Surface], pieces: list[RegionGroup], parts: list[MeshPa
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
     area: dict[str, float] = {}
     for s in hidden:
-        own = pieces[s.piece].name or own_name(parts[s.part].node)
+        own = pieces[s.piece].name or plain_name(parts[s.part].node)
         name = own or wall_name(s.normal, s.mesh.triangles.mean(axis=(0, 1)), room)
         area[name] = area.get(name, 0.0) + s.area
     few = ", ".join(f"{name} {area[name]:.3g}" for name in sorted(area, key=lambda name: -area[name])[:6])
@@ -100,19 +100,21 @@ def _reflectors(
     shell = sorted((s for s in surfaces if s.piece == 0), key=lambda s: -s.area)
     corners = np.concatenate([s.mesh.vertices for s in surfaces if s.piece == 0 or not shell])
     room = np.stack([corners.min(axis=0), corners.max(axis=0)])
-    uses = [own_name(parts[s.part].node) for s in shell]
+    uses = [plain_name(parts[s.part].node) for s in shell]
     entries: list[tuple[str, Mesh, int]] = []
-    for surface, node in zip(shell, uses, strict=True):
+    given = [bool(node) and uses.count(node) == 1 for node in uses]
+    for surface, node, own in zip(shell, uses, given, strict=True):
         middle = surface.mesh.triangles.mean(axis=(0, 1))
         place = wall_name(surface.normal, middle, room)
         if itu_by_word(parts[surface.part].material) == "glass":
             place = place.replace("wall", "window")
-        entries.append((node if node and uses.count(node) == 1 else place, surface.mesh, surface.part))
+        entries.append((node if own else place, surface.mesh, surface.part))
     for number, piece in enumerate(pieces[1:], start=1):
         mine = [s for s in surfaces if s.piece == number]
         for part in sorted({s.part for s in mine}):
             entries.append((piece.name, joined([s.mesh for s in mine if s.part == part]), part))
-    names = numbered([name for name, _, _ in entries])
+            given.append(bool(piece.node))
+    names = numbered([name for name, _, _ in entries], given)
     return {
         name: (mesh, palette.material(name, parts[number].node, parts[number].material))
         for name, (_, mesh, number) in zip(names, entries, strict=True)

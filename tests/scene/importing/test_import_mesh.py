@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
+from built_in_rooms.parts import box_walls
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import RislamError, SceneError
@@ -15,6 +16,7 @@ from rislam_rt.scene.check.mesh_queries import winding
 from rislam_rt.scene.importing import ImportOptions, import_room
 from rislam_rt.scene.importing.materials import THICKNESS, itu_by_word, parse_choices, parse_material
 from rislam_rt.scene.schema import ItuMaterial
+from rislam_rt.scene.shapes import joined
 
 SHELL = {"floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west"}
 
@@ -86,6 +88,28 @@ def test_nodes_and_materials_keep_their_names(node_file: Path) -> None:
     assert material["floor"].reflection == 0.5
     assert material["ceiling"].itu == "plasterboard"
     assert not any("unknown" in line for line in remarks)
+
+
+def test_a_name_that_one_surface_has_is_kept(tmp_path: Path) -> None:
+    """Also one that the importer would give to another surface; where several bear it, each is named by its place."""
+    import trimesh
+
+    given = {
+        "floor": "Floor_0", "ceiling": "ceiling_0", "wall_x0": "wall_north", "wall_x5": "Wall.003", "wall_y0": "walls",
+        "wall_y4": "walls",
+    }  # fmt: skip
+    scene: Any = trimesh.Scene()
+    parts = box_walls(5.0, 4.0, 2.6)
+    for node in set(given.values()):
+        mesh = joined([parts[name] for name in given if given[name] == node])
+        scene.add_geometry(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False), node_name=node, geom_name=node)
+    file = tmp_path / "named.glb"
+    file.write_bytes(scene.export(file_type="glb"))
+    room, _ = imported(file, up="z")
+    middle = {wall.name: wall.vertices.mean(axis=0) for wall in room.reflectors}
+    assert set(middle) == {"floor_0", "ceiling_0", "wall_north", "wall_003", "wall_south", "wall_north_2"}
+    assert middle["wall_north"][0] == pytest.approx(0.0, abs=1e-6)
+    assert middle["wall_north_2"][1] == pytest.approx(4.0, abs=1e-6)
 
 
 def test_the_proposal_is_inside_and_free(node_file: Path) -> None:

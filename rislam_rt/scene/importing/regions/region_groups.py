@@ -1,6 +1,7 @@
 """Groups of a mesh's flat regions, and their names: the shell of the room, and each object in it."""
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -108,13 +109,6 @@ def plain_name(name: str) -> str:
     return re.sub(r"_+", "_", plain.replace(".", "_"))[:48]
 
 
-def own_name(name: str) -> str:
-    """Plain name of a group of flat regions from its node's name; empty too where that says no more than wall, floor or
-    ceiling."""
-    plain = plain_name(name)
-    return "" if re.fullmatch(r"(walls?|floors?|ceilings?|roof|wand|boden|decke)?[_\d]*", plain) else plain
-
-
 def kind_by_shape(bounds: Floats, room: Floats) -> str:
     """Name of an object of an imported room by size and place (`table`, ...); nothing is computed with it."""
     size, floor = bounds[1] - bounds[0], float(room[0, 2])
@@ -149,18 +143,19 @@ def compass_side(direction: Floats) -> str:
     return _SIDES[int(np.round(np.degrees(np.arctan2(direction[1], direction[0])) / 45.0)) % 8]
 
 
-def numbered(names: list[str]) -> list[str]:
-    """Names of an imported room's parts made different: the second of one name gets `_2`, and so on."""
+def numbered(names: list[str], given: Sequence[bool] = ()) -> list[str]:
+    """Names of an imported room's parts made different: the second of one name gets `_2`, and so on; those that the
+    user has `given` come before others."""
     taken: set[str] = set()
-    found = []
-    for name in names:
-        number, unique = 1, name
+    found = dict.fromkeys(range(len(names)), "")
+    for place in sorted(found, key=lambda place: not any(given[place : place + 1])):
+        number, unique = 1, names[place]
         while unique in taken:
             number += 1
-            unique = f"{name}_{number}"
+            unique = f"{names[place]}_{number}"
         taken.add(unique)
-        found.append(unique)
-    return found
+        found[place] = unique
+    return list(found.values())
 
 
 def _is_shell(bounds: Floats, room: Floats) -> bool:
