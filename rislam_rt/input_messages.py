@@ -75,6 +75,20 @@ def did_you_mean(near: Sequence[str]) -> str:
     return f"did you mean {' or '.join(repr(word) for word in near)}?" if near else ""
 
 
+EXACT = 1e-12
+"""Largest error by rounding of a share of none or of all."""
+
+
 def counted(number: int, thing: str) -> str:
     """Spelling of a number of things: `1 error`, `2 errors`."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def share_text(share: float) -> str:
+    """Spelling of a share in percent without a blank, `37%`: with as many decimals, up to two, as keep a few from
+    reading as none, and all but a few as all (1 of 200 is `0.5%`)."""
+    for digits in range(3):
+        text = f"{100.0 * share:.{digits}f}"
+        if float(text) not in (0.0, 100.0) or abs(share - float(text) / 100.0) < EXACT:
+            return f"{float(text):.0f}%" if float(text) in (0.0, 100.0) else f"{text}%"
+    return "below 0.01%" if share < 0.5 else "above 99.99%"

@@ -15,6 +15,7 @@ from rislam_rt.adviser.coverage import Coverage
 from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.remedies import detection_label
 from rislam_rt.adviser.tracing_cost import cost_words
+from rislam_rt.input_messages import share_text
 from rislam_rt.model import Scene
 from rislam_rt.report.map_from_above import draw_plan
 from rislam_rt.report.style import save_figure, styled
@@ -31,7 +32,7 @@ def print_advice(advice: Advice) -> None:
     table = Table("landmark", "codes", "start", "middle", "end", "heard", "why not")
     for link in advice.links:
         cells = (_cell(link, at) for at in link.three)
-        table.add_row(link.landmark, link.code or "any", *cells, f"{link.share:.0%}", _why(link))
+        table.add_row(link.landmark, link.code or "any", *cells, share_text(link.share), _why(link))
     if advice.links:
         title = f"SNR of the strongest path over the threshold of {advice.threshold_db:.1f} dB [dB]"
         console.print(title, style="bold", markup=False)
@@ -71,7 +72,7 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
     axis.set(xlabel="x [m]", ylabel="y [m]")
     axis.set_title(
         f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m: heard at "
-        f"{coverage.heard:.0%} of where it is seen", weight="bold",
+        f"{share_text(coverage.heard)} of where it is seen", weight="bold",
     )  # fmt: skip
     bar = figure.colorbar(shown, ax=axis, fraction=0.05, pad=0.02)
     bar.set_label("SNR of the direct path under the best code,\nover the threshold [dB]; grey: no such path")

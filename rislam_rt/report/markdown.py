@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from rislam_rt.input_messages import share_text
+
 
 def table_lines(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a Markdown table."""
@@ -55,4 +57,4 @@ def percent_between(entry: Mapping[str, Any], name: str) -> str:
 
 def percent(value: float | None) -> str:
     """Table cell in Markdown: a share in percent."""
-    return NOTHING if value is None else f"{100 * value:.0f} %"
+    return NOTHING if value is None else share_text(value).replace("%", " %")

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
+from rislam_rt.input_messages import share_text
 from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.pipeline.scores.loss_causes import words_of_loss
 from rislam_rt.shipped import short_names
@@ -47,7 +48,12 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     rows.append(["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)])
     rows.append(["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)])
     association = [s["association"] for s in schemes]
-    rows.append(["association: precision, recall", *(f"{a['precision']:.0%}, {a['recall']:.0%}" for a in association)])
+    rows.append(
+        [
+            "association: precision, recall",
+            *(", ".join(share_text(a[name]) for name in ("precision", "recall")) for a in association),
+        ]
+    )
     rows.append(["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
     rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
     rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])

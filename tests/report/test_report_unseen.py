@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from rislam_rt.evaluate import share_interval
+from rislam_rt.input_messages import share_text
+from rislam_rt.report.markdown import percent
 from rislam_rt.report.terminal_tables import print_cards
 from rislam_rt.report.unseen import write_unseen
+from rislam_rt.report.unseen.page import COLUMNS, ROWS
 from rislam_rt.report.unseen.score_cards import by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.studies.unseen import UnseenSpec
 from rislam_rt.studies.unseen.sweep import SNR
@@ -62,6 +65,16 @@ def test_medians_percentiles_and_shares() -> None:
     assert entry["panel_found"] == pytest.approx(0.8)
     # NEES of 0.9 alone is within 0.7 to 2
     assert (entry["consistent_count"], entry["consistent_of"]) == (1, 5)
+
+
+def test_a_few_do_not_read_as_none_nor_all_but_a_few_as_all() -> None:
+    spelled = {0.0: "0%", 0.005: "0.5%", 1 / 12000: "0.01%", 1e-6: "below 0.01%", 0.37: "37%", 0.996: "99.6%",
+               199.5 / 200: "99.8%", 1 - 1e-6: "above 99.99%", 1.0: "100%", 1e-17: "0%"}  # fmt: skip
+    assert {share: share_text(share) for share in spelled} == spelled
+    entry = {"lost": 0.005, "lost_low": 0.0009, "lost_high": 0.0278, "lost_of": 200}
+    assert ROWS["lost"](entry) == "0.5% (0.1% to 3%) of 200"
+    assert COLUMNS["lost"](entry) == "0.5%"
+    assert percent(0.004) == "0.4 %"
 
 
 def test_every_run_is_in_one_class_of_each_division() -> None:

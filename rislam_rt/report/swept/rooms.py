@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
+from rislam_rt.input_messages import share_text
 from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.report.markdown import metres, metres_between, paragraph, picture, ratio, table_lines
 from rislam_rt.report.style import MARKER, scheme_colour, styled
@@ -148,4 +149,4 @@ def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> 
     known = "" if bound is None else f"bound {bound:.{digits}f}"
     if entry[name] is None:
         return "-" if entry[share] is None else ", ".join(part for part in ("none found", known) if part)
-    return ", ".join(part for part in (f"{entry[name]:.{digits}f}", known) if part) + f" ({entry[share]:.0%})"
+    return ", ".join(part for part in (f"{entry[name]:.{digits}f}", known) if part) + f" ({share_text(entry[share])})"

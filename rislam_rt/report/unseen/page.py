@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
+from rislam_rt.input_messages import share_text
 from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.report.markdown import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
@@ -135,9 +136,9 @@ def _share(name: str, between: bool = True) -> Any:
     def show(entry: Mapping[str, Any]) -> str:
         if entry[name] is None:
             return NOTHING
-        text = f"{entry[name]:.0%}"
+        text = share_text(entry[name])
         if between:
-            text += f" ({entry[f'{name}_low']:.0%} to {entry[f'{name}_high']:.0%})"
+            text += f" ({share_text(entry[f'{name}_low'])} to {share_text(entry[f'{name}_high'])})"
         return f"{text} of {entry[f'{name}_of']}" if between else text
 
     return show
