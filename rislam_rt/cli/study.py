@@ -35,7 +35,7 @@ from rislam_rt.studies.classifier.sets import gather_sets
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import ALL, train_and_score
 from rislam_rt.studies.fig4a import check_fig4a, run_fig4a
-from rislam_rt.studies.spec import study_record
+from rislam_rt.studies.spec import distinct_scenes, study_record
 from rislam_rt.studies.swept import build_sweep
 from rislam_rt.studies.swept.sweep import swept_record
 from rislam_rt.studies.unseen import build_unseen, count_tests
@@ -55,7 +55,7 @@ def run_compare_channels(spec: CompareSpec, given: StudyOptions) -> None:
     _refuse_scene(given, "compare_channels", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
     opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
-    scenes = [one.scene for one in opened]
+    scenes = distinct_scenes([one.scene for one in opened])
     record = study_record(spec, scenes)
     files = (f"{COMPARISON}.md", f"{COMPARISON}.json", *([CERTIFICATE] if given.page else []))
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
@@ -174,7 +174,8 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     """For `rislam-rt run` of a study: train and score the classifier, and write weights, page, data and figures."""
     _refuse_scene(given, "train_classifier", "names its rooms; set 'rooms'")
     radio = build_radio(spec.radio)
-    scenes = [open_scene(room_beside(given.pipeline.parent, room.scene), radio).scene for room in spec.rooms]
+    opened = [open_scene(room_beside(given.pipeline.parent, room.scene), radio) for room in spec.rooms]
+    scenes = distinct_scenes([one.scene for one in opened])
     record = study_record(spec, scenes)
     files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *(PICTURES if given.page else ()))
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)

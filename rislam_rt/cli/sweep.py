@@ -47,13 +47,13 @@ def command(
 
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.report.terminal_tables import print_sweep
-    from rislam_rt.studies.pipeline_sweep import load_section, score_rows, slam_sweep
+    from rislam_rt.studies.pipeline_sweep import default_folder, load_section, score_rows, slam_sweep
     from rislam_rt.sweeps import SweepOptions
 
     sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
     limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
     effort = SweepOptions(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
-    target = out or Path("sweeps") / f"{sweep.name}-{Path(sweep.base['scene']).name}"
+    target = out or default_folder(Path("sweeps"), sweep.name, str(sweep.base["scene"]))
     try:
         report = _run(sweep, target, effort)
     except KeyboardInterrupt:

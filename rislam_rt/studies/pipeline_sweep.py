@@ -19,10 +19,12 @@ from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.specification.section import Positive, Section
+from rislam_rt.pipeline.store.identity import short_name
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import beside_of, room_beside
+from rislam_rt.storage.checksums import checksum, read_sealed
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.sweeps.store import DONE, MISSING, Row, csv_bytes, rows_by_point
+from rislam_rt.sweeps.store import DONE, MISSING, SWEEP_FILE, Row, csv_bytes, rows_by_point
 from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
 
 FUNCTION = f"{__name__}:run_cell"
@@ -135,6 +137,21 @@ def slam_sweep(
         spec.seed, tuple(section.paired if section.paired is not None else found),
         {"beside": os.path.abspath(path.parent)}, _depends(path, tuple(found)), spec.name,
     )  # fmt: skip
+
+
+def default_folder(sweeps: Path, name: str, scene: str) -> Path:
+    """Folder of a pipeline's sweep within `sweeps`, `<name>-<scene>`, or, where that holds the sweep of another scene
+    of the same name, `<name>-<scene>-<hash of the scene's path>`.
+
+    Raises
+    ------
+    ResultError
+        The folder's `sweep.json` was changed since it was written.
+    """
+    folder = sweeps / f"{name}-{Path(scene).name}"
+    if not (folder / SWEEP_FILE).is_file() or read_sealed(folder / SWEEP_FILE)["base"].get("scene") == scene:
+        return folder
+    return sweeps / short_name(folder.name, checksum(scene))
 
 
 def typed_axis(axis: Axis) -> Axis:

@@ -1,5 +1,7 @@
 """Specification of a study: settings of the pipeline files of kinds `compare_channels`, `fig4a` and `claims`."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
@@ -106,10 +108,22 @@ class ClaimsSpec(NamedSpec):
     """Folder of `fig4a.json`, `fig4b.json` and `fig4c.json`, relative to the pipeline file."""
 
 
+def distinct_scenes(scenes: Sequence[Scene]) -> list[Scene]:
+    """Scenes of a study under different names: a copy that has the name of an earlier one is called `hall (2)`."""
+    taken: set[str] = set()
+    found = []
+    for scene in scenes:
+        names = (scene.name, *(f"{scene.name} ({number})" for number in range(2, len(scenes) + 2)))
+        name = next(name for name in names if name not in taken)
+        taken.add(name)
+        found.append(scene if name == scene.name else replace(scene, name=name))
+    return found
+
+
 def study_record(spec: Any, scenes: list[Scene], **more: Any) -> dict[str, Any]:
     """Record for JSON of what is needed to repeat a study: configuration, seed, versions, hashes of scenes, `more`."""
+    hashes = {scene.name: {"sha256": scene.digest} for scene in distinct_scenes(scenes)}
     return {
-        "kind": spec.kind, "name": spec.name, "seed": spec.seed,
-        "scenes": {scene.name: {"sha256": scene.digest} for scene in scenes}, "versions": library_versions(),
+        "kind": spec.kind, "name": spec.name, "seed": spec.seed, "scenes": hashes, "versions": library_versions(),
         "config": spec.model_dump(mode="json"), **more,
     }  # fmt: skip

@@ -1,6 +1,8 @@
 """`rislam-rt sweep`: exit codes, what it writes, one line for every failure."""
 
 import json
+import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -40,6 +42,25 @@ def test_estimate_then_sweep_then_nothing_left(sweep, tmp_path):
     code, _, err = sweep(*words)
     assert (code, "nothing left to do" in err) == (0, False)
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_scenes_of_one_name_get_a_folder_each(sweep, tmp_path):
+    """A copy with darker walls, in another place: the table of the first stays as it is."""
+    for place, reflection in (("a", "0.85"), ("b", "0.3")):
+        shutil.copytree(ROOT / "scenes" / "paper_room", tmp_path / place / "hall")
+        file = tmp_path / place / "hall" / "scene.toml"
+        file.write_text(file.read_text().replace("reflection = 0.85", f"reflection = {reflection}"))
+    tables = {}
+    for place in ("a", "b", "a", "b"):
+        code, out, _ = sweep(PIPELINE, *TINY, "--scene", f"{place}/hall", "--repeat", "1", "--jobs", "1")
+        assert code == 0
+        folder = tmp_path / out.rpartition("sweep folder: ")[2].strip()
+        assert tables.setdefault(place, (folder, (folder / "table.csv").read_bytes())) == (
+            folder, (folder / "table.csv").read_bytes(),
+        )  # fmt: skip
+    assert tables["a"][0] == tmp_path / "sweeps" / "trace_then_slam-hall"
+    assert re.fullmatch("trace_then_slam-hall-[0-9a-f]{8}", tables["b"][0].name)
+    assert all(len(list((folder / "cells").iterdir())) == 1 for folder, _ in tables.values())
 
 
 def test_a_failed_run_is_told_and_exit_1(sweep, tmp_path):

@@ -172,6 +172,14 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     assert entry["ghost_walls"] == 2.0
 
 
+def test_rooms_of_one_name_are_told_apart(tmp_path):
+    points = [{"scene": f"{place}/hall"} for place in ("../a", "../b")]
+    spec = RoomsSpec(kind="rooms", name="rooms", repetitions=6, scenes=[p["scene"] for p in points])
+    page = write_swept(rows(points, lambda p, f: 0.02 * f), spec, RECORD, tmp_path).read_text()
+    assert "| a/hall | optimized |" in page
+    assert "| b/hall | optimized |" in page
+
+
 def test_rooms_under_several_settings_have_a_line_each(tmp_path):
     points = [{"variant": name, "scene": "../scenes/office"} for name in ("paper", "use_vt")]
     variants = [{"name": "paper"}, {"name": "use_vt", "set": {"slam.use_vt": True}}]

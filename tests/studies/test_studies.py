@@ -3,6 +3,7 @@
 import csv
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from rislam_rt.storage.files import MARK
 from rislam_rt.studies import CompareSpec, Fig4aSpec, load_any
 from rislam_rt.studies.channel_validation import run_comparison
 from rislam_rt.studies.fig4a import longer_side, run_fig4a, sphere_gain, walk_to_panel
+from rislam_rt.studies.spec import distinct_scenes, study_record
 
 ROOT = Path(__file__).parents[2]
 FIG4A, COMPARE, SLAM = (ROOT / "pipelines" / f"{n}.toml" for n in ("fig4a", "compare_channels", "trace_then_slam"))
@@ -201,6 +203,16 @@ def test_compare_writes_the_page_of_its_functions(run, tmp_path):
     assert [row["scene"] for row in content["rooms"]] == ["empty_box"] * 2 + ["l_room"] * 2
     assert set(content["scenes"]) == {"empty_box", "l_room"}
     assert (tmp_path / "docs" / "figures" / "path_certificate.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_every_room_of_a_study_is_in_its_record_by_a_name_of_its_own():
+    """Copies have one name; the record is what the folder's name is made of."""
+    room = load_scene(ROOT / "scenes" / "empty_box")
+    copies = [replace(room, digest=letter) for letter in "abc"]
+    names = ["empty_box", "empty_box (2)", "empty_box (3)"]
+    assert [scene.name for scene in distinct_scenes(copies)] == names
+    record = study_record(load_any(COMPARE), copies)
+    assert record["scenes"] == {name: {"sha256": letter} for name, letter in zip(names, "abc", strict=True)}
 
 
 def test_an_unexplained_path_is_exit_1_and_still_written(run, tmp_path, monkeypatch):

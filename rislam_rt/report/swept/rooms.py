@@ -1,7 +1,6 @@
 """Table, figure and page of the study in many rooms: errors of agent, landmarks and walls, and which aims are met."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from rislam_rt.report.markdown import metres, metres_between, paragraph, picture
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.shipped import short_names
 from rislam_rt.studies.swept import Group, RoomsSpec
 
 TITLE = "All rooms"
@@ -32,8 +32,9 @@ def rooms_content(groups: Sequence[Group], spec: RoomsSpec) -> dict[str, Any]:
     """Scores of the study of the shipped rooms as plain data: an entry a room, variant and scheme, and missed aims."""
     entries = []
     usual = groups[0].point.get("variant", "") if groups else ""
+    rooms = short_names(str(group.point["scene"]) for group in groups)
     for group in groups:
-        room, variant = PurePosixPath(str(group.point["scene"])).name, group.point.get("variant", "")
+        room, variant = rooms[str(group.point["scene"])], group.point.get("variant", "")
         for scheme in group.schemes:
             series = scheme if variant == usual else f"{scheme}, {variant}"
             entry = scheme_entry(group, scheme)
