@@ -20,7 +20,7 @@ from rislam_rt.slam.window.horizon_detection import Elevations, above_within, el
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import poses
-from rislam_rt.slam.window.solver_limits import CERTAIN
+from rislam_rt.slam.window.solver_limits import CERTAIN, STEP
 from rislam_rt.slam.window.state import WindowState
 
 LEG = 0.04
@@ -63,7 +63,7 @@ def log_unheard(
     wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()
     present = np.zeros(length.shape, dtype=np.bool_)
     present[wall, slot[heard]] = True
-    rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length
+    rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP
     low = scipy.special.ndtr((-CONSTANTS.dip - rise) / std) if anyhow else 1.0 * (rise <= -CONSTANTS.dip)
     shows = _shows(context, table, rows, length, summary)
     for number, row in enumerate(rows.tolist()):
