@@ -10,7 +10,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import RisCode
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import OTHER, UNTOLD
+from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import AXES, poses_of
 from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
@@ -66,7 +66,7 @@ def identify(
             continue
         near = rows[evidence[rows] > evidence[rows].max() - CERTAIN]
         fresh = _history(context, at, table, fits, np.append(near, rows[0]))
-        fresh.log_ris[:-1] += taken
+        fresh.log_ris[:-1] += taken + log_none_shorter(context, at, fits.place[near], fits.covariance[near])
         found.gain[near] = np.logaddexp.reduce(np.pad(fresh.log_ris[:-1], ((0, 0), (1, 0))), axis=1)
         found.gain[near] -= np.log1p(panels * CONSTANTS.panels)
         found.elsewhere[track] = fresh.log_ris[-1] + np.logaddexp(
@@ -98,6 +98,34 @@ def longer(context: WindowState, track_rows: list[Integers]) -> Floats:
         apart = np.eye(3, len(covariance), HEAD + 3 * row) - np.eye(3, len(covariance))
         variance = np.vecdot(slope, slope @ (apart @ covariance @ apart.T)) + context.log.std[last, 0] ** 2
         found[:, panel] = (context.log.seen[last, 0] - far[0] - far[1]) / np.sqrt(variance)
+    return found
+
+
+def log_none_shorter(context: WindowState, at: Integers, place: Floats, spread: Floats) -> Floats:
+    """Log probability (N, Q) that points at `place` (N, 3) [m], within covariances `spread` (N, 3, 3) [m^2], are each
+    panel, by the lengths of what was heard over the panels besides a track (rows `at` of the log): no path over a panel
+    is shorter than the direct one, but for a resolution cell in which neighbours move it. 0 where nothing else was
+    heard for `memory` cycles."""
+    log, window, scene = context.log, context.window, context.scene
+    found = np.zeros((len(place), scene.num_panels))
+    others = np.ones(len(log.cycle), dtype=np.bool_)
+    others[at] = False
+    first, cell = context.cycle - window.num_poses + 1, float(scene.sensor.cell_length[0])
+    for panel in range(scene.num_panels):
+        rows = (others & (log.side == PANEL + panel)).nonzero()[0]
+        shortest = np.full(window.num_poses, np.inf)
+        np.minimum.at(shortest, log.cycle[rows] - first, log.seen[rows, 0])
+        slots = np.isfinite(shortest).nonzero()[0]
+        if len(slots) < CONSTANTS.memory:
+            continue
+        pose = poses(window)[slots]
+        ends = poses_of(pose[:, :3], context.heading[slots] + pose[:, 3], scene.body)
+        legs = [place[:, None] - end for end in (ends.tx, ends.rx)]
+        far = [np.maximum(np.linalg.norm(leg, axis=2), 1e-3) for leg in legs]
+        slope = (legs[0] / far[0][..., None] + legs[1] / far[1][..., None]).mean(axis=1)
+        std = np.sqrt(np.vecdot(slope, (spread @ slope[..., None])[..., 0]) + np.median(log.std[rows, 0]) ** 2)
+        margin = np.median(shortest[slots] - far[0] - far[1], axis=1) + cell
+        found[:, panel] = scipy.special.log_ndtr(margin / std)
     return found
 
 

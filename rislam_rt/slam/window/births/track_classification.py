@@ -135,11 +135,11 @@ def _weigh(
     if scene.use_vt:
         right = held.log_odds + log_possible(table, held.place, held.covariance, summary, known)
         free = log_possible(table, fits.place, fits.covariance, summary, known)
+        likely = evidence + np.logaddexp(right, free)
+        heard = context, table, track_rows, owner, likely
+        right += log_unheard(*heard, held.place, held.covariance, summary, anyhow=False)
+        free += log_unheard(*heard, fits.place, fits.covariance, summary, anyhow=True)
         evidence += np.logaddexp(right, free) - np.logaddexp(held.log_odds, 0.0)
-        upright = held.log_odds > 0.0
-        place = np.where(upright[:, None], held.place, fits.place)
-        spread = np.where(upright[:, None, None], held.covariance, fits.covariance)
-        evidence += log_unheard(context, table, track_rows, owner, evidence, place, spread, summary)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     own = table._replace(trials=table.trials._replace(track=owner[track]))
     return own, fits, evidence, summary.mean[0][track, 0]

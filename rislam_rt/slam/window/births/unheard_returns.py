@@ -4,6 +4,7 @@ heard over a known one, or one of two unknown walls'."""
 import math
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
@@ -19,7 +20,7 @@ from rislam_rt.slam.window.horizon_detection import Elevations, above_within, el
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import poses
-from rislam_rt.slam.window.solver_limits import CERTAIN
+from rislam_rt.slam.window.solver_limits import CERTAIN, STEP
 from rislam_rt.slam.window.state import WindowState
 
 LEG = 0.04
@@ -29,10 +30,13 @@ line."""
 
 def log_unheard(
     context: WindowState, table: Hypotheses, track_rows: list[Integers], owner: Integers, evidence: Floats,
-    place: Floats, spread: Floats, summary: TrackSummary,
+    place: Floats, spread: Floats, summary: TrackSummary, *, anyhow: bool,
 ) -> Floats:  # fmt: skip
     """Log probability (H,) that the single-bounce returns of new walls at `place` (H, 3) [m], within covariances
     `spread` (H, 3, 3) [m^2], are detected no oftener than they are; 0 for hypotheses not over a known wall.
+
+    The return of a wall that stands `anyhow`, not upright or level, may as well arrive below the horizon, in all cycles
+    or in none, as far as its place is uncertain.
 
     `track_rows` are the tracks' rows of the log, `owner` the track of each row of the summary, `evidence` (H,) without
     this.
@@ -59,13 +63,16 @@ def log_unheard(
     wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()
     present = np.zeros(length.shape, dtype=np.bool_)
     present[wall, slot[heard]] = True
-    shows = _shows(context, table, rows, length, summary) * (out[..., 2] > -CONSTANTS.dip * length)
-    rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length
+    rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP
+    low = scipy.special.ndtr((-CONSTANTS.dip - rise) / std) if anyhow else 1.0 * (rise <= -CONSTANTS.dip)
+    shows = _shows(context, table, rows, length, summary)
     for number, row in enumerate(rows.tolist()):
         shows[number] *= _above(context, elevations(rise[number], std[number], ray[number, :, :2]))
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
-        found[row] = log_silence(shows[number, span], present[number, span])
+        hidden = float(low[number, span].mean())
+        silent = log_silence(shows[number, span], present[number, span])
+        found[row] = scipy.special.logsumexp([0.0, silent], b=[hidden, 1.0 - hidden])
     return found
 
 

@@ -1,10 +1,19 @@
 """New walls that are heard over a known one: which of a pair of mirror images can be, and what silence tells."""
 
+from dataclasses import replace
 from itertools import pairwise, product
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
+from rislam_rt import slam
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
+from rislam_rt.model import RadioConfig, SensorModel
+from rislam_rt.scene import load_scene
+from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import reflect
 from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL, WALL_KNOWN
@@ -14,6 +23,7 @@ from rislam_rt.slam.window.births.path_feasibility import bounces, log_possible
 from rislam_rt.slam.window.births.unheard_returns import log_silence
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 
+ROOMS = Path(__file__).parents[4] / "scenes"
 MIDDLE = np.array([1.0, -0.5, 0.8])
 BASELINE = np.array([0.05, 0.01, 0.0])
 TX, RX = MIDDLE + BASELINE, MIDDLE - BASELINE
@@ -97,3 +107,20 @@ def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other():
     assert held.log_odds[2] > CONSTANTS.log_born > held.log_odds[1]
     alone = log_upright(SimpleNamespace(trials=trials), fits, summary, known, empty_table(), False)
     assert alone.gain[0] == 0.0
+
+
+def test_a_wall_that_leans_out_is_found_by_what_comes_down_from_the_ceiling() -> None:
+    """`wall_y1` leans out by 3.4 degrees: alone it throws its return below the horizon, where nothing is heard."""
+    scene, radio = load_scene(ROOMS / "tilted_room"), with_reference_snr(RadioConfig(), 13.0)
+    walk, config = scene.agent[100:130], SlamConfig(filter="window", use_vt=True)
+    paths = ImageSourceChannel(replace(scene, ris=None), radio, 2).paths(walk)
+    rng = np.random.default_rng(2)
+    start = StartPrior(walk.position[0], walk.velocity[0], float(walk.heading[0]))
+    state = slam.init(start, walk.body, None, SensorModel(radio), config, rng=rng)
+    for cycle, heading in enumerate(walk.heading.tolist()):
+        heard, _ = measure(paths.of_cycle(cycle), 0, heading, radio, ReceiverConfig(), rng=rng)
+        state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, heading, config, rng=rng)
+    found, true = slam.estimate(state, config).map.wall_normal, build_walls(scene)
+    angle = np.degrees(np.arccos(np.clip(abs(found @ true.normal.T), 0.0, 1.0)))
+    assert angle[:, true.names.index("wall_y1")].min() < 2.0
+    assert angle.min(axis=1).max() < 10.0

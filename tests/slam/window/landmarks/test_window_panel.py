@@ -24,14 +24,14 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import TX as MOVING
 from rislam_rt.slam.predicted_returns import poses_of
 from rislam_rt.slam.window.births.births import _without_rival
-from rislam_rt.slam.window.births.point_identification import longer
+from rislam_rt.slam.window.births.point_identification import log_none_shorter, longer
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.window_features import add_feature
-from rislam_rt.slam.window.smoother.window_gaussian import solve
+from rislam_rt.slam.window.smoother.window_gaussian import extend, solve
 from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
@@ -263,3 +263,28 @@ def test_a_track_is_longer_than_the_direct_path_over_a_panel_by_its_deviations(w
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-3, atol=1e-6)
     none = longer(state._replace(log=log, landmarks=empty_table()), [np.array([0])])
     assert np.isposinf(none).all()
+
+
+def test_a_panel_is_not_where_what_is_heard_over_it_would_be_too_short(walk: Walk) -> None:
+    state = begun(walk, np.random.default_rng(4))
+    ends = poses_of(walk.motion.position[:1], state.heading[:1], walk.motion.body)
+    center, cycles = walk.scene.ris.center, 6
+    far = center + 0.5 * (center - ends.rx[0])
+    long = [sum(np.linalg.norm(place - end[0]) for end in (ends.tx, ends.rx)) for place in (center, far)]
+    window = state.window
+    for _ in range(cycles - 1):  # an agent that stands
+        window = extend(window, 0.1, np.full(3, 1e8))
+    state = state._replace(window=window, heading=np.repeat(state.heading, cycles), cycle=cycles - 1)
+    rows = np.arange(2 * cycles)
+    log = empty_log()._replace(
+        cycle=rows // 2, seen=np.where(rows % 2, *long)[:, None] * np.eye(3)[0], std=np.full((2 * cycles, 3), 0.01),
+        side=np.full(2 * cycles, PANEL),
+    )  # fmt: skip
+    state, places, spread = state._replace(log=log), np.stack([center, far]), np.tile(1e-4 * np.eye(3), (2, 1, 1))
+    # the longer path is no direct one, as the shorter runs over the panel too
+    near, beyond = log_none_shorter(state, rows[rows % 2 == 0], places, spread)[:, 0]
+    assert near > -1e-3
+    assert beyond < -CERTAIN
+    # a track does not speak against itself, nor what runs over no panel
+    assert not log_none_shorter(state, rows, places, spread).any()
+    assert not log_none_shorter(state._replace(log=log._replace(side=np.full(len(rows), OTHER))), rows[:1], places, spread).any()
