@@ -48,13 +48,16 @@ def beside_of(folder: Path, value: Any, key: str) -> Any:
     """What a pipeline file in a folder calls what a setting of the command line names, as seen from the working folder:
     shipped scenes and scene folders under the keys `scene` and `scenes`, the folder `results`; other values stay.
 
-    The name of a shipped scene stays as well, where no folder has it: a pipeline file may name it, too.
+    The name of a shipped scene stays as well, where no folder has it: a pipeline file may name it, too. So does a
+    path that is there as seen from the file alone, as one copied from it.
     """
     if isinstance(value, list):
         return [beside_of(folder, item, key) for item in value]
     if isinstance(value, dict):
         return {name: beside_of(folder, item, name) for name, item in value.items()}
     if key not in ("scene", "scenes", "results") or not isinstance(value, str) or os.path.isabs(value):
+        return value
+    if "/" in value and not Path(value).exists() and (folder / value).exists():
         return value
     built_in = None if Path(value).exists() or key == "results" else shipped_rooms().get(value)
     if built_in is None:

@@ -86,6 +86,8 @@ def test_a_scene_of_the_command_line_is_as_seen_from_the_working_folder(
     shutil.copytree(here / "mine", beside / "office")  # beside the file, which the command line does not mean
     assert found(str(load_spec(beside / "trace_then_slam.toml", ["scene=office"]).scene)) == ROOT / "scenes" / "office"
     monkeypatch.chdir(tmp_path)
+    copied = load_spec(beside / "trace_then_slam.toml", ["scene=../here/mine"]).scene  # a path copied from the file
+    assert found(str(copied)) == here / "mine"
     with pytest.raises(SceneError, match="no such scene file"):
         build_cells(slam_sweep(beside / "trace_then_slam.toml", few, ["scene=mine"]))
 
