@@ -64,15 +64,17 @@ def log_unheard(
     present = np.zeros(length.shape, dtype=np.bool_)
     present[wall, slot[heard]] = True
     rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP
-    low = scipy.special.ndtr((-CONSTANTS.dip - rise) / std) if anyhow else 1.0 * (rise <= -CONSTANTS.dip)
-    shows = _shows(context, table, rows, length, summary)
+    shows, deep = _shows(context, table, rows, length, summary), (-CONSTANTS.dip - rise) / std
+    if not anyhow:
+        shows *= deep < 0.0
     for number, row in enumerate(rows.tolist()):
         shows[number] *= _above(context, elevations(rise[number], std[number], ray[number, :, :2]))
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
-        hidden = float(low[number, span].mean())
-        silent = log_silence(shows[number, span], present[number, span])
-        found[row] = scipy.special.logsumexp([0.0, silent], b=[hidden, 1.0 - hidden])
+        found[row] = log_silence(shows[number, span], present[number, span])
+        if anyhow:
+            low = deep[number, span].mean()
+            found[row] = np.logaddexp(scipy.special.log_ndtr(low), scipy.special.log_ndtr(-low) + found[row])
     return found
 
 
