@@ -215,7 +215,7 @@ def _aligned(values: NDArray[Any], dtype: type) -> NDArray[Any]:
     size = len(values) * np.dtype(dtype).itemsize
     room = np.empty(size + ALIGNMENT, dtype=np.uint8)
     begin = -room.ctypes.data % ALIGNMENT
-    copy = room[begin : begin + size].view(dtype)
+    copy: NDArray[Any] = room[begin : begin + size].view(dtype)
     copy[:] = values
     return copy
 
