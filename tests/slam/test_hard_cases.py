@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-SAMPLE, QUICK = 40, 25
+SAMPLE, QUICK = 40, 15
 TWICE = (0,)
 """Quick ones that another test looks at as well: with nothing wrong."""
 
