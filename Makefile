@@ -11,6 +11,7 @@
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps
 
 .PHONY: demo test slow check docs newest interop lock clean
 .DELETE_ON_ERROR:
@@ -39,7 +40,8 @@ docs: $(READY)
 
 # Everything is pinned with hashes, the build back end too, so that no step resolves anything by itself: pip need not ask
 # what depends on what (3 s of 45).
-# Two modules of three are never used: compiled are those that are, when they are first.
+# Two modules of three are never used: compiled are those that are, when they are first. Two processes install half of
+# the packages each, once pip itself is what it will stay.
 $(READY): requirements.lock pyproject.toml
 	@python=''; \
 	for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
@@ -52,8 +54,10 @@ $(READY): requirements.lock pyproject.toml
 	fi; \
 	echo "building $(VENV) with $$($$python --version)"; \
 	$$python -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --no-deps --require-hashes -r requirements.lock
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@awk -v to=$(VENV)/lock. '/^[^ #]/ {turn = 1 - turn; part = /^pip==/ ? "pip" : turn} {print > (to part)}' requirements.lock
+	@$(INSTALL) --no-compile --require-hashes -r $(VENV)/lock.pip
+	@printf '0\n1\n' | xargs -P 2 -I N $(INSTALL) --no-compile --require-hashes -r $(VENV)/lock.N
+	@$(INSTALL) --no-build-isolation -e .
 	@touch $@
 
 newest: $(READY)

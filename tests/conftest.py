@@ -2,6 +2,29 @@
 
 import gc
 
+import pytest
+
+
+def _is_whole(config: pytest.Config) -> bool:
+    """Whether all tests are asked for, in no order of the caller's."""
+    return config.args_source is config.ArgsSource.TESTPATHS
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """The second process loads the tests from the end: what is not compiled yet, two need not compile twice."""
+    if _is_whole(config) and getattr(config, "workerinput", {}).get("workerid") == "gw1":
+        tests = config.rootpath / "tests"
+        config.args = [
+            str(tests / top) for top in sorted({p.relative_to(tests).parts[0] for p in tests.rglob("test_*.py")})
+        ]
+        config.args.reverse()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Every process has them in the same order."""
+    if _is_whole(config):
+        items.sort(key=lambda item: item.path)
+
 
 def pytest_collection_finish() -> None:
     """What is loaded by now stays to the end: the collector of garbage is not to go through it again and again."""

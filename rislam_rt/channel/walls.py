@@ -1,6 +1,7 @@
 """Walls of a scene: the planes of its reflectors, numbered in the order of the scene file."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -8,9 +9,9 @@ from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import stack_walls, tracer_gap
-from rislam_rt.geometry.plane_segmentation import planar_regions
+from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.planes import signed_distance
-from rislam_rt.model import Material, RisPanel, Scene
+from rislam_rt.model import Material, Reflector, RisPanel, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +71,7 @@ def build_walls(scene: Scene) -> Walls:
     Walls that lie on each other share one plane, that of the largest, into which the others are moved. A panel's host
     wall is the plane of the reflector named `host` that lies nearest to the panel's centre.
     """
-    parts = [planar_regions(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for reflector in scene.reflectors]
+    parts = [_planes(reflector) for reflector in scene.reflectors]
     counts = [len(part.offset) for part in parts]
     first = np.cumsum([0, *counts])
     triangles = np.concatenate([np.zeros((0, 3, 3)), *(r.triangles for r in scene.reflectors)])
@@ -95,6 +96,12 @@ def build_walls(scene: Scene) -> Walls:
         tuple(_host(panel, scene, np.repeat(np.arange(len(counts)), counts), normal, offset) for panel in scene.panels),
         build_occluders(scene),
     )
+
+
+@lru_cache(maxsize=256)
+def _planes(reflector: Reflector) -> PlanarRegions:
+    """Planes of a reflector, each a wall; found once for all scenes that share it, which differ in motion or panel."""
+    return planar_regions(reflector.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET)
 
 
 def _names(reflector: str, count: int) -> list[str]:

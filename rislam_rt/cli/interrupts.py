@@ -4,7 +4,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Event, Timer
+from threading import Event, Timer, main_thread
 from types import FrameType
 
 EXIT_CODE = 130
@@ -34,7 +34,7 @@ def interruptible() -> Iterator[list[int]]:
 
     def repeat() -> None:
         if at_work.is_set():
-            signal.raise_signal(signal.SIGTERM)
+            signal.pthread_kill(main_thread().ident or 0, signal.SIGTERM)  # which may be asleep: to it, not to this one
 
     def dropped(what: "sys.UnraisableHookArgs") -> None:
         if isinstance(what.exc_value, KeyboardInterrupt):

@@ -153,18 +153,19 @@ def test_walls_are_walls_of_the_room(clear: tuple[Heard, Course]) -> None:
 
 def test_same_seed_same_bits(normal: tuple[Heard, Course]) -> None:
     heard, course = normal
-    again = go(heard, cycles=25)
+    again = go(heard, cycles=16)
     for before, after in zip(course.estimates, again.estimates, strict=False):
         np.testing.assert_array_equal(after.position, before.position)
         np.testing.assert_array_equal(after.covariance, before.covariance)
         np.testing.assert_array_equal(after.map.position, before.map.position)
+    assert len(again.estimates[-1].map.position) > 0
 
 
 def test_order_of_measurements_does_not_matter(normal: tuple[Heard, Course]) -> None:
     """Not to the last bit: not even whose turn it is to be looked at may hang on it. Labels go along."""
     heard, course = normal
     rng = np.random.default_rng(9)
-    cycles = 30
+    cycles = 20
     orders = [rng.permutation(len(m)) for m in heard.measurements]
     names = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std", "from_panel")
     mixed = [
@@ -178,6 +179,7 @@ def test_order_of_measurements_does_not_matter(normal: tuple[Heard, Course]) -> 
         np.testing.assert_array_equal(after.covariance, before.covariance)
         np.testing.assert_array_equal(after.map.position, before.map.position)
         np.testing.assert_array_equal(other.infos[cycle].landmark, course.infos[cycle].landmark[orders[cycle]])
+    assert len(other.estimates[-1].map.position) > 0
 
 
 def test_labels_are_idents_of_the_map(clear: tuple[Heard, Course]) -> None:

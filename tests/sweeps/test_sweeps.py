@@ -218,7 +218,7 @@ def test_a_folder_with_another_sweep_json_is_refused(text, tmp_path):
 def test_trouble_is_recorded_and_the_rest_goes_on(tmp_path):
     kinds = ("good", "abort", "orphan", "segfault", "leave", "exit", "hang", "raise", "object", "list", "names", "fine")
     sweep = Sweep("sweep_cells:misbehave", (Axis("kind", kinds),))
-    report = run_sweep(sweep, tmp_path, SweepOptions(jobs=2, time_limit=3.0))
+    report = run_sweep(sweep, tmp_path, SweepOptions(jobs=2, time_limit=1.5))
     found = {row.cell.point["kind"]: (row.state, row.message) for row in report.rows}
     assert found == {
         "good": ("done", ""),
@@ -227,7 +227,7 @@ def test_trouble_is_recorded_and_the_rest_goes_on(tmp_path):
         "segfault": ("died", "its process was killed by SIGSEGV"),
         "leave": ("died", "its process ended with exit code 0"),
         "exit": ("raised", "SystemExit: gone"),
-        "hang": ("hung", "not done after 3 s, its time limit"),
+        "hang": ("hung", "not done after 1.5 s, its time limit"),
         "raise": ("raised", "ValueError: no \udcff \u00e9"),
         "object": ("raised", "the cell returned x = object; return numbers, text, lists or mappings"),
         "list": ("raised", "the cell returned list; return a mapping of names to values"),
@@ -322,7 +322,7 @@ def tell_of(folder):
 
 def test_killed_again_and_again_it_ends_with_the_same_bytes(tmp_path):
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    run_sweep(sweep_cells.slow_sweep(), whole)
+    run_sweep(sweep_cells.slow_sweep(), whole, SweepOptions(jobs=2))
     rng = np.random.default_rng(3)
     for _ in range(3):
         with start(killed, 2) as process:

@@ -19,7 +19,7 @@ from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, cross
 from rislam_rt.channel.traced.leg_query import LegEndpoints
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
 from rislam_rt.channel.traced.radio_materials import ConstantReflection
-from rislam_rt.channel.traced.tracer_scene import TracerScene
+from rislam_rt.channel.traced.tracer_scene import TracerScene, as_floats
 from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
@@ -81,7 +81,7 @@ def incidence_jones(material: Any, cosine: Floats) -> Complexes:
     basis is s = -z.
     """
     count = len(cosine)
-    along, up = (mi.Float(part.astype(np.float32)) for part in (cosine, np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2)))
+    along, up = map(as_floats, (cosine, np.sqrt(1.0 - np.minimum(cosine, 1.0) ** 2)))
     incident, reflected = mi.Vector3f(-along, up, 0.0), mi.Vector3f(along, up, 0.0)
     bounce = dr.zeros(mi.SurfaceInteraction3f, count)
     bounce.n = bounce.sh_frame.n = mi.Normal3f(1.0, 0.0, 0.0)
@@ -90,9 +90,13 @@ def incidence_jones(material: Any, cosine: Floats) -> Complexes:
     event = dr.full(mi.UInt, rt.InteractionType.SPECULAR, count)
     bounce.dp_du = mi.Vector3f(0.0, 0.0, dr.reinterpret_array(mi.Float, event))
     context = mi.BSDFContext(mode=mi.TransportMode.Importance, type_mask=0, component=0)
-    real = np.array(spectrum_to_matrix_4f(material.eval(context, bounce, reflected, True)), dtype=np.float64)
-    matrix = np.moveaxis(np.broadcast_to(real.reshape(4, 4, -1), (4, 4, count)), -1, 0)
-    return matrix[:, :2, :2] + 1j * matrix[:, 2:, :2]
+    real = spectrum_to_matrix_4f(material.eval(context, bounce, reflected, True))
+    dr.eval(real)
+    # read part by part: as a whole Dr.Jit would compile a kernel that reorders it, for every number of rays another
+    matrix = np.empty((count, 2, 2), dtype=np.complex128)
+    for row, column in np.ndindex(2, 2):
+        matrix[:, row, column] = np.array(real[row, column]) + 1j * np.array(real[2 + row, column])
+    return matrix
 
 
 def spherical_basis(direction: Floats) -> tuple[Floats, Floats]:
@@ -130,7 +134,7 @@ def _radiated(
         kind = antenna_pattern.PolarizedAntennaPattern(v_pattern=shape, polarization=polarization)
         theta = np.arctan2(np.hypot(direction[rows, 0], direction[rows, 1]), direction[rows, 2])
         angles = theta, _azimuth(direction[rows]) - heading[rows]
-        gains = kind.patterns[0](*(mi.Float(angle.astype(np.float32)) for angle in angles))
+        gains = kind.patterns[0](*map(as_floats, angles))
         for part, gain in enumerate(gains):
             field[rows, part] = np.array(gain.real) + 1j * np.array(gain.imag)
     return field

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import sionna.rt as rt
+from numpy.typing import NDArray
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
@@ -16,6 +18,9 @@ from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
 from rislam_rt.geometry.triangles import inside_any
+
+ALIGNMENT = 64
+"""Bytes of the longest vector of a processor; memory that begins at a multiple of it counts as aligned."""
 
 NO_OCCLUDER = -1
 """Key of `TracerScene.views` for the room with all its occluders."""
@@ -135,6 +140,8 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: 
         scene.add([*objects, *dark.values()])
     except ValueError as error:
         raise SceneError(f"material: {error}; give an ITU material that is specified at {carrier:g} Hz") from None
+    for material in radio_materials:  # in memory, not in the code of kernels: every room would compile its own
+        dr.make_opaque([value for _, value in mi.traverse(material)])
     ids = np.array([int(o.object_id) for o in objects], dtype=np.int64)
     removable = [number for number in dark if number != ALONE]  # the others are nobody's own
     views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
@@ -174,7 +181,7 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
     margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
-    offset = mi.Float((walls.offset - walls.normal @ origin).astype(np.float32))
+    offset = as_floats(walls.offset - walls.normal @ origin)
     return WallBoxes(
         mi.Vector3f(as_points(walls.normal)), offset, as_points(0.5 * (low + high)),
         mi.Vector3f(as_points(0.5 * (high - low))), margin,
@@ -183,12 +190,34 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
 
 def as_points(points: Floats) -> mi.Point3f:
     """Convert positions (N, 3) [m] for the tracer's scene to float32 points of its backend."""
-    return mi.Point3f(*(mi.Float(np.ascontiguousarray(column, dtype=np.float32)) for column in points.T))
+    return mi.Point3f(*map(as_floats, points.T))
+
+
+def as_floats(values: Floats) -> mi.Float:
+    """Convert values (N,) for the tracer's scene to float32 numbers of its backend."""
+    return mi.Float(_aligned(values, np.float32))
 
 
 def as_indices(values: Integers) -> mi.UInt:
     """Convert numbers (N,) for the tracer's scene to unsigned integers of its backend."""
-    return mi.UInt(np.ascontiguousarray(values, dtype=np.uint32))
+    return mi.UInt(_aligned(values, np.uint32))
+
+
+def as_mask(values: Booleans) -> mi.Bool:
+    """Convert flags (N,) for the tracer's scene to a mask of its backend."""
+    return mi.Bool(_aligned(values, np.bool_))
+
+
+def _aligned(values: NDArray[Any], dtype: type) -> NDArray[Any]:
+    """Copy an array (N,) for the tracer's scene to memory that begins at a multiple of `ALIGNMENT`."""
+    # Dr.Jit reads the array where it is, and compiles one kernel for aligned memory and another for any other, for each
+    # argument anew: left to chance, hardly any kernel is found in its cache again.
+    size = len(values) * np.dtype(dtype).itemsize
+    room = np.empty(size + ALIGNMENT, dtype=np.uint8)
+    begin = -room.ctypes.data % ALIGNMENT
+    copy: NDArray[Any] = room[begin : begin + size].view(dtype)
+    copy[:] = values
+    return copy
 
 
 def build_mesh(name: str, triangles: Floats) -> mi.Mesh:

@@ -21,7 +21,7 @@ from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
-from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_points
+from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_mask, as_points
 from rislam_rt.channel.traced.wall_sequences import NO_WALL, CandidateIndices, turned_round
 
 
@@ -141,7 +141,7 @@ def fill_buffer(tracer_scene: TracerScene, sequences: Integers, rows: CandidateI
     for column, (wall, point) in enumerate(zip(walls.T, np.moveaxis(tracer_scene.corner[walls], 1, 0), strict=True)):
         real = wall != NO_WALL
         event = np.where(real, rt.InteractionType.SPECULAR, rt.InteractionType.NONE)
-        at, here = dr.full(mi.UInt, column + 1, count), mi.Bool(real)
+        at, here = dr.opaque(mi.UInt, column + 1, count), as_mask(real)
         buffer.set_interaction_type(at, as_indices(event), mi.Bool(True))
         buffer.set_shape(at, as_indices(tracer_scene.shape[wall]), here)
         buffer.set_primitive(at, as_indices(tracer_scene.primitive[wall]), here)

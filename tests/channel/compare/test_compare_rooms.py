@@ -33,7 +33,7 @@ def test_no_difference_is_unexplained_and_refined_numbers_agree(name):
     assert numbers["max_angle_error_rad"] <= 1e-9
 
 
-@pytest.mark.parametrize("name", ["paper_room", "tilted_room", "large_hall"])
+@pytest.mark.parametrize("name", [pytest.param("paper_room", marks=pytest.mark.slow), "tilted_room", "large_hall"])
 def test_the_tracers_own_vertices_agree_to_float32(name):
     """Refinement repeats the image construction; the tracer's own lengths are the independent evidence."""
     scene = load_scene(SCENES / name)

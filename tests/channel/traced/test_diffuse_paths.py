@@ -18,7 +18,7 @@ def test_switches_off_add_nothing(rooms):
     assert extras.source == "traced, no analytic twin"
 
 
-@pytest.mark.parametrize("scattering", [0.4, 0.8])
+@pytest.mark.parametrize("scattering", [0.4, pytest.param(0.8, marks=pytest.mark.slow)])
 def test_scattered_power_is_the_lambertian_integral(rooms, scattering):
     """(lambda / 4 pi)^2 S^2 R^2 / pi times the integral of cos cos / (d1^2 d2^2) over a wall of 40 m."""
     side = 20.0

@@ -57,8 +57,14 @@ def test_a_ray_through_two_balls_meets_what_lies_on_it(seed):
     assert not np.array(_meets(astray, ahead, *small)).any()
 
 
-@pytest.mark.parametrize("name", ["l_room", "office", "tilted_room", "large_hall", "ball"])
-@pytest.mark.parametrize("near", [True, False])
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        *((name, False) for name in ("l_room", "office", "tilted_room", "large_hall", "ball")),
+        *(pytest.param(name, True, marks=pytest.mark.slow) for name in ("l_room", "office", "tilted_room")),
+        *((name, True) for name in ("large_hall", "ball")),
+    ],
+)
 def test_cones_lose_nothing(rooms, monkeypatch, name, near):
     scene = with_ball(rooms.paper()) if name == "ball" else load_scene(SCENES / name)
     depth = 3 if name in ("l_room", "tilted_room") else 2

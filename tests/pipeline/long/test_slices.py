@@ -28,14 +28,14 @@ BOUND = {"bound_m", "over_bound", "walls", "ghost_walls"}
 
 @pytest.fixture
 def short_slices(monkeypatch):
-    monkeypatch.setattr(slices, "SLICE", 7)
+    monkeypatch.setattr(slices, "SLICE", 4)
 
 
 @pytest.fixture(scope="module")
 def spec():
     settings = [
         "channel=image_source",
-        "cycles=16",
+        "cycles=10",
         "depth=1",
         'schemes=["random", "no_ris"]',
         "receiver.estimator=bound",
@@ -59,7 +59,7 @@ def done(room, spec, tmp_path_factory):
     """A completed run of three slices, the last of them short; nobody changes it."""
     folder = tmp_path_factory.mktemp("done") / "run"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(slices, "SLICE", 7)
+        patch.setattr(slices, "SLICE", 4)
         return lead(room, spec, folder), folder
 
 
@@ -98,12 +98,12 @@ def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
 def _cut(room):
     from rislam_rt.pipeline.run import cut_scene
 
-    return cut_scene(room, 16)
+    return cut_scene(room, 10)
 
 
 def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, short_slices, done, tmp_path):
     def stop(setup, at, total):
-        if (setup, at) == ("no_ris", 9):
+        if (setup, at) == ("no_ris", 6):
             raise KeyboardInterrupt
 
     again = tmp_path / "again"
@@ -118,7 +118,7 @@ def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, short_slices, don
 
 def test_a_stop_before_the_first_scheme_is_done_leaves_nothing(room, spec, short_slices, tmp_path):
     def stop(setup, at, total):
-        if at == 9:
+        if at == 6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -133,7 +133,7 @@ def test_it_can_be_read_again_and_a_changed_slice_is_told(short_slices, done, tm
     assert again.summary["schemes"]["random"]["rmse_m"] == pytest.approx(
         found.summary["schemes"]["random"]["rmse_m"], rel=1e-6
     )  # the room's path file holds nanometres
-    assert len(again.shown.schemes["random"].position) == 16
+    assert len(again.shown.schemes["random"].position) == 10
     file = folder / "slices" / "00002" / "scheme_random.nc"
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1

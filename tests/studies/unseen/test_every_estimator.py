@@ -86,7 +86,9 @@ def test_it_errs_no_more_than_it_says(case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    "case", [CASES[1], CASES[5], CASES[6], CASES[8], CASES[-1]], ids=lambda case: f"{case.name}-{case.room}"
+    "case",
+    [CASES[1], *(pytest.param(CASES[n], marks=pytest.mark.slow) for n in (5, 6, 8)), CASES[-1]],
+    ids=lambda case: f"{case.name}-{case.room}",
 )
 def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     scores = run(case, deaf(ESTIMATORS[SCHEMES[case.scheme].estimator]))

@@ -141,6 +141,8 @@ class DrJitEngine:
         """Resample a cloud in a Dr.Jit kernel to `size` equally weighted particles per agent particle, of mean 0,
         covariance (N, 3, 3)."""
         count = len(cloud.block)
+        # drawn anew each time: as a number in the code it would have a kernel compiled for each that was not yet drawn
+        kernel = kernel._replace(offset=self._dr.opaque(self._int, kernel.offset))
         children = self._draw(cloud, self._ancestors(cloud, size, kernel.comb), size, kernel.stride)
         grain = cloud.points.step[cloud.block]
         first, second, reach = self._mixed_moments(children, count, size, kernel)
