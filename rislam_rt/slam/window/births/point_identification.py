@@ -11,7 +11,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
-from rislam_rt.slam.predicted_returns import AXES, poses_of
+from rislam_rt.slam.predicted_returns import AXES, NONE, poses_of
 from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
@@ -103,29 +103,27 @@ def longer(context: WindowState, track_rows: list[Integers]) -> Floats:
 
 def log_none_shorter(context: WindowState, at: Integers, place: Floats, spread: Floats) -> Floats:
     """Log probability (N, Q) that points at `place` (N, 3) [m], within covariances `spread` (N, 3, 3) [m^2], are each
-    panel, by the lengths of what was heard over the panels besides a track (rows `at` of the log): no path over a panel
-    is shorter than the direct one, but for a resolution cell in which neighbours move it. 0 where nothing else was
-    heard for `memory` cycles."""
-    log, window, scene = context.log, context.window, context.scene
-    found = np.zeros((len(place), scene.num_panels))
-    others = np.ones(len(log.cycle), dtype=np.bool_)
-    others[at] = False
-    first, cell = context.cycle - window.num_poses + 1, float(scene.sensor.cell_length[0])
-    for panel in range(scene.num_panels):
-        rows = (others & (log.side == PANEL + panel)).nonzero()[0]
-        shortest = np.full(window.num_poses, np.inf)
-        np.minimum.at(shortest, log.cycle[rows] - first, log.seen[rows, 0])
-        slots = np.isfinite(shortest).nonzero()[0]
-        if len(slots) < CONSTANTS.memory:
+    panel, by what was heard straight over the point that is held for it, besides a track (rows `at` of the log): no
+    path over a panel is shorter than its direct one, but for a resolution cell in which neighbours move it. 0 where
+    none is held, or was heard for `memory` cycles."""
+    log, window, scene, held = context.log, context.window, context.scene, context.landmarks.panels
+    found, first = np.zeros((len(place), len(held))), context.cycle - window.num_poses + 1
+    others = ~np.isin(np.arange(len(log.cycle)), at)
+    for panel, point in enumerate(held):
+        direct = np.array([context.landmarks.ident[point], NONE, NONE, NONE, NONE])
+        rows = (others & (log.side == PANEL + panel) & (log.form[:, 0] == direct).all(axis=1)).nonzero()[0]
+        if point < 0 or len(rows) < CONSTANTS.memory:
             continue
+        slots = log.cycle[rows] - first
         pose = poses(window)[slots]
         ends = poses_of(pose[:, :3], context.heading[slots] + pose[:, 3], scene.body)
-        legs = [place[:, None] - end for end in (ends.tx, ends.rx)]
+        legs = [np.concatenate([window.features[[point]], place])[:, None] - end for end in (ends.tx, ends.rx)]
         far = [np.maximum(np.linalg.norm(leg, axis=2), 1e-3) for leg in legs]
-        slope = (legs[0] / far[0][..., None] + legs[1] / far[1][..., None]).mean(axis=1)
+        length = far[0] + far[1]
+        gap = length[0] + scene.sensor.nearest(log.seen[rows, 0] - length[0]) - length[1:]
+        slope = (legs[0] / far[0][..., None] + legs[1] / far[1][..., None])[1:].mean(axis=1)
         std = np.sqrt(np.vecdot(slope, (spread @ slope[..., None])[..., 0]) + np.median(log.std[rows, 0]) ** 2)
-        margin = np.median(shortest[slots] - far[0] - far[1], axis=1) + cell
-        found[:, panel] = scipy.special.log_ndtr(margin / std)
+        found[:, panel] = scipy.special.log_ndtr((np.median(gap, axis=1) + float(scene.sensor.cell_length[0])) / std)
     return found
 
 

@@ -11,7 +11,9 @@ import pytest
 from scipy.stats import rice
 
 from rislam_rt import slam
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.information import amplitude_std
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
 from rislam_rt.model import Paths, RadioConfig, RisCode, RisSpec, RisSpecs, Scene, SensorModel, SlamEstimate, Trajectory
@@ -21,14 +23,15 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
+from rislam_rt.slam.predicted_returns import NONE, poses_of
 from rislam_rt.slam.predicted_returns import TX as MOVING
-from rislam_rt.slam.predicted_returns import poses_of
 from rislam_rt.slam.window.births.births import _without_rival
 from rislam_rt.slam.window.births.point_identification import log_none_shorter, longer
 from rislam_rt.slam.window.cycle_association import return_sides
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh
-from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.measurement_log import Log, empty_log
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.window_features import add_feature
 from rislam_rt.slam.window.smoother.window_gaussian import extend, solve
@@ -265,26 +268,36 @@ def test_a_track_is_longer_than_the_direct_path_over_a_panel_by_its_deviations(w
     assert np.isposinf(none).all()
 
 
-def test_a_panel_is_not_where_what_is_heard_over_it_would_be_too_short(walk: Walk) -> None:
-    state = begun(walk, np.random.default_rng(4))
+def test_a_panel_is_not_where_what_is_heard_straight_over_it_would_be_too_short(walk: Walk) -> None:
+    state, period = begun(walk, np.random.default_rng(4)), 1e-7
     ends = poses_of(walk.motion.position[:1], state.heading[:1], walk.motion.body)
-    center, cycles = walk.scene.ris.center, 6
-    far = center + 0.5 * (center - ends.rx[0])
-    long = [sum(np.linalg.norm(place - end[0]) for end in (ends.tx, ends.rx)) for place in (center, far)]
-    window = state.window
+    center, cycles, known = walk.scene.ris.center, 6, unknown(1)._replace(log_ris=np.array([[CERTAIN]]))
+    beyond = center + 0.5 * (center - ends.rx[0])
+    long = sum(np.linalg.norm(center - end[0]) for end in (ends.tx, ends.rx))
+    window = add_feature(state.window, center, no_holds(), 0.05**-2)
     for _ in range(cycles - 1):  # an agent that stands
         window = extend(window, 0.1, np.full(3, 1e8))
-    state = state._replace(window=window, heading=np.repeat(state.heading, cycles), cycle=cycles - 1)
-    rows = np.arange(2 * cycles)
-    log = empty_log()._replace(
-        cycle=rows // 2, seen=np.where(rows % 2, *long)[:, None] * np.eye(3)[0], std=np.full((2 * cycles, 3), 0.01),
-        side=np.full(2 * cycles, PANEL),
+    state = state._replace(
+        window=window, heading=np.repeat(state.heading, cycles), cycle=cycles - 1,
+        landmarks=enter(state.landmarks, False, np.zeros(3), 9, 5.0, known),
+        scene=state.scene._replace(sensor=replace(state.scene.sensor, period=period)),
     )  # fmt: skip
-    state, places, spread = state._replace(log=log), np.stack([center, far]), np.tile(1e-4 * np.eye(3), (2, 1, 1))
-    # the longer path is no direct one, as the shorter runs over the panel too
-    near, beyond = log_none_shorter(state, rows[rows % 2 == 0], places, spread)[:, 0]
-    assert near > -1e-3
-    assert beyond < -CERTAIN
-    # a track does not speak against itself, nor what runs over no panel
-    assert not log_none_shorter(state, rows, places, spread).any()
-    assert not log_none_shorter(state._replace(log=log._replace(side=np.full(len(rows), OTHER))), rows[:1], places, spread).any()
+    log = empty_log()._replace(
+        cycle=np.arange(cycles), seen=np.tile([long, 0.0, 0.0], (cycles, 1)), std=np.full((cycles, 3), 0.01),
+        side=np.full(cycles, PANEL), form=np.tile([state.landmarks.ident[0], NONE, NONE, NONE, NONE], (cycles, 2, 1)),
+    )  # fmt: skip
+    places, spread, none = np.stack([center, beyond]), np.tile(1e-4 * np.eye(3), (2, 1, 1)), np.zeros(0, dtype=np.int64)
+
+    def found(log: Log, at: Integers = none) -> Floats:
+        return log_none_shorter(state._replace(log=log), at, places, spread)[:, 0]
+
+    assert found(log)[0] > -1e-3
+    assert found(log)[1] < -CERTAIN
+    # as heard a period of the sounding too early, it is as long
+    np.testing.assert_allclose(
+        found(log._replace(seen=log.seen - [SPEED_OF_LIGHT * period, 0.0, 0.0])), found(log), atol=1e-6
+    )
+    # a track does not speak against itself, nor what is heard over no panel, nor by another way
+    assert not found(log, np.arange(cycles)).any()
+    assert not found(log._replace(side=np.full(cycles, OTHER))).any()
+    assert not found(log._replace(form=np.full((cycles, 2, 5), UNKNOWN))).any()
