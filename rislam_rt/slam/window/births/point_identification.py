@@ -110,9 +110,11 @@ def log_none_shorter(context: WindowState, at: Integers, place: Floats, spread: 
     found, first = np.zeros((len(place), len(held))), context.cycle - window.num_poses + 1
     others = ~np.isin(np.arange(len(log.cycle)), at)
     for panel, point in enumerate(held):
+        if point < 0:
+            continue
         direct = np.array([context.landmarks.ident[point], NONE, NONE, NONE, NONE])
         rows = (others & (log.side == PANEL + panel) & (log.form[:, 0] == direct).all(axis=1)).nonzero()[0]
-        if point < 0 or len(rows) < CONSTANTS.memory:
+        if len(rows) < CONSTANTS.memory:
             continue
         slots = log.cycle[rows] - first
         pose = poses(window)[slots]

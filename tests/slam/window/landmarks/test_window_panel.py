@@ -301,3 +301,5 @@ def test_a_panel_is_not_where_what_is_heard_straight_over_it_would_be_too_short(
     assert not found(log, np.arange(cycles)).any()
     assert not found(log._replace(side=np.full(cycles, OTHER))).any()
     assert not found(log._replace(form=np.full((cycles, 2, 5), UNKNOWN))).any()
+    empty = state._replace(log=log, landmarks=empty_table())
+    assert not log_none_shorter(empty, none, places, spread).any()
