@@ -88,4 +88,4 @@ def test_sionnas_own_scenes(name):
     scene, _ = scene_of_xml(file, name)
     trip = round_trip(scene, file, poses=10)
     assert trip.passed
-    assert trip.report.matched > 20
+    assert trip.report.matched >= 2 * 10  # two paths a pose at least
