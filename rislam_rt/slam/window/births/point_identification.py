@@ -11,7 +11,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
-from rislam_rt.slam.predicted_returns import AXES, NONE, poses_of
+from rislam_rt.slam.predicted_returns import AXES, NONE, Poses, poses_of
 from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
@@ -92,9 +92,7 @@ def longer(context: WindowState, track_rows: list[Integers]) -> Floats:
     covariance = now(window)[1]
     for panel in (held >= 0).nonzero()[0]:
         row = int(held[panel])
-        legs = [window.features[row] - end for end in (ends.tx, ends.rx)]
-        far = [np.linalg.norm(leg, axis=1) for leg in legs]
-        slope = legs[0] / far[0][:, None] + legs[1] / far[1][:, None]
+        far, slope = _direct(window.features[row], ends)
         apart = np.eye(3, len(covariance), HEAD + 3 * row) - np.eye(3, len(covariance))
         variance = np.vecdot(slope, slope @ (apart @ covariance @ apart.T)) + context.log.std[last, 0] ** 2
         found[:, panel] = (context.log.seen[last, 0] - far[0] - far[1]) / np.sqrt(variance)
@@ -119,14 +117,20 @@ def log_none_shorter(context: WindowState, at: Integers, place: Floats, spread: 
         slots = log.cycle[rows] - first
         pose = poses(window)[slots]
         ends = poses_of(pose[:, :3], context.heading[slots] + pose[:, 3], scene.body)
-        legs = [np.concatenate([window.features[[point]], place])[:, None] - end for end in (ends.tx, ends.rx)]
-        far = [np.maximum(np.linalg.norm(leg, axis=2), 1e-3) for leg in legs]
-        length = far[0] + far[1]
+        far, slopes = _direct(np.concatenate([window.features[[point]], place]), ends)
+        length, slope = far[0] + far[1], slopes[1:].mean(axis=1)
         gap = length[0] + scene.sensor.nearest(log.seen[rows, 0] - length[0]) - length[1:]
-        slope = (legs[0] / far[0][..., None] + legs[1] / far[1][..., None])[1:].mean(axis=1)
         std = np.sqrt(np.vecdot(slope, (spread @ slope[..., None])[..., 0]) + np.median(log.std[rows, 0]) ** 2)
         found[:, panel] = scipy.special.log_ndtr((np.median(gap, axis=1) + float(scene.sensor.cell_length[0])) / std)
     return found
+
+
+def _direct(place: Floats, ends: Poses) -> tuple[list[Floats], Floats]:
+    """Direct paths over points to be identified at `place` (..., 3) [m], from K poses: lengths (..., K) [m] of the legs
+    to Tx and Rx, and the slopes (..., K, 3) of their sum by the place."""
+    legs = [place[..., None, :] - end for end in (ends.tx, ends.rx)]
+    far = [np.maximum(np.linalg.norm(leg, axis=-1), 1e-3) for leg in legs]
+    return far, np.asarray(legs[0] / far[0][..., None] + legs[1] / far[1][..., None])
 
 
 def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, rows: Integers) -> PanelIdentity:

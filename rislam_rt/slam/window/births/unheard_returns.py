@@ -63,6 +63,7 @@ def log_unheard(
     wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()
     present = np.zeros(length.shape, dtype=np.bool_)
     present[wall, slot[heard]] = True
+    # no elevation is known to less than `STEP`
     rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP
     shows, deep = _shows(context, table, rows, length, summary), (-CONSTANTS.dip - rise) / std
     if not anyhow:
