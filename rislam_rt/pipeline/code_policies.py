@@ -10,7 +10,7 @@ from rislam_rt.information import prior_from_covariance
 from rislam_rt.model import DataSheet, RisCode, SlamEstimate
 from rislam_rt.pipeline.assumed_model import AssumedModel
 from rislam_rt.pipeline.cycle import CodePolicy, GroundTruth
-from rislam_rt.pipeline.own_methods import is_own, own_code
+from rislam_rt.pipeline.own_methods import fresh_own, is_own, own_code
 from rislam_rt.pipeline.schemes import Scheme
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings
 
@@ -31,6 +31,7 @@ def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolic
     section, panel, settings = spec.design, told.panel, told.settings
     assert panel is not None
     last: RisCode | None = None
+    own = fresh_own(method) if is_own(method) else None
 
     def choose(
         belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
@@ -38,8 +39,8 @@ def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolic
         nonlocal last
         if method == "random":  # looks at no belief
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
-        if is_own(method):
-            return own_code(method, belief(), panel, settings.radio, rng=rng)
+        if own is not None:
+            return own_code(method, belief(), panel, settings.radio, rng=rng, designer=own)
         design = design_code(
             belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,

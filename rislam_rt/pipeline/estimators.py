@@ -8,18 +8,13 @@ import numpy as np
 
 from rislam_rt import slam
 from rislam_rt.arrays import Integers
-from rislam_rt.errors import ConfigError, expect
 from rislam_rt.information.landmark_model import Unknown
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
-from rislam_rt.pipeline.own_methods import load_own, own_method_errors
+from rislam_rt.pipeline.estimate_checks import check_estimate
+from rislam_rt.pipeline.own_methods import fresh_own, own_method_errors
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
-
-ROUNDING = 1e-6
-"""Largest ratio of a covariance's negative to its largest eigenvalue that counts as rounding in single precision."""
-FARTHEST = 1e12
-"""[m] Largest coordinate that a user's own filter may return, so that scores, which square it, stay finite."""
 
 
 class Estimator(NamedTuple):
@@ -55,23 +50,12 @@ class OwnDiagnostics(NamedTuple):
 
 
 def own_estimator(name: str) -> Estimator:
-    """Estimator made of the user's own class of that name (`docs/own_methods.md`); the poses it returns are checked.
+    """Estimator made of the user's own class of that name (`docs/own_methods.md`), of an object of its own each time.
 
-    The functions raise `ConfigError` for whatever it raises, and for a covariance or position that cannot be.
+    What it returns is checked: the functions raise `ConfigError` for whatever it raises, and for poses and maps that
+    cannot be. It uses wall returns if it says so by `use_vt = True`.
     """
-    own = load_own(name)
-
-    def checked(found: SlamEstimate, what: str) -> SlamEstimate:
-        expect(f"'{name}': {what}", found, SlamEstimate)
-        far = float(np.abs(found.position).max())
-        if far > FARTHEST:
-            raise ConfigError(f"'{name}': {what}: a position of {far:g} m returned; give one up to {FARTHEST:g} m")
-        least, *_, most = np.linalg.eigvalsh(0.5 * (found.covariance + found.covariance.T))
-        if least < -ROUNDING * max(most, 0.0):
-            raise ConfigError(
-                f"'{name}': {what}: a covariance with an eigenvalue of {least:g} returned; give none below 0"
-            )
-        return found
+    own = fresh_own(name)
 
     @own_method_errors(name)
     def init(start: StartPrior, body: Body, panel: DataSheet | None, sensor: SensorModel, config: Any,
@@ -80,11 +64,13 @@ def own_estimator(name: str) -> Estimator:
 
     @own_method_errors(name)
     def estimate(state: Any, config: Any = None) -> SlamEstimate:
-        return checked(own.estimate(state), "estimate")
+        return check_estimate(own.estimate(state), f"'{name}': estimate")
 
     @own_method_errors(name)
     def predict(state: Any, ahead: float, config: Any) -> SlamEstimate:
-        return checked(own.predict(state, ahead), "predict") if hasattr(own, "predict") else estimate(state)
+        if not hasattr(own, "predict"):
+            return estimate(state)
+        return check_estimate(own.predict(state, ahead), f"'{name}': predict")
 
     @own_method_errors(name)
     def step(
@@ -94,7 +80,14 @@ def own_estimator(name: str) -> Estimator:
         state = own.step(state, measurement, code, dt, heading, rng=rng)
         return state, OwnDiagnostics(np.full(len(measurement), -1))
 
-    return Estimator(init, predict, step, estimate, lambda settings: None, use_vt=lambda settings: False)
+    return Estimator(
+        init,
+        predict,
+        step,
+        estimate,
+        lambda settings: None,
+        use_vt=lambda settings: bool(getattr(own, "use_vt", False)),
+    )
 
 
 class Estimators(dict[str, Estimator]):

@@ -9,7 +9,7 @@ import hashlib
 import inspect
 import re
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
@@ -29,7 +29,7 @@ _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 @cache
 def load_own(name: str) -> Any:
-    """Import a user's own designer, estimator, channel or scheme by name; an estimator's class is instantiated.
+    """Import a user's own designer, estimator, channel or scheme by name; a class is returned as such.
 
     Raises
     ------
@@ -50,6 +50,19 @@ def load_own(name: str) -> Any:
         where = f" ({module.__file__})" if getattr(module, "__file__", None) else ""
         raise ConfigError(f"'{name}': module '{place}'{where} has no '{attribute}'; mend either name")
     return _made(name, getattr(module, attribute))
+
+
+def fresh_own(name: str) -> Any:
+    """A user's own designer or estimator, ready to be called; a class is instantiated each time, so that what an object
+    of it remembers of one run is not there in the next.
+
+    Raises
+    ------
+    ConfigError
+        There is nothing of that name, it cannot be imported, or the class cannot be instantiated.
+    """
+    found = load_own(name)
+    return _instance(name, found) if inspect.isclass(found) else found
 
 
 @contextmanager
@@ -94,9 +107,10 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
 
 
 def own_code(
-    name: str, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator
-) -> RisCode:
-    """Phase code that a user's own designer returns for a belief, checked.
+    name: str, belief: SlamEstimate, panel: DataSheet, radio: RadioConfig, *, rng: np.random.Generator,
+    designer: Callable[..., Any] | None = None,
+) -> RisCode:  # fmt: skip
+    """Phase code that a user's own designer returns for a belief, checked; `designer` is the object made of a class.
 
     Raises
     ------
@@ -104,7 +118,7 @@ def own_code(
         It raised, or returned something else than phase levels of the panel.
     """
     with own_method_errors(name):
-        levels = np.asarray(load_own(name)(belief, panel, radio, rng=rng))
+        levels = np.asarray((designer or fresh_own(name))(belief, panel, radio, rng=rng))
     wanted = f"give whole numbers ({panel.rows}, {panel.cols}) from 0 to {panel.levels - 1}"
     if levels.shape != (panel.rows, panel.cols) or levels.dtype.kind not in "iu":
         raise ConfigError(f"'{name}': {levels.dtype} of shape {levels.shape} returned; {wanted}")
@@ -161,7 +175,7 @@ def _entry_point(name: str) -> Any:
 
 
 def _made(name: str, found: Any) -> Any:
-    """Check a loaded method of the user's own; an estimator's class is instantiated, all else returned as it is."""
+    """Check a loaded method of the user's own, and return it."""
     if not hasattr(found, "step"):
         if hasattr(found, "init") and hasattr(found, "estimate"):
             raise ConfigError(f"'{name}': has 'init' and 'estimate' and no 'step'; a filter has all three")
@@ -171,8 +185,13 @@ def _made(name: str, found: Any) -> Any:
     lacks = [part for part in ("init", "estimate") if not hasattr(found, part)]
     if lacks:
         raise ConfigError(f"'{name}': has 'step' and no '{lacks[0]}'; a filter has init, step and estimate")
-    if not inspect.isclass(found):
-        return found
+    if inspect.isclass(found):
+        _instance(name, found)  # what cannot be made is told before anything is traced
+    return found
+
+
+def _instance(name: str, found: type) -> Any:
+    """Object of the class of a user's own filter or designer."""
     try:
         return found()
     except (Exception, SystemExit) as error:

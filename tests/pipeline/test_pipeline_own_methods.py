@@ -13,12 +13,15 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import SlamResult, empty_map, pose_estimate
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.own_methods import load_own, own_code, own_digests
+from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.studies.pipeline_sweep import slam_sweep
 from rislam_rt.sweeps import SweepOptions, run_sweep
 
 FAULTS = """
 import sys
+from rislam_rt.model import MapEstimate
 number = 3
 
 def raises(belief, panel, radio, *, rng):
@@ -65,6 +68,42 @@ class Negative(Away):
     def estimate(self, state):
         return pose_estimate(np.zeros(3), np.zeros(3), 0.0, np.diag([1.0, 1.0, -1e-3, 1.0, 1.0, 1.0]), state)
 
+class NoHeading(Away):
+    def estimate(self, state):
+        return pose_estimate(np.zeros(3), np.zeros(3), np.nan, np.eye(6), state)
+
+class Mapped(Away):
+    part = {}
+    def estimate(self, state):
+        known = dict(
+            ident=[4], position=np.zeros((1, 3)), covariance=np.eye(3)[None], parent=[-1], ris_probability=[1.0],
+            strength=[0.1], wall_normal=[[0.0, 0.0, 1.0]], wall_offset=[0.0], wall_std=[[0.1, 0.1]],
+        )
+        return pose_estimate(np.zeros(3), np.zeros(3), 0.0, np.eye(6), state, MapEstimate(**(known | self.part)))
+
+class NoSuchParent(Mapped):
+    part = {"parent": [5]}
+
+class TooSure(Mapped):
+    part = {"ris_probability": [7.0]}
+
+class LongNormal(Mapped):
+    part = {"wall_normal": [[0.0, 0.0, 2.0]]}
+
+class Unnumbered(Mapped):
+    part = {"ident": [-1]}
+
+class Counting(Away):
+    # its cycles, from its making on
+    use_vt = True
+    def __init__(self):
+        self.count = 0
+    def step(self, state, *given, **named):
+        self.count += 1
+        return state
+    def estimate(self, state):
+        return pose_estimate(np.full(3, float(self.count)), np.zeros(3), 0.0, np.eye(6), state)
+
 class NoPaths:
     def __init__(self, scene, radio, depth): ...
     def paths(self, trajectory): ...
@@ -79,8 +118,8 @@ QUICK = ["cycles=8", "channel=image_source", "depth=1", "receiver.estimator=boun
 
 @pytest.fixture
 def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The how-to's three examples in one file, where Python finds it."""
-    assert len(FILES) == 3
+    """The how-to's examples in one file, where Python finds it."""
+    assert len(FILES) == 4
     file = tmp_path / "mine.py"
     file.write_text("\n".join(FILES) + "\n\ndef bad(belief, panel, radio, *, rng):\n    return [1.5]\n" + FAULTS)
     monkeypatch.syspath_prepend(tmp_path)
@@ -123,6 +162,21 @@ def test_the_example_focuses_once_the_panel_is_known() -> None:
     phase = -2.0 * np.pi * way / radio.wavelength - code.xi
     # four levels leave each element within 45 degrees of the best phase: at least cos 45 degrees of the full sum
     assert np.abs(np.exp(1j * phase).sum()) > np.sqrt(0.5) * panel.num_elements
+
+
+@pytest.mark.usefixtures("mine")
+def test_what_an_object_remembers_of_one_run_is_not_in_the_next() -> None:
+    for _ in range(2):
+        found = run('["mine:Beams", "mine:Counting"]').schemes
+        np.testing.assert_array_equal(found["mine:Beams"].sent[:, 0, 1], np.arange(8) % 4)
+        np.testing.assert_array_equal(found["mine:Counting"].position[:, 0], np.arange(1.0, 9.0))
+
+
+@pytest.mark.usefixtures("mine")
+def test_a_filter_says_whether_it_uses_wall_returns() -> None:
+    settings = build_settings(load_spec(find_pipeline("trace_then_slam"), QUICK))
+    assert uses_wall_returns("mine:Counting", settings)
+    assert not uses_wall_returns("mine:DeadReckoning", settings)
 
 
 @pytest.mark.usefixtures("mine")
@@ -173,6 +227,11 @@ def test_the_file_is_part_of_the_identity(mine: Path) -> None:
         ('["mine:Nothing"]', "estimate: NoneType received; give a SlamEstimate"),
         ('["mine:Away"]', "estimate: a position of 1e[+]200 m"),
         ('["mine:Negative"]', "estimate: a covariance with an eigenvalue of -0.001"),
+        ('["mine:NoHeading"]', "'mine:NoHeading': estimate: a heading of nan returned"),
+        ('["mine:NoSuchParent"]', r"'mine:NoSuchParent': estimate: map: parent \[5\] returned; give rows"),
+        ('["mine:TooSure"]', r"map: ris_probability \[7.\] returned; give numbers from 0 to 1"),
+        ('["mine:LongNormal"]', "map: wall_normal .* returned; give unit vectors"),
+        ('["mine:Unnumbered"]', r"map: ident \[-1\] returned"),
     ],
 )
 def test_what_is_wrong_is_one_line(schemes: str, said: str) -> None:

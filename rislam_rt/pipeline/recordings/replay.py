@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.assumed_model import tell_settings
+from rislam_rt.pipeline.estimate_checks import check_estimate
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator, OwnDiagnostics
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
@@ -53,8 +54,10 @@ def answers_from_arrays(
     Raises
     ------
     ConfigError
-        An array is of another shape; the line names it.
+        An array is of another shape, or a covariance or map cannot be; the line names it.
     """
+    if isinstance(maps, MapEstimate):
+        raise ConfigError("maps: one MapEstimate received; give a list, of one a cycle or of the last alone")
     cycles, known = len(inputs.time), list(maps or [])
     for name, given, wanted in (
         ("position", position, (cycles, 3)), ("covariance", covariance, (cycles, 3, 3)), ("lost", lost, (cycles,)),
@@ -64,13 +67,22 @@ def answers_from_arrays(
     if len(known) > cycles or (landmark is not None and len(landmark) != cycles):
         name, count = ("maps", len(known)) if len(known) > cycles else ("landmark", len(landmark or ()))
         raise ConfigError(f"{name}: {count} received; give {cycles}, one a cycle")
+    for cycle, (own, heard) in enumerate(zip(landmark or (), inputs.measurements, strict=False)):
+        if np.shape(own) != (len(heard),):
+            raise ConfigError(
+                f"landmark: cycle {cycle}: shape {np.shape(own)} received; give ({len(heard)},), one a component"
+            )
     found = (cycles - len(known)) * [empty_map()] + known
     spread = np.zeros((cycles, 6, 6))
     if covariance is not None:
         spread[:, :3, :3] = covariance
+    known_heading = np.where(np.isnan(inputs.heading), inputs.start.heading, inputs.heading)
+    rows = zip(position, known_heading, spread, found, strict=True)
     estimates = [
-        SlamEstimate(place, np.zeros(3), float(heading), cov, np.zeros((0, 3)), inputs.body, one)
-        for place, heading, cov, one in zip(position, inputs.heading, spread, found, strict=True)
+        check_estimate(
+            SlamEstimate(place, np.zeros(3), float(heading), cov, np.zeros((0, 3)), inputs.body, one), f"cycle {cycle}"
+        )
+        for cycle, (place, heading, cov, one) in enumerate(rows)
     ]
     none = [np.full(len(m), -1) for m in inputs.measurements]
     said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
@@ -150,15 +162,21 @@ def replay(
     config
         The specification of the recorded run.
     scheme
-        Its name, which says whose estimator is run, unless `estimator` gives one.
+        Its name, which says whose estimator is run, unless `estimator` gives one; `module:Class` is one's own.
     changes
         Settings by dotted key, as `slam.filter`.
 
     Raises
     ------
     ConfigError
-        A setting is unknown, or its value unusable.
+        A setting is unknown, or its value unusable; `estimator` is none, or `rng` no generator.
     """
+    if not isinstance(estimator, Estimator | None):
+        raise ConfigError(
+            f"estimator: {type(estimator).__name__} received; give an Estimator, or for a class of your own its name "
+            "as the scheme, 'module:Class'"
+        )
+    expect("rng", rng, np.random.Generator)
     content = dict(config)
     content["nested"] = {name: value for name, value in content.get("nested", {}).items() if name not in GONE}
     for key, value in (changes or {}).items():

@@ -6,6 +6,7 @@ import numpy as np
 
 from rislam_rt import evaluate
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.errors import ConfigError
 from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
@@ -40,7 +41,16 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
     landmarks, births.
 
     None where there is nothing to score.
+
+    Raises
+    ------
+    ConfigError
+        The answers are to another number of cycles.
     """
+    if len(answers.estimates) != len(truth.position):
+        raise ConfigError(
+            f"answers: {len(answers.estimates)} estimates of {len(truth.position)} cycles received; give one a cycle"
+        )
     told = inputs.start.position - truth.position[0]
     errors = _errors(truth, answers, told)
     late = inputs.time >= SETTLED

@@ -1,5 +1,7 @@
 """One cell: what it gives does not depend on how it is asked for, and what it leaves can be replayed to the bit."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +86,20 @@ def test_plain_arrays_are_scored_like_an_estimator(tmp_path: Path) -> None:
         with pytest.raises(ConfigError) as found:
             answers_from_arrays(inputs, **({"position": told} | wrong))
         assert str(found.value) == f"{name}: {said}"
+    slanted = replace(empty_map(), wall_normal=[[0.0, 0.0, 2.0]], wall_offset=[1.0], wall_std=[[0.1, 0.1]])
+    for given, said in (
+        ({"maps": empty_map()}, "maps: one MapEstimate received"),
+        ({"maps": [slanted]}, f"cycle {cycles - 1}: map: wall_normal"),
+        ({"maps": cycles * [None]}, "cycle 0: map: NoneType received"),
+        ({"covariance": np.tile(-np.eye(3), (cycles, 1, 1))}, "cycle 0: a covariance with an eigenvalue of -1"),
+        ({"landmark": cycles * [np.zeros(0)]}, "landmark: cycle 0: shape (0,) received"),
+    ):
+        with pytest.raises(ConfigError, match=f"^{re.escape(said)}"):
+            answers_from_arrays(inputs, told, **given)
+    with pytest.raises(ConfigError, match=f"2 estimates of {cycles} cycles"):
+        score_run(truth, inputs, answers_from_arrays(inputs, told)._replace(estimates=2 * [None]))
+    with pytest.raises(ConfigError, match=r"estimator: object received; give an Estimator, or .* 'module:Class'"):
+        replay(inputs, recording.config, "no_ris", estimator=object(), rng=np.random.default_rng(0))
 
 
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path) -> None:
