@@ -102,7 +102,11 @@ def parse_point(option: str, text: str) -> "Floats":
         values = np.array([float(part) for part in text.split(",")])
     except ValueError:
         values = np.zeros(0)
-    if values.shape != (3,) or not (np.abs(values) <= FARTHEST).all():
+    if values.shape == (3,) and (np.abs(values) > FARTHEST).any():
+        raise ConfigError(
+            f"{option}: '{text[:60]}' received; give at most {FARTHEST:g}, counted from a point in the room or near it"
+        )
+    if values.shape != (3,) or not np.isfinite(values).all():
         raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
     return values
 

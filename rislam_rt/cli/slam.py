@@ -8,6 +8,7 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pipeline_file
 from rislam_rt.cli.output_files import write_json
+from rislam_rt.cli.verbosity import warn
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -58,13 +59,15 @@ def command(
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.recordings.own_measurements import localise, read_inputs, run_rng
+    from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
     from rislam_rt.pipeline.specification.radio import build_radio
 
     spec = load_spec(config, set_ or ())
     stds = (spec.start.position_std_m, spec.start.velocity_std_m_s, float(np.deg2rad(spec.start.heading_std_deg)))
     prior = None if start is None else _prior(start, velocity, stds)
     inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
+    for line in input_warnings(inputs):
+        warn(f"{measurements}: {line}")
     true = None if truth is None else _true_positions(truth, len(inputs.time))
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
@@ -172,14 +175,14 @@ def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
     position = np.array([one.position for one in answers.estimates])
     heading = np.array([one.heading for one in answers.estimates])
     head = ["time_s", "x_m", "y_m", "z_m", "std_x_m", "std_y_m", "std_z_m", "heading_rad", "components", "outcome"]
-    rows = []
-    for time, one, info, heard in zip(inputs.time, answers.estimates, answers.infos, inputs.measurements, strict=True):
+    rows, times = [], inputs.time + inputs.since
+    for time, one, info, heard in zip(times, answers.estimates, answers.infos, inputs.measurements, strict=True):
         std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
-        numbers = [time, *one.position, *std, one.heading]
-        rows.append([*(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
+        numbers = [*one.position, *std, one.heading]
+        rows.append([f"{time:.16g}", *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
     last = answers.estimates[-1].map
     fields = ("ident", "position", "covariance", "parent", "ris_probability", "strength", "wall_normal", "wall_offset")
     names = (*fields, "wall_std", *(["panel"] if last.panel is not None else []))
-    files = {"estimate.tum": tum_bytes(inputs.time, position, heading), "estimate.csv": csv_file(head, rows)}
+    files = {"estimate.tum": tum_bytes(times, position, heading), "estimate.csv": csv_file(head, rows)}
     content = plain_result({name: getattr(last, name) for name in names})
     write_all(folder, files | {"map.json": json_file(content)})

@@ -64,6 +64,8 @@ class Inputs(NamedTuple):
     """(K,) one a cycle."""
     codes: tuple[RisCode | None, ...]
     """(K,) phase code that the agent holds to be applied; None without a panel."""
+    since: float = 0.0
+    """[s] First cycle's time by the clock of a user's own file, from which `time` counts."""
 
 
 class RecordedInputs(NamedTuple):

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
-from rislam_rt.errors import ConfigError, StoreError
+from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.errors import ConfigError, RislamError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
@@ -44,8 +44,24 @@ LONGEST_DELAY = 1e-5
 """[s] Largest delay accepted, 3 km: a larger number is in another unit."""
 ROUNDING = 1e-6
 """By how much the sum of two squared direction cosines may exceed 1: the rounding of tables with six digits."""
+LARGEST_SNR_DB = 200.0
+"""[dB] Largest SNR accepted, of either sign: a larger number is no decibel."""
+LONGEST_STEP = 10.0
+"""[s] Median time between cycles from which on the times are warned of, as milliseconds given as seconds would be."""
+SHORTEST_STEP = 1e-3
+"""[s] Median time between cycles of one component each below which the times are warned of: each row has its own."""
 FINEST_STD = 1e-15
 """[s] Least standard deviation of a delay accepted, 0.3 um: a smaller number is in another unit."""
+RANGES: dict[str, tuple[float, float, str]] = {
+    "amplitude": (0.0, np.inf, "positive numbers, not decibels"),
+    "snr_db": (-LARGEST_SNR_DB, LARGEST_SNR_DB, f"decibels, {-LARGEST_SNR_DB:g} to {LARGEST_SNR_DB:g}"),
+    "delay_std_s": (0.0, LONGEST_DELAY, "positive numbers in seconds (were these nanoseconds, or metres?)"),
+    "cos_x_std": (0.0, 2.0, "positive deviations of a direction cosine, not degrees"),
+    "cos_y_std": (0.0, 2.0, "positive deviations of a direction cosine, not degrees"),
+    "amplitude_std": (0.0, np.inf, "positive numbers, not decibels"),
+}
+"""Columns of a user's table that have a range of their own: above the first number, up to the second, and what to
+give."""
 
 
 def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) -> Answers:
@@ -104,7 +120,10 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
             what = "not a readable NetCDF file" if file.exists() else "no such file"
             raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
         try:
-            return _check_inputs(dataset_to_inputs(data), str(file))
+            made = _check_inputs(dataset_to_inputs(data), str(file))
+            return made._replace(time=made.time - made.time[0], since=float(made.time[0]))
+        except RislamError as error:
+            raise ConfigError(str(error) if str(file) in str(error) else f"{file}: {error}") from None
         except (KeyError, ValueError, TypeError) as error:
             said = " ".join(str(error.args[0] if error.args else error).split())
             cause = said.partition(". Did you mean")[0][:80]
@@ -140,6 +159,7 @@ def inputs_of(
         if np.isinf(columns.get(name, 0.0)).any():
             raise ConfigError(f"{place}: {name}: infinite; give a number, or leave the field empty")
     heard = np.isfinite(columns["delay_s"])
+    _check_components(columns, heard, place)
     filled = _filled({name: column[heard] for name, column in columns.items()}, radio, place)
     probability = filled.get("panel_probability")
     measurements = []
@@ -148,7 +168,14 @@ def inputs_of(
         parts = {name: filled[name][rows] for name in PARTS}
         measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
     first = np.searchsorted(cycle, np.arange(len(cycles)))
-    heading = columns.get("heading_rad", np.zeros(len(time)))[first]
+    compass = columns.get("heading_rad", np.zeros(len(time)))
+    heading = compass[first]
+    turned = np.flatnonzero(np.abs(compass - heading[cycle]) > ROUNDING)
+    if len(turned):
+        raise ConfigError(
+            f"{place}: heading_rad: row {turned[0] + 1} of the data has another than its cycle's first row; give one "
+            "heading a cycle"
+        )
     if not np.isfinite(heading).all():
         raise ConfigError(f"{place}: heading_rad: empty in cycle {int(np.argmin(np.isfinite(heading)))}; fill it")
     if np.abs(heading).max() > 2.0 * np.pi:
@@ -160,8 +187,42 @@ def inputs_of(
     else:
         heading = np.full(len(cycles), np.nan)
     nothing = (None,) * len(cycles)
-    made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing)
+    made = Inputs(
+        start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing, float(cycles[0])
+    )
     return _check_inputs(made, place)
+
+
+def input_warnings(inputs: Inputs) -> list[str]:
+    """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, or each
+    component with a time of its own."""
+    step = float(np.median(np.diff(inputs.time))) if len(inputs.time) > 1 else 0.0
+    counts = {len(one) for one in inputs.measurements}
+    if step > LONGEST_STEP:
+        return [f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds"]
+    if counts == {1} and 0.0 < step < SHORTEST_STEP:
+        return [
+            f"time_s: every cycle holds one component, {step:g} s apart; rows of one time are one cycle: round them"
+        ]
+    return []
+
+
+def _check_components(columns: Mapping[str, Floats], heard: Booleans, place: str) -> None:
+    """Raise an error for a row of a user's measurements that has half a component, or a number out of range."""
+    last = "of the data; fill it, or leave the component out"
+    for name, column in columns.items():
+        if name in ("time_s", "heading_rad", "delay_s"):
+            continue
+        lost = np.flatnonzero(~heard & np.isfinite(column))
+        if len(lost):
+            raise ConfigError(f"{place}: delay_s: empty beside {name} in row {lost[0] + 1} {last}")
+        odd = np.flatnonzero(heard & ~np.isfinite(column))
+        if len(odd) and name != "panel_probability":
+            raise ConfigError(f"{place}: {name}: no finite number in row {odd[0] + 1} {last}")
+        least, most, wanted = RANGES.get(name, (-np.inf, np.inf, ""))
+        odd = np.flatnonzero(heard & ((column <= least) | (column > most)))
+        if len(odd):
+            raise ConfigError(f"{place}: {name}: {column[odd[0]]:g} in row {odd[0] + 1} of the data; give {wanted}")
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:
@@ -190,8 +251,11 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
                 raise ConfigError(f"{where}: {name} of {value.min():g} received; give positive, finite numbers")
         if (one.tau_std < FINEST_STD).any():
             raise ConfigError(f"{where}: tau_std of {one.tau_std.min():g} s received; give seconds")
-    if (np.diff(inputs.time) <= 0.0).any():
-        raise ConfigError(f"{place}: time: not increasing; give each cycle its own")
+        told = one.from_panel
+        if told is not None and not ((told >= 0.0) & (told <= 1.0)).all():
+            raise ConfigError(f"{where}: from_panel: not from 0 to 1; give probabilities")
+    if not np.isfinite(inputs.time).all() or (np.diff(inputs.time) <= 0.0).any():
+        raise ConfigError(f"{place}: time: not increasing, or not finite; give each cycle its own")
     return inputs
 
 

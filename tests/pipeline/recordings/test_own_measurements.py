@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 import rislam_rt
+from rislam_rt.cli.options import parse_point
 from rislam_rt.cli.slam import _new_folder, command
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import ReceiverConfig, build_sensor
 from rislam_rt.model import SensorModel
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
-from rislam_rt.pipeline.recordings.own_measurements import inputs_of, localise, read_inputs
+from rislam_rt.pipeline.recordings.inputs import inputs_to_dataset
+from rislam_rt.pipeline.recordings.own_measurements import input_warnings, inputs_of, localise, read_inputs
 from rislam_rt.pipeline.recordings.replay import replay
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
@@ -179,15 +181,17 @@ def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpe
         ("delay_s", 33.0, "delays are in seconds"),
         ("delay_s", -1e-9, "give none below 0"),
         ("cos_x", 1.7, "direction cosines from -1 to 1"),
-        ("delay_std_s", -1e-10, "tau_std of -1e-10 received"),
-        ("delay_std_s", np.inf, "tau_std: not a finite number"),
-        ("cos_y_std", 0.0, "cosines_std of 0 received"),
-        ("amplitude", -1.0, "amplitude of -1 received"),
+        ("delay_std_s", -1e-10, "delay_std_s: -1e-10 in row 1 of the data"),
+        ("delay_std_s", np.inf, "delay_std_s: no finite number in row 1 of the data"),
+        ("delay_std_s", 0.01, "delay_std_s: 0.01 in row 1 of the data; give positive numbers in seconds"),
+        ("cos_x_std", 3.0, "cos_x_std: 3 in row 1 of the data; give .* not degrees"),
+        ("cos_y_std", 0.0, "cos_y_std: 0 in row 1 of the data"),
+        ("amplitude", -1.0, "amplitude: -1 in row 1 of the data; give positive numbers, not decibels"),
         ("delay_s", 1e-9 + 1j, "complex numbers received"),
         ("cos_x", "north", "not numbers"),
         ("speed", 1.0, "unknown column"),
         ("heading_rad", 45.0, "radians, not degrees"),
-        ("amplitude_std", 0.0, "amplitude_std of 0 received"),
+        ("amplitude_std", 0.0, "amplitude_std: 0 in row 1 of the data"),
         ("delay_s", np.inf, "delay_s: infinite"),
         ("heading_rad", np.nan, "heading_rad: empty in cycle 0"),
         ("panel_probability", 7.0, "not from 0 to 1"),
@@ -306,6 +310,22 @@ def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
             "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n0,0,1e-8,0,0,0.01\nnan,0,1e-8,0,0,0.01\n",
             "time_s: row 2 of the data has no finite number; give each row its cycle's time",
         ),
+        (
+            "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n0,0,,,,\n1,0,1e-8,0,0,0.01\n1,0,,0.1,0,0.01\n",
+            "delay_s: empty beside cos_x in row 3 of the data; fill it, or leave the component out",
+        ),
+        (
+            "time_s,heading_rad,delay_s,theta_r_rad,phi_r_rad,amplitude\n0,0,,,,\n1,0,1e-8,0,0,0.01\n1,0,1e-8,,0,0.01\n",
+            "theta_r_rad: no finite number in row 3 of the data; fill it, or leave the component out",
+        ),
+        (
+            "time_s,heading_rad,delay_s,cos_x,cos_y,snr_db\n0,0,1e-8,0,0,3000\n",
+            "snr_db: 3000 in row 1 of the data; give decibels, -200 to 200",
+        ),
+        (
+            "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n1,0,1e-8,0,0,0.01\n1,0.2,1e-8,0,0,0.01\n",
+            "heading_rad: row 2 of the data has another than its cycle's first row; give one heading a cycle",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_table_is_named(tmp_path: Path, spec: PipelineSpec, text: str, said: str) -> None:
@@ -324,3 +344,68 @@ def test_a_file_of_another_kind_names_what_it_lacks(tmp_path: Path, spec: Pipeli
         read_inputs(tmp_path / "scheme.nc", None, build_radio(spec.radio))
     said = str(found.value).removeprefix(f"{tmp_path / 'scheme.nc'}: ")
     assert said == "No variable named 'start_position'; give one as a run folder's measurements_<scheme>.nc"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("tau", np.nan, "Measurement.tau: NaN at index"),
+        ("time", np.nan, "time: not increasing, or not finite"),
+        ("start_position", np.nan, "StartPrior.position: NaN at index"),
+        ("from_panel", 7.0, "cycle 0: from_panel: not from 0 to 1"),
+    ],
+)
+def test_what_is_wrong_in_a_netcdf_file_names_the_file(
+    recorded: tuple[Inputs, np.ndarray], tmp_path: Path, name: str, value: float, said: str
+) -> None:
+    data = inputs_to_dataset(recorded[0])
+    data["from_panel"] = data.tau * 0.0 + 0.5
+    data[name] = data[name] * 0.0 + value
+    data.to_netcdf(tmp_path / "mine.nc", engine="h5netcdf")
+    with pytest.raises(ConfigError) as found:
+        read_inputs(tmp_path / "mine.nc", None, build_radio(load_spec(find_pipeline("trace_then_slam")).radio))
+    assert str(found.value).startswith(f"{tmp_path / 'mine.nc'}: {said}")
+
+
+def test_the_estimate_has_the_times_of_the_file(
+    table: Table, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a clock that counts from the epoch, as a recording's: other logs are joined by it."""
+    file, rows = tmp_path / "mine.csv", {**table, "time_s": [1.7e9 + time for time in table["time_s"]]}
+    with file.open("w", newline="") as lines:
+        writer = csv.writer(lines)
+        writer.writerow(rows)
+        writer.writerows(list(zip(*rows.values(), strict=True))[:60])
+    command(file, find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", out=tmp_path / "out")
+    with (tmp_path / "out" / "estimate.csv").open() as lines:
+        times = [float(row["time_s"]) for row in csv.DictReader(lines)]
+    assert len(times) > 1
+    np.testing.assert_allclose(times, np.unique(rows["time_s"][:60]), rtol=0.0, atol=1e-6)
+    track = np.loadtxt(tmp_path / "out" / "estimate.tum")
+    np.testing.assert_allclose(track[:, 0], times, rtol=0.0, atol=1e-6)
+    assert "warning" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("factor", "apart", "said"),
+    [
+        (1000.0, 0.0, "cycles are 100 s apart; give seconds"),
+        (1.0, 1e-6, "every cycle holds one component, 1e-06 s apart"),
+    ],
+)
+def test_times_that_are_most_often_a_mistake_are_warned_of(
+    table: Table, spec: PipelineSpec, factor: float, apart: float, said: str
+) -> None:
+    times = [factor * time + apart * row for row, time in enumerate(table["time_s"])]
+    start, radio = StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio)
+    assert not input_warnings(inputs_of(table, start, radio))
+    (line,) = input_warnings(inputs_of({**table, "time_s": times}, start, radio))
+    assert said in line
+
+
+def test_a_start_that_is_too_far_is_told_so() -> None:
+    """UTM coordinates are three numbers: the line must not say that they are not."""
+    with pytest.raises(ConfigError, match=r"--start: '500000,5400000,100' received; give at most 100000"):
+        parse_point("--start", "500000,5400000,100")
+    with pytest.raises(ConfigError, match="give three numbers"):
+        parse_point("--start", "1,2,nan")
