@@ -1,4 +1,5 @@
-"""Reasons why a landmark is not detected: occluded, behind the panel, below the array, not resolved, too weak."""
+"""Reasons why a landmark is not detected: occluded, behind the panel, below the array, not resolved, outside the
+receiver's window, too weak."""
 
 from typing import NamedTuple
 
@@ -12,6 +13,8 @@ from rislam_rt.scene.check.mesh_queries import crossings
 
 WEAK = "too weak"
 """Reason where a path comes in that is below the detection threshold."""
+OUTSIDE = "beyond the receiver's delays"
+"""Reason where all paths arrive outside of the window of delays that the receiver looks at."""
 CLEARANCE = 1e-6
 """Share of a line of sight left out at the landmark's end, where a panel lies on its own wall."""
 
@@ -46,6 +49,8 @@ class Reasons(NamedTuple):
             return f"not to be told from {self.paths.label(covered)}"
         if not own.any():
             return "no path"
+        if not self.settings.sensor.in_window(self.paths.tau[place, own]).any():
+            return OUTSIDE
         return WEAK if weak else ""
 
     def _blocker(self, point: Floats, place: int, number: int) -> str:

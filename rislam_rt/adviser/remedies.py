@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.adviser.link_budget import LandmarkLink, Survey
-from rislam_rt.adviser.reasons import WEAK
+from rislam_rt.adviser.reasons import OUTSIDE, WEAK
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.antennas import amplitude
 from rislam_rt.design import exact_code
@@ -120,6 +120,8 @@ def _way_round(why: str, *, panel_held: bool) -> str:
         return "move the one or the other, or lead the way around"
     if "below" in why:
         return "raise it, lower the agent, or take radio.array.pattern = 'isotropic'"
+    if why == OUTSIDE:
+        return "a larger receiver.max_delay, or lead the way nearer"
     if "told from" in why:
         return "more bandwidth or antennas" + (", or receiver.alternation = true" if panel_held else "")
     return "lead the way to where it is seen"

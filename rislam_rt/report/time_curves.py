@@ -29,12 +29,18 @@ def draw_agent_error(result: SlamResult) -> Figure:
             axis.plot(time, 100.0 * error, color=colour, lw=1.6, label=label)
         axis.set(xlabel="time [s]", ylabel="agent position error [cm]")
         axis.set_title("How far off the agent is, and how far off it believes to be", weight="bold")
-        axis.set_xlim(time[0], time[-1])
+        axis.set_xlim(*time_limits(time))
         axis.set_ylim(0.0)
         band = Patch(color="#555555", alpha=0.2, lw=0.0, label="the filter's own σ")
         handles, _ = axis.get_legend_handles_labels()
         figure.legend(handles=[*handles[::-1], band], loc="outside lower center", ncols=6, fontsize=9)
     return figure
+
+
+def time_limits(time: Floats) -> tuple[float, float]:
+    """Limits of a time axis [s] for curves over cycles at `time` (K,); around a single cycle, a second."""
+    first, last = float(time[0]), float(time[-1])
+    return (first, last) if last > first else (first - 0.5, first + 0.5)
 
 
 def draw_landmark_errors(result: SlamResult) -> Figure:
@@ -50,7 +56,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
         never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
         for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
             axis.set_title(landmark, weight="bold")
-            axis.set(xlabel="time [s]", xlim=(time[0], time[-1]))
+            axis.set(xlabel="time [s]", xlim=time_limits(time))
             axis.set_ylim(0.0)
             if number in never:
                 axis.text(0.5, 0.5, "never found", transform=axis.transAxes, ha="center", color="#555555")
@@ -87,7 +93,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
                 axis.plot(time, level, color=scheme_colour(name), lw=width, zorder=order, label=f"RIS, {name}")
         threshold = detection_snr_db - snr_per_gain_db
         axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")
-        axis.set(xlim=(time[0], time[-1]), xlabel="time [s]", ylabel="path gain [dB]")
+        axis.set(xlim=time_limits(time), xlabel="time [s]", ylabel="path gain [dB]")
         shift = (lambda g: np.asarray(g) + snr_per_gain_db, lambda s: np.asarray(s) - snr_per_gain_db)
         right = axis.secondary_yaxis("right", functions=shift)
         right.set_ylabel("SNR over all antennas [dB]")

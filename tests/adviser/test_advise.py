@@ -103,6 +103,10 @@ def test_every_reason_is_found_where_it_holds(paper: Scene, office: Scene) -> No
     low = replace(paper, scatterers=(replace(paper.scatterers[0], position=np.array([2.0, 1.0, 0.1])),))
     _, links = look(replace(low, reflectors=tuple(r for r in low.reflectors if r.name != "ceiling"), ris=None))
     assert "below the array, which hears from above only" in links["sphere", ""].reason
+    # loud enough, and later than the receiver looks: 8 ns are 2.4 m of path
+    looked, links = look(paper, "receiver.max_delay=8e-9")
+    assert set(links["ris", "aimed"].reason) == {"beyond the receiver's delays"}
+    assert any("a larger receiver.max_delay" in line for line in remedies(looked, [*links.values()]))
 
 
 def test_what_hides_and_reflects_nothing_is_named(paper: Scene) -> None:

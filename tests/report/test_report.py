@@ -1,6 +1,7 @@
 """The report: lines that are drawn, figures that exist, a page that needs nothing else."""
 
 import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +30,15 @@ def result():
     settings = ["channel=image_source", "cycles=6", "depth=1", "slam.num_samples=40", 'schemes=["random", "no_ris"]']
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
     return run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+
+
+def test_a_run_of_one_cycle_is_drawn_without_a_complaint():
+    settings = ["channel=image_source", "cycles=1", "depth=1", "slam.num_samples=40", 'schemes=["no_ris"]']
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
+    one = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        draw_figures(one)
 
 
 def test_outline_has_no_diagonals(result):

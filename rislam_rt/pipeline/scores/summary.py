@@ -129,9 +129,12 @@ def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> li
 
 
 def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
-    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle, for their scores."""
-    truth = scene.landmark_positions
-    error = np.full((len(scheme.position), len(truth)), np.nan)
+    """Match the map's points (no mirror images) one to one with the true landmarks in every cycle, for their scores.
+
+    Panels are matched with nothing in a scheme that has a plain wall in their place.
+    """
+    truth = scene.landmark_positions if scheme.levels else scene.landmark_positions[: len(scene.scatterers)]
+    error = np.full((len(scheme.position), len(scene.landmarks)), np.nan)
     column = np.full(error.shape, -1)
     points = scheme.held & (scheme.parent < 0)
     for cycle in range(len(error)):

@@ -103,6 +103,20 @@ def test_images_never_stand_for_landmarks(room, short_result):
     assert (track.column[:, 1] == -1).all()
 
 
+def test_a_panel_that_is_not_there_is_matched_with_nothing(room, short_result):
+    """Without a panel a plain wall hangs in its place: a point of the map near it is a false one, not the panel."""
+    scheme = short_result.schemes["optimized"]
+    place = np.tile(room.landmark_positions[-1] + 0.3, (len(scheme.position), 1, 1))
+    one = {"ident": [0], "parent": [-1], "held": np.ones(place.shape[:2], bool), "landmark_position": place,
+           "ris_probability": np.zeros(place.shape[:2])}  # fmt: skip
+    there = replace(scheme, **one)
+    assert (landmark_track(room, there).column[:, -1] == 0).all()
+    away = replace(there, levels=0, sent=there.sent[:, :0, :0], applied=there.applied[:, :0, :0])
+    track = landmark_track(room, away)
+    assert track.error.shape == (len(place), len(room.landmarks))
+    assert (track.column == -1).all()
+
+
 def test_summary_is_plain_and_complete(short_result):
     import json
 
