@@ -73,7 +73,7 @@ def command(
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
     answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed))
     summary = _summary(inputs, answers, true)
-    _write(folder, inputs, answers)
+    _write(_new_folder(folder), inputs, answers)  # another command may have filled it meanwhile
     for name, value in summary.items():
         typer.echo(f"{name}: {f'{value:.4g}' if isinstance(value, float) else value}")
     typer.echo(f"folder: {folder}")

@@ -1,6 +1,7 @@
 """Measurements of one's own: the same answer as in the run they came from, and a clear line for a wrong unit."""
 
 import csv
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -250,6 +251,23 @@ def test_a_folder_by_another_name_is_not_written_over(tmp_path: Path, monkeypatc
             _new_folder(Path(folder))
 
 
+def test_a_folder_that_another_command_filled_meanwhile_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.csv").write_text("time_s,heading_rad,delay_s,cos_x,cos_y,snr_db\n0,0,6e-9,0.1,0.1,30\n")
+    out = tmp_path / "out"
+
+    def slow(*given: object, **named: object) -> object:
+        out.mkdir()
+        (out / "map.json").write_text("theirs")
+        return localise(*given, **named)
+
+    monkeypatch.setattr("rislam_rt.pipeline.recordings.own_measurements.localise", slow)
+    with pytest.raises(ConfigError, match="exists and is not empty"):
+        command(tmp_path / "mine.csv", find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", out=out)
+    assert (out / "map.json").read_text() == "theirs"
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -409,3 +427,10 @@ def test_a_start_that_is_too_far_is_told_so() -> None:
         parse_point("--start", "500000,5400000,100")
     with pytest.raises(ConfigError, match="give three numbers"):
         parse_point("--start", "1,2,nan")
+
+
+def test_the_pages_example_in_python_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "own_measurements.md").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(block, {})
+    assert capsys.readouterr().out.startswith("SlamEstimate: at (0.50")
