@@ -137,7 +137,7 @@ def _correct(
     mean, variance = gaussian_sums.range_moments(state.sums, sight, agent.course)
     squares = (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
     missed = 1.0 - own.sum(axis=1, keepdims=True)
-    found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0), 1)
+    found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0))
     sums, course = absorb(state.sums, sight, agent.course, scan, found, config.odds)
     strains = dict(state.strains)
     for name, square in zip(sums.ident[hit].tolist(), squares.tolist(), strict=True):
