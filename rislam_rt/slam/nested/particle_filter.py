@@ -116,8 +116,8 @@ def step(
     )
     view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers, None)
     front, used = cycle_explanation.log_associations(front, observed, view)
-    told = update(belief, _seen(front, view, used), config.nested, engine)
-    front = _refresh_view(front, told.belief, config)
+    belief, evidence, nis = update(belief, _seen(front, view, used), config.nested, engine)
+    front = _refresh_view(front, belief, config)
     left = relinearise(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
     left = left._replace(square=squares(left.row, left.left, front.log, 0.0))
     before = front.lost_log_odds
@@ -129,7 +129,7 @@ def step(
     # a wall found by a point that it stands before is gone with it
     found = grown.landmarks.ident
     grown = remove_from_map(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
-    belief = _follow_map(told.belief, front, grown, config, rng=rng)
+    belief = _follow_map(belief, front, grown, config, rng=rng)
     ess = effective_size(belief)
     belief, resampled = renew(belief, _spans(grown), config.nested, engine, rng=rng)
     outcome = cycle_explanation.outcome_of(len(measurement), len(grown.landmarks.ident), grown.lost_log_odds >= 0.0)
@@ -138,7 +138,7 @@ def step(
     cause = LossCause.NONE
     if outcome == StepOutcome.DIVERGED:
         cause = cause_of_loss(before, grown.lost_log_odds, grown.lost_log_odds, view.score)
-    info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome, cause)
+    info = StepInfo(landmark, ess, resampled, nis, 3 * int(used.sum()), evidence, count, outcome, cause)
     return NestedState(front, belief), info
 
 
