@@ -74,10 +74,11 @@ def _fits(have: tuple[int, ...], want: tuple[int | None, ...]) -> bool:
     return len(have) == len(want) and all(w in (None, h) for w, h in zip(want, have, strict=True))
 
 
-def freeze(record: Any, name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:
-    """Replace a field of a frozen dataclass by its checked, read-only array (for `__post_init__`)."""
-    label = f"{type(record).__name__}.{name}"
-    object.__setattr__(record, name, frozen(getattr(record, name), dtype, shape, label))
+def freeze(record: Any, dtype: Any, **shapes: tuple[int | None, ...]) -> None:
+    """Replace fields of a frozen dataclass by checked, read-only arrays of a type and shapes (for `__post_init__`)."""
+    for name, shape in shapes.items():
+        label = f"{type(record).__name__}.{name}"
+        object.__setattr__(record, name, frozen(getattr(record, name), dtype, shape, label))
 
 
 def row_blocks(count: int, width: int, most: int = 2_000_000, least: int = 1) -> list[slice]:

@@ -43,9 +43,15 @@ def main() -> None:
             if mine.sum() > 50:
                 score = association_score(all_labels[mine], path[mine])
                 purity = np.mean([_purity(all_labels, path, one) for one in np.unique(all_labels[mine])])
-                rate = score.switches / mine.sum()
+                rate = _switches(all_labels[mine], path[mine]) / mine.sum()
                 print(f"  {kind.name:5s} {mine.sum():6d}: right {score.accuracy:.3f}, switches {rate:.4f}", end="")
                 print(f", purity {purity:.3f}")
+
+
+def _switches(label: np.ndarray, path: np.ndarray) -> int:
+    """Number of times that the label of a path's components changes."""
+    own = [label[path == one] for one in np.unique(path)]
+    return sum(int(np.sum(labels[1:] != labels[:-1])) for labels in own)
 
 
 def _purity(label: np.ndarray, path: np.ndarray, one: int) -> float:

@@ -34,16 +34,12 @@ class SpecularLegs:
     def __post_init__(self) -> None:
         cycles, sequences = np.shape(self.valid)
         depth = np.shape(self.walls)[1]
-        for name, dtype, shape in (
-            ("walls", np.int64, (sequences, depth)),
-            ("valid", np.bool_, (cycles, sequences)),
-            ("length", np.float64, (cycles, sequences)),
-            ("at_device", np.float64, (cycles, sequences, 3)),
-            ("at_far_end", np.float64, (cycles, sequences, 3)),
-            ("coefficient", np.complex128, (cycles, sequences)),
-            ("vertices", np.float64, (cycles, sequences, depth, 3)),
-        ):
-            freeze(self, name, dtype, shape)
+        freeze(self, np.int64, walls=(sequences, depth))
+        freeze(self, np.bool_, valid=(cycles, sequences))
+        freeze(self, np.float64, length=(cycles, sequences))
+        freeze(self, np.float64, at_device=(cycles, sequences, 3), at_far_end=(cycles, sequences, 3))
+        freeze(self, np.complex128, coefficient=(cycles, sequences))
+        freeze(self, np.float64, vertices=(cycles, sequences, depth, 3))
 
     @property
     def num_bounces(self) -> Integers:

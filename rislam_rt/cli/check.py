@@ -40,6 +40,8 @@ def command(
 
     Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
     """
+    from dataclasses import asdict
+
     from rislam_rt.scene import check_scene
 
     changed = list(set_ or ())
@@ -54,11 +56,10 @@ def command(
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
-    fields = ("severity", "file", "field", "message", "mend")
     content = {
         "scene": str(scene),
         "errors": errors,
-        "findings": [{name: getattr(finding, name) for name in fields} for finding in findings],
+        "findings": [asdict(finding) for finding in findings],
     }
     if not errors:
         content["advice"] = _advise(Path(scene), settings, picture)

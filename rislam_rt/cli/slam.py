@@ -166,6 +166,8 @@ def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dic
 
 def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
     """Write the results of `rislam-rt slam`: estimated trajectory as TUM and CSV, and the last map as JSON."""
+    from dataclasses import fields
+
     import numpy as np
 
     from rislam_rt.scene.write import tum_bytes
@@ -181,8 +183,6 @@ def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
         numbers = [*one.position, *std, one.heading]
         rows.append([f"{time:.16g}", *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
     last = answers.estimates[-1].map
-    fields = ("ident", "position", "covariance", "parent", "ris_probability", "strength", "wall_normal", "wall_offset")
-    names = (*fields, "wall_std", *(["panel"] if last.panel is not None else []))
     files = {"estimate.tum": tum_bytes(times, position, heading), "estimate.csv": csv_file(head, rows)}
-    content = plain_result({name: getattr(last, name) for name in names})
+    content = plain_result({f.name: value for f in fields(last) if (value := getattr(last, f.name)) is not None})
     write_all(folder, files | {"map.json": json_file(content)})

@@ -44,14 +44,13 @@ class DesignProblem:
     """For each panel the row of its direct path, and the span of its elements among all N M."""
 
     def __post_init__(self) -> None:
-        freeze(self, "response", np.complex128, (None, None, None, None))
+        freeze(self, np.complex128, response=(None, None, None, None))
         samples, panel = self.response.shape[:2]
-        freeze(self, "static_gain", np.complex128, (samples, None))
+        freeze(self, np.complex128, static_gain=(samples, None))
         count = panel + self.static_gain.shape[1]
-        freeze(self, "gradient", np.float64, (samples, count, 2))
-        freeze(self, "prior", np.float64, (2, 2))
+        freeze(self, np.float64, gradient=(samples, count, 2), prior=(2, 2))
         if self.variance is not None:
-            freeze(self, "variance", np.float64, (samples, count))
+            freeze(self, np.float64, variance=(samples, count))
         if samples < 1 or panel < 1:
             raise ConfigError(f"design: {samples} belief samples and {panel} panel paths received; give at least one")
         if not self.least_power >= 0.0:

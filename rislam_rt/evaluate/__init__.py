@@ -1,6 +1,6 @@
 """Scores of estimates against the truth (floor 5): errors, map distances, consistency, association, intervals."""
 
-from rislam_rt.evaluate.association import association_fractions, association_score, label_switches
+from rislam_rt.evaluate.association import AssociationScore, association_fractions, association_score
 from rislam_rt.evaluate.confidence_intervals import (
     Interval,
     bootstrap,
@@ -22,8 +22,8 @@ from rislam_rt.evaluate.plane_matching import (
 from rislam_rt.evaluate.set_distances import gospa, match_points
 
 __all__ = [
-    "NEAR_ANGLE", "NEAR_WALL", "Interval", "Surfaces", "align", "association_fractions", "association_score",
-    "bootstrap", "bootstrap_ratio", "ghost_planes", "gospa", "label_switches", "match_planes", "match_points",
+    "NEAR_ANGLE", "NEAR_WALL", "AssociationScore", "Interval", "Surfaces", "align", "association_fractions",
+    "association_score", "bootstrap", "bootstrap_ratio", "ghost_planes", "gospa", "match_planes", "match_points",
     "median_over_runs", "normalised_squares", "plane_angle", "plane_distance", "position_errors", "rms_over_runs",
     "rmse", "root_mean_square", "share_interval",
 ]  # fmt: skip

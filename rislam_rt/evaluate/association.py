@@ -12,7 +12,7 @@ NONE = -1
 
 
 class AssociationScore(NamedTuple):
-    """Scores of a run's data association: fractions of its measurements, and label switches."""
+    """Scores of a run's data association: fractions of its measurements."""
 
     accuracy: float
     """Fraction of the measurements whose label is right; clutter that was left alone counts as right."""
@@ -20,42 +20,26 @@ class AssociationScore(NamedTuple):
     """Fraction of the measurements with a label whose label stands for their true identity."""
     recall: float
     """Fraction of the measurements with a true identity whose label stands for it."""
-    switches: int
-    """Number of times that an identity's label changes from one of its measurements to the next."""
 
 
 def association_score(label: Integers, truth: Integers) -> AssociationScore:
-    """Score of data association: the labels (T,) that a filter gave measurements against their true identities (T,), in
-    the order of time; -1 is none.
+    """Score of data association: the labels (T,) that a filter gave measurements against their true identities (T,); -1
+    is none.
 
     Labels are numbers of the agent's own. Each is first given the identity with which it agrees most often, one to one
     (the assignment that gets the most measurements right), so a split or merged track costs what it loses.
     """
-    label, truth = np.asarray(label), np.asarray(truth)
-    if not len(label):
-        return AssociationScore(1.0, 1.0, 1.0, 0)
     labels, rows = np.unique(label, return_inverse=True)
     identities, cols = np.unique(truth, return_inverse=True)
     counts = np.zeros((len(labels), len(identities)), dtype=np.int64)
     np.add.at(counts, (rows, cols), 1)
-    return AssociationScore(*association_fractions(labels, identities, counts), label_switches(label, truth))
+    return association_fractions(labels, identities, counts)
 
 
-def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> tuple[float, float, float]:
-    """Accuracy, precision, recall from counts (L, I) of how often label (L,) met identity (I,); -1 is none."""
+def association_fractions(labels: Integers, identities: Integers, counts: Integers) -> AssociationScore:
+    """Score of data association from counts (L, I) of how often label (L,) met identity (I,); -1 is none."""
     own = counts[np.ix_(labels != NONE, identities != NONE)]
     right = int(own[scipy.optimize.linear_sum_assignment(own, maximize=True)].sum()) if own.size else 0
     left_alone = int(counts[np.ix_(labels == NONE, identities == NONE)].sum())
     parts = (right + left_alone, counts), (right, counts[labels != NONE]), (right, counts[:, identities != NONE])
-    accuracy, precision, recall = (part / int(of.sum()) if of.sum() else 1.0 for part, of in parts)
-    return accuracy, precision, recall
-
-
-def label_switches(label: Integers, truth: Integers) -> int:
-    """Score of association: number of times that a true identity's label changes; -1 does not count."""
-    switches = 0
-    both = (np.asarray(label) != NONE) & (np.asarray(truth) != NONE)
-    for identity in np.unique(np.asarray(truth)[both]):
-        own = np.asarray(label)[both & (np.asarray(truth) == identity)]
-        switches += int(np.sum(own[1:] != own[:-1]))
-    return switches
+    return AssociationScore._make(part / int(of.sum()) if of.sum() else 1.0 for part, of in parts)

@@ -98,14 +98,6 @@ def eliminate_gains(information: Floats, num_paths: int) -> EquivalentDelayInfor
     return EquivalentDelayInformation(reduced, np.where(degenerate, int(Outcome.DEGENERATE), int(Outcome.OK)))
 
 
-def delay_information(
-    tau: Floats, gain: Complexes, radio: RadioConfig, *, antennas: Complexes | None = None
-) -> EquivalentDelayInformation:
-    """Equivalent Fisher information (..., P, P) [1/s^2] on the delays of overlapping paths, gains unknown."""
-    full = delay_gain_information(tau, gain, radio, antennas=antennas)
-    return eliminate_gains(full, np.shape(tau)[-1])
-
-
 def map_to_position(delays: Floats, gradient: Floats) -> Floats:
     """Fisher information (..., D, D) [1/m^2] on the position from that on delays (..., P, P): `T J T^T` of Appendix B.
 

@@ -22,9 +22,9 @@ class PosteriorBound:
     """(U, U) covariance of landmarks and walls after the last cycle."""
 
     def __post_init__(self) -> None:
-        freeze(self, "agent", np.float64, (None, None, None))
-        freeze(self, "unknown", np.float64, (len(self.agent), None))
-        freeze(self, "last", np.float64, (self.unknown.shape[1],) * 2)
+        freeze(self, np.float64, agent=(None, None, None))
+        freeze(self, np.float64, unknown=(len(self.agent), None))
+        freeze(self, np.float64, last=(self.unknown.shape[1],) * 2)
 
     @property
     def rms(self) -> Floats:

@@ -11,16 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.measurement.components import (
-    ReportedComponents,
-    blind_axes,
-    capped_cosine_std,
-    clip_to_unit_disc,
-    lone_errors,
-    merge,
-    select_paths,
-    single,
-)
+from rislam_rt.measurement import components
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detection_threshold import build_sensor, draw_false_alarms
 from rislam_rt.measurement.joint_bound import joint_errors
@@ -53,28 +44,29 @@ def measure_bound(
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
     parts = [part._replace(capture=np.full(len(part.path), number)) for number, part in enumerate(parts)]
-    found = ReportedComponents._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
+    found = components.ReportedComponents._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
     order = np.argsort(found.points[:, 0])
-    found = ReportedComponents._make(field[order] for field in found)
+    found = components.ReportedComponents._make(field[order] for field in found)
     told = panel_probability(found, radio, config) if config.alternation else ()
     measurement = Measurement(
-        found.points[:, 0], clip_to_unit_disc(blind_axes(found.points[:, 1:], radio)), np.abs(found.gain),
-        found.deviation[:, 0], capped_cosine_std(found.deviation[:, 1:], radio), found.gain_std / np.sqrt(2.0), *told,
+        found.points[:, 0], components.clip_to_unit_disc(components.blind_axes(found.points[:, 1:], radio)),
+        np.abs(found.gain), found.deviation[:, 0], components.capped_cosine_std(found.deviation[:, 1:], radio),
+        found.gain_std / np.sqrt(2.0), *told,
     )  # fmt: skip
     return measurement, PathTruth(found.path)
 
 
 def _capture(
     received: Received, draws: Floats, sensor: SensorModel, config: ReceiverConfig, *, rng: np.random.Generator
-) -> ReportedComponents:
+) -> components.ReportedComponents:
     """Draw the detected components of one capture by the bound, and its false alarms."""
     radio, window = sensor.radio, sensor.window
-    received = select_paths(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
+    received = components.select_paths(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
     if config.resolution == "joint":
         parts, errors = joint_errors(received, radio, config, draws)
     else:
-        parts = merge(received, sensor) if config.merge else single(received)
-        errors = lone_errors(parts, radio, draws[parts.path])
+        parts = components.merge(received, sensor) if config.merge else components.single(received)
+        errors = components.lone_errors(parts, radio, draws[parts.path])
     noise = draws[parts.path, :2] / np.sqrt(2.0)
     gain = parts.gain + errors.gain_std * (noise[:, 0] + 1j * noise[:, 1])
     points = np.column_stack([parts.tau, parts.cosines]) + errors.error
@@ -84,7 +76,7 @@ def _capture(
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
     none = np.zeros_like(parts.path)
     fields = (parts.path, points, deviation, gain, errors.gain_std, none)
-    true = ReportedComponents._make(field[seen] for field in fields)
-    return ReportedComponents._make(
+    true = components.ReportedComponents._make(field[seen] for field in fields)
+    return components.ReportedComponents._make(
         np.concatenate(fields) for fields in zip(true, draw_false_alarms(sensor, rng=rng), strict=True)
     )

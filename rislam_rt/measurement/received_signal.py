@@ -13,7 +13,7 @@ from rislam_rt.measurement.config import MOST_TONES, ReceiverConfig
 from rislam_rt.measurement.estimation.path_signals import tone_response
 from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import RadioConfig
-from rislam_rt.waveform import delay_response, flat_pulse, subcarrier_frequencies
+from rislam_rt.waveform import delay_response, subcarrier_frequencies
 
 FEWEST_TONES = 16
 """Smallest number of tones of a sounding that is not set."""
@@ -49,17 +49,6 @@ def tones(received: Received, radio: RadioConfig, config: ReceiverConfig, elemen
         return scale * _element_exact(received, radio, frequencies, elements)
     antennas = phasor(2.0 * np.pi * elements @ received.direction.T)
     return scale * (antennas * received.gain) @ tone_response(frequencies, received.tau).T
-
-
-def pulse_samples(received: Received, radio: RadioConfig, config: ReceiverConfig) -> Complexes:
-    """Noiseless received signal of one flat pulse as samples (L, U) [sqrt(W)] at n / B, n < U; U is `num_tones`.
-
-    Unlike the tones, which repeat, the pulse's tails are cut off at the window's ends.
-    """
-    time = np.arange(num_tones(radio, config)) / radio.bandwidth
-    pulses = flat_pulse(time - received.tau[:, None], radio.bandwidth, radio.energy)
-    antennas = phasor(2.0 * np.pi * radio.array.positions(1.0) @ received.direction.T)
-    return (antennas * received.gain) @ pulses
 
 
 def to_tones(samples: Complexes, radio: RadioConfig) -> Complexes:

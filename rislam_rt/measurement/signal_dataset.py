@@ -8,16 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rislam_rt.channel.doppler import doppler_shift
+from rislam_rt.measurement import waveform_receiver
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
-from rislam_rt.measurement.waveform_receiver import (
-    DetectedComponents,
-    capture,
-    find_components,
-    to_measurement,
-    true_paths,
-)
 from rislam_rt.model import Paths, RadioConfig, Trajectory
 from rislam_rt.storage.netcdf import Entry, padded, read_dataset, variables
 from rislam_rt.waveform import subcarrier_frequencies
@@ -63,9 +57,9 @@ def signals_dataset(
     tracks, last, previous = init_tracks(), trajectory.time[0], None
     for cycle in range(paths.num_cycles):
         received = receive(paths, cycle, float(trajectory.heading[cycle]), radio, config, shift[cycle])
-        captures = capture(received, radio, config, rng=rng)
-        components = find_components(captures, radio, config, previous)
-        previous = to_measurement(components, radio, config)
+        captures = waveform_receiver.capture(received, radio, config, rng=rng)
+        components = waveform_receiver.find_components(captures, radio, config, previous)
+        previous = waveform_receiver.to_measurement(components, radio, config)
         step = float(trajectory.time[cycle] - last)
         tracks, info = step_tracks(tracks, previous, step, TrackingConfig())
         last = trajectory.time[cycle]
@@ -74,7 +68,7 @@ def signals_dataset(
         heard[cycle, received.path] = 1
         found.append(components)
         labels.append(info.label)
-        truth.append(true_paths(components, received, radio, config))
+        truth.append(waveform_receiver.true_paths(components, received, radio, config))
         over_panel.append(np.zeros(len(components.tau)) if previous.from_panel is None else previous.from_panel)
         which.append(previous.panel)
         if on_cycle is not None:
@@ -93,7 +87,7 @@ def signals_dataset(
     }
     if config.alternation and config.panels > 1:
         values["found_which_panel"] = padded(which, NO_COMPONENT)
-    for name in DetectedComponents._fields[:-1]:
+    for name in waveform_receiver.DetectedComponents._fields[:-1]:
         values[f"found_{name}"] = padded([getattr(one, name) for one in found], 0.0)
     return _dataset(values, radio, config)
 

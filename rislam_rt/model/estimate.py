@@ -40,16 +40,13 @@ class MapEstimate:
 
     def __post_init__(self) -> None:
         count, walls = len(np.asarray(self.ident)), len(np.asarray(self.wall_offset))
-        for name, dtype, shape in (
-            ("ident", np.int64, (count,)), ("position", np.float64, (count, 3)),
-            ("covariance", np.float64, (count, 3, 3)), ("parent", np.int64, (count,)),
-            ("ris_probability", np.float64, (count,)), ("strength", np.float64, (count,)),
-            ("wall_normal", np.float64, (walls, 3)), ("wall_offset", np.float64, (walls,)),
-            ("wall_std", np.float64, (walls, 2)),
-        ):  # fmt: skip
-            freeze(self, name, dtype, shape)
+        freeze(self, np.int64, ident=(count,))
+        freeze(self, np.float64, position=(count, 3), covariance=(count, 3, 3))
+        freeze(self, np.int64, parent=(count,))
+        freeze(self, np.float64, ris_probability=(count,), strength=(count,))
+        freeze(self, np.float64, wall_normal=(walls, 3), wall_offset=(walls,), wall_std=(walls, 2))
         if self.panel is not None:
-            freeze(self, "panel", np.int64, (count,))
+            freeze(self, np.int64, panel=(count,))
 
     def __repr__(self) -> str:
         known = int(np.sum(self.ris_probability > 0.5))
@@ -103,10 +100,7 @@ class SlamEstimate:
     designed (see `slam.predict`)."""
 
     def __post_init__(self) -> None:
-        freeze(self, "position", np.float64, (3,))
-        freeze(self, "velocity", np.float64, (3,))
-        freeze(self, "covariance", np.float64, (6, 6))
-        freeze(self, "samples", np.float64, (None, 3))
+        freeze(self, np.float64, position=(3,), velocity=(3,), covariance=(6, 6), samples=(None, 3))
 
     def __repr__(self) -> str:
         std = float(np.sqrt(np.trace(self.covariance[:2, :2])))

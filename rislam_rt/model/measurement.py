@@ -37,15 +37,12 @@ class Measurement:
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.tau))
-        for name, shape in (
-            ("tau", (count,)), ("cosines", (count, 2)), ("amplitude", (count,)), ("tau_std", (count,)),
-            ("cosines_std", (count, 2)), ("amplitude_std", (count,)),
-        ):  # fmt: skip
-            freeze(self, name, np.float64, shape)
+        freeze(self, np.float64, tau=(count,), cosines=(count, 2), amplitude=(count,))
+        freeze(self, np.float64, tau_std=(count,), cosines_std=(count, 2), amplitude_std=(count,))
         if self.from_panel is not None:
-            freeze(self, "from_panel", np.float64, (count,))
+            freeze(self, np.float64, from_panel=(count,))
         if self.panel is not None:
-            freeze(self, "panel", np.int64, (count,))
+            freeze(self, np.int64, panel=(count,))
 
     def __len__(self) -> int:
         return len(self.tau)
@@ -75,4 +72,4 @@ class PathTruth:
     path: Integers
 
     def __post_init__(self) -> None:
-        freeze(self, "path", np.int64, (None,))
+        freeze(self, np.int64, path=(None,))

@@ -45,10 +45,8 @@ class RisLegs:
     """Slice of each RIS panel's elements among the elements of all panels, counted row by row."""
 
     def __post_init__(self) -> None:
-        freeze(self, "tx", np.complex128, (None, None, None, None))
-        freeze(self, "rx", np.complex128, (None, None, None, None))
-        freeze(self, "tx_leg", np.int64, (None,))
-        freeze(self, "rx_leg", np.int64, (len(self.tx_leg),))
+        freeze(self, np.complex128, tx=(None, None, None, None), rx=(None, None, None, None))
+        freeze(self, np.int64, tx_leg=(None,), rx_leg=(len(self.tx_leg),))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,14 +92,12 @@ class Paths:
 
     def __post_init__(self) -> None:
         cycles, paths = np.shape(self.valid)
-        for name, dtype, shape in (
-            ("kind", np.int64, (paths,)), ("landmark", np.int64, (paths,)), ("tx_walls", np.int64, (paths, None)),
-            ("rx_walls", np.int64, (paths, None)), ("valid", np.bool_, (cycles, paths)),
-            ("tau", np.float64, (cycles, paths)), ("departure", np.float64, (cycles, paths, 3)),
-            ("arrival", np.float64, (cycles, paths, 3)), ("gain", np.complex128, (cycles, paths)),
-            ("vertices", np.float64, (cycles, paths, None, 3)), ("num_vertices", np.int64, (paths,)),
-        ):  # fmt: skip
-            freeze(self, name, dtype, shape)
+        freeze(self, np.int64, kind=(paths,), landmark=(paths,), tx_walls=(paths, None), rx_walls=(paths, None))
+        freeze(self, np.bool_, valid=(cycles, paths))
+        freeze(self, np.float64, tau=(cycles, paths), departure=(cycles, paths, 3), arrival=(cycles, paths, 3))
+        freeze(self, np.complex128, gain=(cycles, paths))
+        freeze(self, np.float64, vertices=(cycles, paths, None, 3))
+        freeze(self, np.int64, num_vertices=(paths,))
 
     def __repr__(self) -> str:
         classes = ", ".join(f"{kind.name} {count}" for kind in PathKind if (count := int(np.sum(self.kind == kind))))

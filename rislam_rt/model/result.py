@@ -79,21 +79,19 @@ class SchemeResult:
 
     def __post_init__(self) -> None:
         cycles, held = np.shape(self.position)[0], len(np.asarray(self.ident))
-        for name, dtype, shape in (
-            ("time", np.float64, (cycles,)), ("position", np.float64, (cycles, 3)),
-            ("velocity", np.float64, (cycles, 3)), ("heading", np.float64, (cycles,)),
-            ("covariance", np.float64, (cycles, 6, 6)), ("sent", np.int64, (cycles, None, None)),
-            ("applied", np.int64, (cycles, None, None)), ("gain", np.complex128, (cycles, None)),
-            ("component_path", np.int64, (cycles, None)), ("component_landmark", np.int64, (cycles, None)),
-            ("ident", np.int64, (held,)), ("parent", np.int64, (held,)), ("held", np.bool_, (cycles, held)),
-            ("landmark_position", np.float64, (cycles, held, 3)), ("ris_probability", np.float64, (cycles, held)),
-            ("seconds", np.float64, (cycles, len(STEPS))),
-        ):  # fmt: skip
-            freeze(self, name, dtype, shape)
+        freeze(self, np.float64, time=(cycles,), position=(cycles, 3), velocity=(cycles, 3), heading=(cycles,))
+        freeze(self, np.float64, covariance=(cycles, 6, 6))
+        freeze(self, np.int64, sent=(cycles, None, None), applied=(cycles, None, None))
+        freeze(self, np.complex128, gain=(cycles, None))
+        freeze(self, np.int64, component_path=(cycles, None), component_landmark=(cycles, None))
+        freeze(self, np.int64, ident=(held,), parent=(held,))
+        freeze(self, np.bool_, held=(cycles, held))
+        freeze(self, np.float64, landmark_position=(cycles, held, 3), ris_probability=(cycles, held))
+        freeze(self, np.float64, seconds=(cycles, len(STEPS)))
         if self.panel is not None:
-            freeze(self, "panel", np.int64, (cycles, held))
+            freeze(self, np.int64, panel=(cycles, held))
         if self.smoothed is not None:
-            freeze(self, "smoothed", np.float64, (cycles, 3))
+            freeze(self, np.float64, smoothed=(cycles, 3))
 
     def named(self, panel: int) -> Booleans:
         """Whether (K, I) each landmark of a scheme's result was identified as a RIS panel (above one half)."""

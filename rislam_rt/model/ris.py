@@ -34,8 +34,7 @@ class RisSpec:
     """A: reflection coefficient of an element."""
 
     def __post_init__(self) -> None:
-        for name, shape in (("spacing", (2,)), ("normal", (3,)), ("up", (3,))):
-            freeze(self, name, np.float64, shape)
+        freeze(self, np.float64, spacing=(2,), normal=(3,), up=(3,))
         if self.rows < 1 or self.cols < 1:
             raise SceneError(f"ris.rows, ris.cols: {self.rows} x {self.cols} received; give at least 1 x 1")
         if not (self.spacing > 0.0).all():
@@ -182,7 +181,7 @@ class RisPanel:
     name: str = "ris"
 
     def __post_init__(self) -> None:
-        freeze(self, "center", np.float64, (3,))
+        freeze(self, np.float64, center=(3,))
 
     @property
     def panels(self) -> "tuple[RisPanel, ...]":

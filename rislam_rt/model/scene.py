@@ -166,8 +166,7 @@ class Scatterer:
     """Occluder of the object's shape; None if it hides nothing. Its own centre it does not hide."""
 
     def __post_init__(self) -> None:
-        freeze(self, "position", np.float64, (3,))
-        freeze(self, "axis", np.float64, (3,))
+        freeze(self, np.float64, position=(3,), axis=(3,))
         place = f"scatterer '{self.name}'"
         if not self.rcs > 0.0:
             raise SceneError(f"{place}: cross-section {self.rcs} m^2 received; give a positive one")
@@ -246,8 +245,8 @@ class Scene:
 
 def _freeze_mesh(mesh: Any, place: str) -> None:
     """Check and freeze `vertices` and `faces` of the mesh of a scene's reflector or occluder."""
-    freeze(mesh, "vertices", np.float64, (None, 3))
-    freeze(mesh, "faces", np.int64, (None, 3))
+    freeze(mesh, np.float64, vertices=(None, 3))
+    freeze(mesh, np.int64, faces=(None, 3))
     if len(mesh.faces) == 0:
         raise SceneError(f"{place}: the mesh has no faces")
     if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):

@@ -17,7 +17,7 @@ from rislam_rt.model.radio import RadioConfig
 
 RESOLUTIONS = ("cell", "joint", "all")
 """Rules by which two paths are resolved: they lie outside each other's resolution cell; their amplitudes can be told
-when all else is unknown (`information.resolved_probability`); always."""
+when all else is unknown (`measurement.joint_bound`); always."""
 ONE_PULSE = 1.0
 """Period [s] that stands for a sounding which does not repeat: longer than any path."""
 CERTAIN_SNR = 10.0

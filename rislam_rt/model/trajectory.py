@@ -22,8 +22,7 @@ class Body:
     rx_offset: Floats = field(default_factory=_default_offset)
 
     def __post_init__(self) -> None:
-        freeze(self, "tx_offset", np.float64, (3,))
-        freeze(self, "rx_offset", np.float64, (3,))
+        freeze(self, np.float64, tx_offset=(3,), rx_offset=(3,))
         if np.linalg.norm(self.tx_offset - self.rx_offset) < 1e-6:
             raise GeometryError("tx_offset_m, rx_offset_m: Tx and Rx coincide; keep them apart")
 
@@ -48,10 +47,9 @@ class Trajectory:
     body: Body = field(default_factory=Body)
 
     def __post_init__(self) -> None:
-        freeze(self, "time", np.float64, (None,))
+        freeze(self, np.float64, time=(None,))
         count = len(self.time)
-        for name, shape in (("position", (count, 3)), ("velocity", (count, 3)), ("heading", (count,))):
-            freeze(self, name, np.float64, shape)
+        freeze(self, np.float64, position=(count, 3), velocity=(count, 3), heading=(count,))
 
     def __len__(self) -> int:
         return len(self.time)

@@ -34,29 +34,29 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the terminal table of a run's scores: label, then one cell for each scheme."""
     schemes = list(summary["schemes"].values())
     first = schemes[0]
-    rows = [["agent", *(_metres(s["rmse_m"]) for s in schemes)]]
     aligned = [s["rmse_aligned_m"] for s in schemes]
-    rows.append(["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)])
-    for name in first["landmarks"]:
-        rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
     known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it
     heard = [wall for wall in first["walls"] if any(s["walls"][wall][k] is not None for s in schemes for k in known)]
-    for name in heard:
-        rows.append([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)])
+    rows = [
+        ["agent", *(_metres(s["rmse_m"]) for s in schemes)],
+        ["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)],
+        *(
+            [f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)]
+            for name in first["landmarks"]
+        ),
+        *([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)] for name in heard),
+    ]
     if len(first["walls"]) > len(heard):
         rows.append([f"{len(first['walls']) - len(heard)} walls", *("not heard" for _ in schemes)])
-    rows.append(["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)])
-    rows.append(["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)])
-    association = [s["association"] for s in schemes]
-    rows.append(
-        [
-            "association: precision, recall",
-            *(", ".join(share_text(a[name]) for name in ("precision", "recall")) for a in association),
-        ]
-    )
-    rows.append(["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)])
-    rows.append(["diverged", *("yes" if s["diverged"] else "no" for s in schemes)])
-    rows.append(["held itself for lost", *(_said(s["outcomes"]) for s in schemes)])
+    shares = [[share_text(s["association"][name]) for name in ("precision", "recall")] for s in schemes]
+    rows += [
+        ["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)],
+        ["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)],
+        ["association: precision, recall", *map(", ".join, shares)],
+        ["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)],
+        ["diverged", *("yes" if s["diverged"] else "no" for s in schemes)],
+        ["held itself for lost", *(_said(s["outcomes"]) for s in schemes)],
+    ]
     lost = [s.get("lost", {"times": 0}) for s in schemes]
     if any(one["times"] for one in lost):
         rows.append(["because", *(words_of_loss(one) if one["times"] else "-" for one in lost)])

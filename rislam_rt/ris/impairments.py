@@ -50,9 +50,9 @@ class PanelErrors:
 
     def __post_init__(self) -> None:
         shape = np.shape(self.amplitude)
-        freeze(self, "amplitude", np.float64, (None, None))
-        for name, dtype in (("phase", np.float64), ("dead", np.bool_), ("stuck", np.int64)):
-            freeze(self, name, dtype, shape)
+        freeze(self, np.float64, amplitude=(None, None), phase=shape)
+        freeze(self, np.bool_, dead=shape)
+        freeze(self, np.int64, stuck=shape)
         if (self.amplitude < 0.0).any():
             raise ConfigError(f"panel.amplitude: {self.amplitude.min()} received; give factors of 0 or more")
 

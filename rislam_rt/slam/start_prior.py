@@ -26,8 +26,7 @@ class StartPrior:
     """Standard deviation [rad] of the heading, where it is estimated."""
 
     def __post_init__(self) -> None:
-        freeze(self, "position", np.float64, (3,))
-        freeze(self, "velocity", np.float64, (3,))
+        freeze(self, np.float64, position=(3,), velocity=(3,))
         for name in ("position_std", "velocity_std", "heading_std"):
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"start.{name}: {getattr(self, name)} received; give a number that is not negative")

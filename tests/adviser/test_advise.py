@@ -9,9 +9,8 @@ import pytest
 
 from rislam_rt.adviser.advice import advise
 from rislam_rt.adviser.coverage import panel_coverage
-from rislam_rt.adviser.detection_forecast import forecast_detection
 from rislam_rt.adviser.forecast_codes import aimed_paths, paths_under_codes
-from rislam_rt.adviser.link_budget import LandmarkLink, Survey, link_budget, survey
+from rislam_rt.adviser.link_budget import LandmarkLink, Survey, forecast_detection, link_budget, survey
 from rislam_rt.adviser.remedies import HEARD, detection_label, enough_elements, lack_db, remedies, weak_places
 from rislam_rt.adviser.tracing_cost import COUNTED, cost_words, trace_cost
 from rislam_rt.channel.image_source import ImageSourceChannel

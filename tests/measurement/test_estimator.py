@@ -11,7 +11,7 @@ from rislam_rt.measurement.detection_threshold import _half_perimeter, detection
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
 from rislam_rt.measurement.received_paths import receive
-from rislam_rt.measurement.true_identity import identify
+from rislam_rt.measurement.waveform_receiver import identify
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()

@@ -14,7 +14,7 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, step
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.nested import particle_filter
+from rislam_rt.slam.window import cycle_explanation
 from rislam_rt.slam.window.cycle_explanation import learn_cycle
 from rislam_rt.slam.window.smoother import motion as model
 
@@ -250,7 +250,7 @@ def test_residuals_of_the_nested_filter_tell_of_scatter(
         squares.append(given[4].square)
         return learn_cycle(*given)
 
-    monkeypatch.setattr(particle_filter, "learn_cycle", learn)
+    monkeypatch.setattr(cycle_explanation, "learn_cycle", learn)
     nested = NestedConfig(num_agents=20, min_agents=20, num_points=32, min_points=32, engine="numpy", birth_cycles=6)
     go(clear[0], cycles=16, config=SlamConfig(filter="nested", nested=nested))
     found = np.concatenate(squares)

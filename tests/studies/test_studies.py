@@ -15,8 +15,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.pipeline import PipelineSpec, load_spec
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.report.studies.channel_validation import validation_page
-from rislam_rt.report.studies.channel_validation_figure import draw_certificate
+from rislam_rt.report.studies.channel_validation import draw_certificate, validation_page
 from rislam_rt.report.studies.fig4a import claims, fig4a_csv, fig4a_page, findings_of
 from rislam_rt.report.style import to_png
 from rislam_rt.scene import load_scene

@@ -81,11 +81,10 @@ class PathReport:
     """How each channel found its paths (`Paths.source`), by side."""
 
     def __post_init__(self) -> None:
-        freeze(self, "kind", np.int64, (None,))
-        for name in ("path", "cycle"):
-            freeze(self, name, np.int64, (len(self.kind),))
-        for name in ("length_error", "gain_error_db", "gain_error", "phase_error", "aod_error", "aoa_error"):
-            freeze(self, name, np.float64, (len(self.kind),))
+        freeze(self, np.int64, kind=(None,))
+        freeze(self, np.int64, **dict.fromkeys(("path", "cycle"), self.kind.shape))
+        errors = ("length_error", "gain_error_db", "gain_error", "phase_error", "aod_error", "aoa_error")
+        freeze(self, np.float64, **dict.fromkeys(errors, self.kind.shape))
 
     @property
     def matched(self) -> int:

@@ -73,16 +73,10 @@ class DiffusePaths:
 
     def __post_init__(self) -> None:
         count = len(np.asarray(self.cycle))
-        for name, dtype, shape in (
-            ("cycle", np.int64, (count,)),
-            ("kind", np.int64, (count,)),
-            ("tau", np.float64, (count,)),
-            ("departure", np.float64, (count, 3)),
-            ("arrival", np.float64, (count, 3)),
-            ("gain", np.complex128, (count,)),
-            ("vertices", np.float64, (count, None, 3)),
-        ):
-            freeze(self, name, dtype, shape)
+        freeze(self, np.int64, cycle=(count,), kind=(count,))
+        freeze(self, np.float64, tau=(count,), departure=(count, 3), arrival=(count, 3))
+        freeze(self, np.complex128, gain=(count,))
+        freeze(self, np.float64, vertices=(count, None, 3))
 
     def __len__(self) -> int:
         return len(self.cycle)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.evaluate import association_fractions, position_errors
+from rislam_rt.evaluate import AssociationScore, association_fractions, position_errors
 from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
@@ -74,7 +74,6 @@ class Tally:
         walls = wall_scores(self.scene, self.map)
         seconds = dict(zip(STEPS, (self.seconds / self.cycles).tolist(), strict=True))
         nees = None if self.nees is None else self.nees[0] / self.cycles
-        names = ("accuracy", "precision", "recall")
         return {
             "rmse_m": float(np.sqrt(self.square / self.cycles)),
             "bound_m": None,
@@ -90,7 +89,7 @@ class Tally:
             "walls": walls,
             "ghost_walls": count_ghosts(self.scene, self.map),
             "map": map_score(self.scene, self.map, panel=self.panel),
-            "association": dict(zip(names, self._association(), strict=True)),
+            "association": self._association()._asdict(),
             "step_seconds": seconds,
             "over_budget": over_budget(seconds, self.budget),
             "seconds": float(self.seconds.sum()),
@@ -133,7 +132,7 @@ class Tally:
         for (who, path), count in zip(met.T.tolist(), times.tolist(), strict=True):
             self.pairs[who, sources[path]] += count
 
-    def _association(self) -> tuple[float, float, float]:
+    def _association(self) -> AssociationScore:
         """Accuracy, precision and recall of data association from the tally of a long run."""
         labels = sorted({label for label, _ in self.pairs})
         sources = sorted({source for _, source in self.pairs}, key=lambda s: (s is not None, s))

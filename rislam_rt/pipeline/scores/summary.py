@@ -81,7 +81,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "walls": walls,
         "ghost_walls": count_ghosts(scene, scheme.map),
         "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
-        "association": {"accuracy": score.accuracy, "precision": score.precision, "recall": score.recall},
+        "association": score._asdict(),
         "step_seconds": seconds,
         "over_budget": over_budget(seconds, result.config["budget"]),
         "seconds": float(scheme.seconds.sum()),

@@ -1,15 +1,23 @@
-"""The page of the channel validation: how traced and image-source paths were compared, and a table of all rooms."""
+"""The page and figure of the channel validation: how traced and image-source paths agree, by room and pose."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.channel.compare import Validation
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rislam_rt.channel.compare import OneSidedPath, Validation
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.model import PathKind, Paths
+from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.markdown import table_lines
-from rislam_rt.report.studies.channel_validation_figure import draw_certificate
-from rislam_rt.report.style import to_png
+from rislam_rt.report.room_figures import path_points
+from rislam_rt.report.style import KIND, TRUTH, WALL, styled, to_png
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.studies.channel_validation import Comparison
+from rislam_rt.studies.channel_validation import Certificate, Comparison
 from rislam_rt.studies.spec import CompareSpec
 
 COMPARISON, CERTIFICATE = "channel_validation", "figures/path_certificate.png"
@@ -102,3 +110,115 @@ def _error(spread: Mapping[str, float]) -> str:
         return "-"
     largest, p99 = ("< 1e-12" if spread[name] < 1e-12 else f"{spread[name]:.1e}" for name in ("max", "p99"))
     return f"{largest} ({p99})"
+
+
+ALONE = "#CC79A7"
+"""Colour of a path that only one channel has."""
+FLOOR = 1e-16
+"""Smallest error that is drawn: half the spacing of float64 at 1."""
+MOST_LISTED = 6
+"""Largest number of one-sided paths whose explanations are written out."""
+
+
+def draw_certificate(certificate: Certificate) -> Figure:
+    """Draw the comparison of both channels at one pose: traced paths, image-source paths, one-sided ones, errors."""
+    scene, report = certificate.scene, certificate.report
+    low, high = scene.bounds
+    aspect = float((high[1] - low[1]) / (high[0] - low[0]))
+    with styled():
+        figure = Figure(figsize=(11.0, 2.0 * 5.2 * aspect + 2.2))
+        (left, right), (alone, errors) = figure.subplots(2, 2)
+        for axis, paths, name in ((left, certificate.traced, "traced"), (right, certificate.analytic, "analytic")):
+            _draw_side(axis, certificate, paths, name)
+        _draw_alone(alone, certificate)
+        _draw_errors(errors, certificate)
+        figure.suptitle(
+            f"Path certificate: {scene.name}, pose {certificate.pose}: {report.matched} matched, "
+            f"{sum(report.explained.values())} explained, {report.unexplained} unexplained",
+            weight="bold", fontsize=12,
+        )  # fmt: skip
+        kinds = [kind for kind in PathKind if kind in report.kind]
+        lines = [Line2D([], [], color=KIND[kind], lw=2.0, label=kind.name) for kind in kinds]
+        lines.append(Line2D([], [], color=ALONE, lw=3.0, label="only one side has it"))
+        for marker, size, label in (("*", 11, "agent"), ("o", 9, "scatterer"), ("s", 9, "panel")):
+            filled = TRUTH if marker == "*" else "none"
+            lines.append(Line2D([], [], ls="", marker=marker, ms=size, mfc=filled, mec=TRUTH, label=label))
+        figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), fontsize=9)
+    return figure
+
+
+def _draw_side(axis: Axes, certificate: Certificate, paths: Paths, name: str) -> None:
+    """Draw all paths of one channel from above for the validation, those that the other channel lacks on top."""
+    _draw_plan(axis, certificate)
+    columns = np.flatnonzero(paths.valid[0])
+    only = {path.label for path in certificate.report.one_sided if path.side == name}
+    for column in columns[np.argsort(-paths.kind[columns], kind="stable")]:
+        path, points = int(column), path_points(certificate.scene, paths, 0, int(column))
+        if paths.label(path) in only:
+            axis.plot(points[:, 0], points[:, 1], color=ALONE, lw=3.0, zorder=6)
+        else:
+            axis.plot(points[:, 0], points[:, 1], color=KIND[PathKind(paths.kind[path])], lw=0.8, alpha=0.6, zorder=3)
+    counts = f"{len(columns)} paths" + (f", {len(only)} of them alone" if only else "")
+    axis.set_title(f"{name}: {counts}", weight="bold")
+
+
+def _draw_alone(axis: Axes, certificate: Certificate) -> None:
+    """Draw the paths that only one channel has in the validation, with their explanations below."""
+    _draw_plan(axis, certificate)
+    sides = {"traced": certificate.traced, "analytic": certificate.analytic}
+    one_sided = certificate.report.one_sided
+    for path in one_sided:
+        paths = sides[path.side]
+        column = next(p for p in np.flatnonzero(paths.valid[0]) if paths.label(int(p)) == path.label)
+        points = path_points(certificate.scene, paths, 0, int(column))
+        axis.plot(points[:, 0], points[:, 1], color=ALONE, lw=2.5, ls="-" if path.reason else ":", zorder=6)
+        axis.plot(points[1:-1, 0], points[1:-1, 1], "o", color=ALONE, ms=5, zorder=7)
+    axis.set_title("what only one side has, and why", weight="bold")
+    axis.set_xlabel("")
+    axis.text(0.0, -0.09, _proofs(one_sided), transform=axis.transAxes, va="top", fontsize=8.5)
+
+
+def _proofs(one_sided: Sequence[OneSidedPath]) -> str:
+    """Explanations of the first one-sided paths of a channel comparison as text."""
+    if not one_sided:
+        return "nothing: both sides have the same paths"
+    lines = [f"{p.label}\n  only {p.side}: {p.reason or 'UNEXPLAINED'}, {p.proof}" for p in one_sided[:MOST_LISTED]]
+    more = len(one_sided) - MOST_LISTED
+    return "\n".join(lines + ([f"and {more} more"] if more > 0 else []))
+
+
+def _draw_errors(axis: Axes, certificate: Certificate) -> None:
+    """Draw the errors of matched paths of the channel validation, the tracer's float32 against float64, in rows by
+    quantity and path class."""
+    report = certificate.report
+    rows = (
+        ("length [m]", report.length_error), ("gain [dB]", report.gain_error_db), ("phase [rad]", report.phase_error),
+        ("AoD [rad]", report.aod_error), ("AoA [rad]", report.aoa_error),
+    )  # fmt: skip
+    kinds = [kind for kind in PathKind if kind in report.kind]
+    for row, (_, error) in enumerate(rows):
+        for number, kind in enumerate(kinds):
+            mine = np.sort(np.maximum(error[report.kind == kind], FLOOR))
+            height = row + 0.8 * (number + 0.5) / len(kinds) - 0.4
+            axis.plot(mine, np.full(len(mine), height), "|", color=KIND[kind], ms=6, mew=1.2, alpha=0.8)
+    axis.set_xscale("log")
+    axis.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axis.invert_yaxis()
+    axis.grid(False, axis="y")
+    axis.set_xlabel(f"tracer's float32 against analytic float64 (equal or less: at {FLOOR:.0e})")
+    axis.set_title("matched paths: how far apart", weight="bold")
+
+
+def _draw_plan(axis: Axes, certificate: Certificate) -> None:
+    """Draw walls, landmarks and agent of the pose of the channel validation from above."""
+    scene = certificate.scene
+    for edge in wall_edges(build_walls(scene)):
+        axis.plot(edge[:, 0], edge[:, 1], color=WALL, lw=1.6, solid_capstyle="round", zorder=2)
+    for scatterer in scene.scatterers:
+        axis.plot(*scatterer.position[:2], "o", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
+    for panel in scene.panels:
+        axis.plot(*panel.center[:2], "s", ms=9, mfc="none", mec=TRUTH, mew=1.5, zorder=8)
+    axis.plot(*scene.agent.position[0, :2], "*", color=TRUTH, ms=11, zorder=9)
+    axis.set_aspect("equal")
+    axis.grid(False)
+    axis.set(xlabel="x [m]", ylabel="y [m]")

@@ -6,16 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import (
-    NOTHING,
-    metres,
-    metres_between,
-    paragraph,
-    percent_between,
-    picture,
-    ratio,
-    table_lines,
-)
+from rislam_rt.report import markdown
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
@@ -83,7 +74,7 @@ def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
 
 def fig4b_body(content: Mapping[str, Any], spec: Fig4bSpec, figure: str | None) -> list[str]:
     """Lines of the page of Fig. 4(b): the picture, errors, gains, and what limits the errors."""
-    lines = picture(figure, "RMSE of the agent against SNR")
+    lines = markdown.picture(figure, "RMSE of the agent against SNR")
     for case in spec.cases:
         entries = [entry for entry in content["entries"] if entry["case"] == case.name]
         gains = [entry for entry in content["gains"] if entry["case"] == case.name]
@@ -99,7 +90,7 @@ def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     Most of the start's own error is not in it, which no measurement of unknown landmarks removes:"""
     return [
         "RMSE of the agent [m], with its 95 % interval:", "", *_schemes_lines(entries, "rmse"), "",
-        *paragraph(shape), "", *_schemes_lines(entries, "aligned"),
+        *markdown.paragraph(shape), "", *_schemes_lines(entries, "aligned"),
     ]  # fmt: skip
 
 
@@ -110,9 +101,11 @@ def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str
     for snr in dict.fromkeys(entry["snr_db"] for entry in entries):
         own = {entry["scheme"]: entry for entry in entries if entry["snr_db"] == snr}
         paper = next(iter(own.values()))["paper_snr_db"]
-        cells = [metres_between(own[scheme], error) if scheme in own else NOTHING for scheme in schemes]
+        cells = [
+            markdown.metres_between(own[scheme], error) if scheme in own else markdown.NOTHING for scheme in schemes
+        ]
         rows.append([f"{snr:g}", f"{paper:.0f}", *cells])
-    return table_lines(["SNR [dB]", "paper's SNR [dB]", *schemes], rows)
+    return markdown.table_lines(["SNR [dB]", "paper's SNR [dB]", *schemes], rows)
 
 
 def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -124,22 +117,22 @@ def _gain_lines(gains: Sequence[Mapping[str, Any]]) -> list[str]:
         for rival in rivals:
             entry = next(e for e in gains if e["snr_db"] == snr and e["over"] == rival)
             limit = f"; bounds {100 * entry['bound_gain']:.0f} %" if entry["bound_gain"] is not None else ""
-            cells.append(f"{percent_between(entry, 'gain')}, {metres(entry['lower_by_m'])} m{limit}")
+            cells.append(f"{markdown.percent_between(entry, 'gain')}, {markdown.metres(entry['lower_by_m'])} m{limit}")
         rows.append(cells)
     title = (
         f"How far `{OURS}` is below the others, from pairs of runs with the same motion and noise (95 % interval), in"
     )
     head = ["SNR [dB]", *(f"than {rival}" for rival in rivals)]
-    return [title, "metres, and the same of their bounds:", "", *table_lines(head, rows)]
+    return [title, "metres, and the same of their bounds:", "", *markdown.table_lines(head, rows)]
 
 
 def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     """Table for Fig. 4(b) of bounds, NEES, association and what limits the error, by SNR and scheme."""
     rows = [
         [
-            f"{entry['snr_db']:g}", entry["scheme"], metres(entry["bound_m"]), ratio(entry["over_bound"]),
-            ratio(entry["nees_per_dof"]), ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}",
-            str(entry["failed"]), what_limits(entry),
+            f"{entry['snr_db']:g}", entry["scheme"], markdown.metres(entry["bound_m"]),
+            *(markdown.ratio(entry[name]) for name in ("over_bound", "nees_per_dof", "association")),
+            f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]), what_limits(entry),
         ]
         for entry in entries
     ]  # fmt: skip
@@ -147,4 +140,4 @@ def _budget_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     text = """Error budget. The limit is the bound where the RMSE is within 1.5 of it, else association where fewer than
     95 % of the components are taken for what they are, else the filter. NEES is that of the position per degree of
     freedom: 1 if the estimator knows how wrong it is."""
-    return [*paragraph(text), "", *table_lines(head, rows)]
+    return [*markdown.paragraph(text), "", *markdown.table_lines(head, rows)]

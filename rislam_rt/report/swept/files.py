@@ -11,17 +11,7 @@ from rislam_rt.report.style import to_png
 from rislam_rt.report.swept import ablations, fig4b, fig4c, hardware, robustness, rooms
 from rislam_rt.report.swept.entries import entries_csv, failure_notes
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.studies.swept import (
-    AblationsSpec,
-    Fig4bSpec,
-    Fig4cSpec,
-    Group,
-    HardwareSpec,
-    RobustnessSpec,
-    RoomsSpec,
-    SweptSpec,
-    group_rows,
-)
+from rislam_rt.studies import swept
 from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.cell_work import plain_result
 
@@ -31,7 +21,7 @@ class StudyLayout(NamedTuple):
 
     title: str
     """Title of the page."""
-    content: Callable[[Sequence[Group], Any], dict[str, Any]]
+    content: Callable[[Sequence[swept.Group], Any], dict[str, Any]]
     """Makes plain data from groups and specification."""
     draw: Callable[[Mapping[str, Any], Any], Figure]
     """Draws the figure from plain data and specification."""
@@ -40,23 +30,23 @@ class StudyLayout(NamedTuple):
 
 
 LAYOUTS: dict[type, StudyLayout] = {
-    Fig4bSpec: StudyLayout(fig4b.TITLE, fig4b.fig4b_content, fig4b.draw_fig4b, fig4b.fig4b_body),
-    Fig4cSpec: StudyLayout(fig4c.TITLE, fig4c.fig4c_content, fig4c.draw_fig4c, fig4c.fig4c_body),
-    AblationsSpec: StudyLayout(
+    swept.Fig4bSpec: StudyLayout(fig4b.TITLE, fig4b.fig4b_content, fig4b.draw_fig4b, fig4b.fig4b_body),
+    swept.Fig4cSpec: StudyLayout(fig4c.TITLE, fig4c.fig4c_content, fig4c.draw_fig4c, fig4c.fig4c_body),
+    swept.AblationsSpec: StudyLayout(
         ablations.TITLE, ablations.ablations_content, ablations.draw_ablations, ablations.ablations_body
     ),
-    HardwareSpec: StudyLayout(
+    swept.HardwareSpec: StudyLayout(
         hardware.TITLE, hardware.hardware_content, hardware.draw_hardware, hardware.hardware_body
     ),
-    RobustnessSpec: StudyLayout(
+    swept.RobustnessSpec: StudyLayout(
         robustness.TITLE, robustness.robustness_content, robustness.draw_robustness, robustness.robustness_body
     ),
-    RoomsSpec: StudyLayout(rooms.TITLE, rooms.rooms_content, rooms.draw_rooms, rooms.rooms_body),
+    swept.RoomsSpec: StudyLayout(rooms.TITLE, rooms.rooms_content, rooms.draw_rooms, rooms.rooms_body),
 }
 
 
 def write_swept(
-    rows: Sequence[Row], spec: SweptSpec, record: Mapping[str, Any], folder: Path, *, figures: bool = True
+    rows: Sequence[Row], spec: swept.SweptSpec, record: Mapping[str, Any], folder: Path, *, figures: bool = True
 ) -> Path | None:
     """Write the files of a swept study (`.md`, `.csv`, `.json`, figure); return the page, None before any cell is done.
 
@@ -65,7 +55,7 @@ def write_swept(
     StoreError
         The disk refused.
     """
-    groups = [group for group in group_rows(rows) if group.schemes or (any(group.results) and _of_receiver(spec))]
+    groups = [group for group in swept.group_rows(rows) if group.schemes or (any(group.results) and _of_receiver(spec))]
     if not groups:
         return None
     layout = LAYOUTS[type(spec)]
@@ -83,12 +73,14 @@ def write_swept(
     return write_all(folder, files)
 
 
-def _of_receiver(spec: SweptSpec) -> bool:
+def _of_receiver(spec: swept.SweptSpec) -> bool:
     """Whether the files of a study are of the receiver alone: its cells have no scores of schemes."""
-    return isinstance(spec, HardwareSpec)
+    return isinstance(spec, swept.HardwareSpec)
 
 
-def about_lines(groups: Sequence[Group], spec: SweptSpec, record: Mapping[str, Any], wanted: int) -> list[str]:
+def about_lines(
+    groups: Sequence[swept.Group], spec: swept.SweptSpec, record: Mapping[str, Any], wanted: int
+) -> list[str]:
     """Lines on how the numbers of a swept study were computed; `wanted` is the number of cells in all."""
     config = record["settings"]
     source = "ray tracing (Sionna RT)" if config["channel"] == "traced" else "image sources"

@@ -5,16 +5,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import (
-    metres,
-    metres_between,
-    paragraph,
-    percent,
-    percent_between,
-    picture,
-    ratio,
-    table_lines,
-)
+from rislam_rt.report import markdown
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import interval_entry, rmse_change, scheme_entry
 from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
@@ -89,12 +80,12 @@ def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
 
 def robustness_body(content: Mapping[str, Any], spec: RobustnessSpec, figure: str | None) -> list[str]:
     """Lines of the robustness study's page: the worst mismatches with their remedies, the picture, a table."""
-    lines = [*paragraph(LAW), "", "## The worst at the level of ordinary equipment", ""]
-    lines += [*table_lines(["mismatch", "level", "change", "what would cure it"], _worst_rows(content)), ""]
+    lines = [*markdown.paragraph(LAW), "", "## The worst at the level of ordinary equipment", ""]
+    lines += [*markdown.table_lines(["mismatch", "level", "change", "what would cure it"], _worst_rows(content)), ""]
     lines += ["In this order after them: " + ", ".join(f"`{name}`" for name in content["worst"][WORST:]) + ".", ""]
-    lines += picture(figure, "RMSE at every level of every mismatch")
+    lines += markdown.picture(figure, "RMSE at every level of every mismatch")
     lines += ["## All levels", "", "An asterisk marks the level of ordinary equipment.", ""]
-    lines += [*table_lines(_HEAD, [_row(content, entry) for entry in content["entries"]]), ""]
+    lines += [*markdown.table_lines(_HEAD, [_row(content, entry) for entry in content["entries"]]), ""]
     lines += ["## Why a level is ordinary", ""]
     return lines + [f"- `{name}`, {_level(content, name, mismatch['ordinary'])}: {mismatch['source']}."
                     for name, mismatch in content["about"].items() if mismatch["source"]]  # fmt: skip
@@ -113,7 +104,9 @@ def _worst_rows(content: Mapping[str, Any]) -> list[list[str]]:
         mine = [entry for entry in content["entries"] if entry["mismatch"] == name and entry["ordinary"]]
         entry = next(entry for entry in mine if entry["scheme"] == first)
         note = f"`{name}`: {mismatch['note']}"
-        rows.append([note, _level(content, name, entry["level"]), percent_between(entry, "change"), mismatch["cure"]])
+        rows.append(
+            [note, _level(content, name, entry["level"]), markdown.percent_between(entry, "change"), mismatch["cure"]]
+        )
     return rows
 
 
@@ -123,10 +116,10 @@ def _row(content: Mapping[str, Any], entry: Mapping[str, Any]) -> list[str]:
     note = f"`{name}`: {content['about'][name]['note']}" if name else "`reference`: nothing is wrong"
     level = _level(content, name, entry["level"]) + ("*" if entry["ordinary"] else "") if name else ""
     return [
-        note, level, entry["scheme"], metres_between(entry), percent_between(entry, "change"), metres(entry["bound_m"]),
-        metres(entry["aligned_m"]), ratio(entry["nees_per_dof"]), metres(entry["ris_m"]),
-        percent(entry["ris_found"]),
-        ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
+        note, level, entry["scheme"], markdown.metres_between(entry), markdown.percent_between(entry, "change"),
+        markdown.metres(entry["bound_m"]), markdown.metres(entry["aligned_m"]), markdown.ratio(entry["nees_per_dof"]),
+        markdown.metres(entry["ris_m"]), markdown.percent(entry["ris_found"]), markdown.ratio(entry["association"]),
+        f"{entry['diverged']} of {entry['runs']}", str(entry["failed"]),
     ]  # fmt: skip
 
 

@@ -47,7 +47,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     """Draft of a room from an imported mesh, by flat regions or a scan's planes: reflectors, materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
-        pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64), True)]
+        pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64))]
     else:
         pieces, about = find_pieces(facets, [part.node for part in parts]), []
         found = sort_regions(facets, pieces, find_round(facets), options)

@@ -35,19 +35,11 @@ from rislam_rt.slam.observations import PANEL, free_space, stranger_density
 from rislam_rt.slam.predicted_returns import AXES, observe, poses_of
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import REMOVED, LossCause, StepInfo, StepOutcome
-from rislam_rt.slam.window import WindowState
+from rislam_rt.slam.window import WindowState, cycle_explanation
 from rislam_rt.slam.window import init as window_init
 from rislam_rt.slam.window import revisit as window_revisit
 from rislam_rt.slam.window.births.feature_removal import remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle
-from rislam_rt.slam.window.cycle_explanation import (
-    components_to_explain,
-    learn_cycle,
-    log_associations,
-    outcome_of,
-    remove_or_add_features,
-    unexplained,
-)
 from rislam_rt.slam.window.divergence.divergence_monitor import cause_of_loss
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.measurement_log import Log, squares
@@ -117,34 +109,36 @@ def step(
     turn = heading - float(state.front.heading[-1])
     front, belief = _move(state, dt, heading, code, config, rng=rng)
     scene, landmarks, engine = front.scene, front.landmarks, pick_engine(config.nested.engine)
-    heard = components_to_explain(measurement, scene)
+    heard = cycle_explanation.components_to_explain(measurement, scene)
     observed = heard.observed
-    strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(front, observed)))
+    strangers = stranger_density(
+        observed, scene.sensor, max(config.new_density, cycle_explanation.unexplained(front, observed))
+    )
     view = associate_cycle(front.window, landmarks, front.visibility, heading, scene, code, observed, strangers, None)
-    front, used = log_associations(front, observed, view)
-    told = update(belief, _seen(front, view, used), config.nested, engine)
-    front = _refresh_view(front, told.belief, config)
+    front, used = cycle_explanation.log_associations(front, observed, view)
+    belief, evidence, nis = update(belief, _seen(front, view, used), config.nested, engine)
+    front = _refresh_view(front, belief, config)
     left = relinearise(front, 0 if front.cycle % REFRESH == 0 else front.window.num_poses - 1)[1]
     left = left._replace(square=squares(left.row, left.left, front.log, 0.0))
     before = front.lost_log_odds
-    front, landmark = learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
+    front, landmark = cycle_explanation.learn_cycle(front, heard, view, used, left, dt, turn, config.sigma_a, code)
     front, removed = _classify(front, config)
     landmark[heard.free[removed[len(removed) - len(observed.seen) :]]] = REMOVED
 
-    grown = remove_or_add_features(front, left, view)
+    grown = cycle_explanation.remove_or_add_features(front, left, view)
     # a wall found by a point that it stands before is gone with it
     found = grown.landmarks.ident
     grown = remove_from_map(grown, (found < landmarks.next_ident) | np.isin(found, grown.log.form[:, 0]))
-    belief = _follow_map(told.belief, front, grown, config, rng=rng)
+    belief = _follow_map(belief, front, grown, config, rng=rng)
     ess = effective_size(belief)
     belief, resampled = renew(belief, _spans(grown), config.nested, engine, rng=rng)
-    outcome = outcome_of(len(measurement), len(grown.landmarks.ident), grown.lost_log_odds >= 0.0)
+    outcome = cycle_explanation.outcome_of(len(measurement), len(grown.landmarks.ident), grown.lost_log_odds >= 0.0)
     front = _refresh_view(grown._replace(cycle=grown.cycle + 1), belief, config)
     count = len(front.landmarks.points)
     cause = LossCause.NONE
     if outcome == StepOutcome.DIVERGED:
         cause = cause_of_loss(before, grown.lost_log_odds, grown.lost_log_odds, view.score)
-    info = StepInfo(landmark, ess, resampled, told.nis, 3 * int(used.sum()), told.log_evidence, count, outcome, cause)
+    info = StepInfo(landmark, ess, resampled, nis, 3 * int(used.sum()), evidence, count, outcome, cause)
     return NestedState(front, belief), info
 
 

@@ -1,6 +1,6 @@
 """Scores of one estimator in one unseen room: RMSE over its bound, NEES, divergence, walls, landmarks, births."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -27,20 +27,12 @@ MIN_PARTS = 3
 """Least number of components associated with a landmark for its kind to be scored."""
 
 
-class Errors(NamedTuple):
-    """Absolute position errors, and errors relative to the true start, over K cycles [m]."""
-
-    absolute: Floats
-    """(K,) distance of estimate and true position."""
-    relative: Floats
-    """(K,) the same without the error of the start prior, which no measurement reduces."""
-
-
 def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
     """Score the estimates of one run in an unseen room against its truth: RMSE, bounds, NEES, divergence, walls,
     landmarks, births.
 
-    None where there is nothing to score.
+    None where there is nothing to score. Relative errors are without the error of the start prior, which no measurement
+    reduces.
 
     Raises
     ------
@@ -52,21 +44,22 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
             f"answers: {len(answers.estimates)} estimates of {len(truth.position)} cycles received; give one a cycle"
         )
     told = inputs.start.position - truth.position[0]
-    errors = _errors(truth, answers, told)
+    offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
+    absolute, relative = np.linalg.norm(offset, axis=1), np.linalg.norm(offset - told, axis=1)
     late = inputs.time >= SETTLED
     drift = truth.position[0] + np.outer(inputs.time, inputs.start.velocity) - truth.position
     scores = {
-        **_ratio("", errors.absolute, truth.bound),
-        **_ratio("relative_", errors.relative, truth.relative_bound),
-        **(_ratio("late_", errors.absolute[late], truth.bound[late]) if late.any() else {}),
-        **(_ratio("late_relative_", errors.relative[late], truth.relative_bound[late]) if late.any() else {}),
+        **_ratio("", absolute, truth.bound),
+        **_ratio("relative_", relative, truth.relative_bound),
+        **(_ratio("late_", absolute[late], truth.bound[late]) if late.any() else {}),
+        **(_ratio("late_relative_", relative[late], truth.relative_bound[late]) if late.any() else {}),
         "dead_reckoning_m": evaluate.root_mean_square(np.linalg.norm(drift, axis=1)),
         "nees": _nees(truth, answers, 3),
         "horizontal_nees": _nees(truth, answers, 2),
     }
     own = np.array([np.sqrt(np.trace(estimate.covariance[:3, :3])) for estimate in answers.estimates])
     outcomes = [info.outcome for info in answers.infos]
-    scores |= lost_scores(errors.relative, truth.relative_bound, own, inputs.time, outcomes)
+    scores |= lost_scores(relative, truth.relative_bound, own, inputs.time, outcomes)
     maps = [estimate.map for estimate in answers.estimates]
     scores |= wall_scores(truth, maps, inputs.time, told)
     scores |= point_scores(truth, maps, inputs, told)
@@ -175,12 +168,6 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
         if len(parts.get(ident, ())) >= MIN_PARTS
     ]
     return {"births": len(is_image), "births_judged": len(judged), "births_right": int(np.sum(judged))}
-
-
-def _errors(truth: Truth, answers: Answers, told: Floats) -> Errors:
-    """Position errors of a run in an unseen room, to score; `told` (3,) [m] is the error of the start prior."""
-    offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
-    return Errors(np.linalg.norm(offset, axis=1), np.linalg.norm(offset - told, axis=1))
 
 
 def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:

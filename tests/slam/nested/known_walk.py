@@ -95,7 +95,7 @@ def walk(config: SlamConfig, cycles: int, walls: int = 0, std: Floats = STD, *, 
             belief = born(belief, truth, np.array(history), std, spans, config.nested, engine, rng=own)
         if cycle > FIRST:
             told = Seen(truth.returns, truth.anchor, BODY, seen, np.tile(std**2, (len(seen), 1)))
-            belief = update(belief, told, config.nested, engine).belief
+            belief = update(belief, told, config.nested, engine)[0]
         belief, done = renew(belief, spans, config.nested, engine, rng=own)
         resampled += done
         moments.append(gaussian(belief))

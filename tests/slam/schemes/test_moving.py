@@ -11,7 +11,7 @@ from rislam_rt import slam
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import SensorModel
 from rislam_rt.slam import StepOutcome
-from rislam_rt.slam.schemes import RIVALS, bp_slam, channel_slam
+from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
 from rislam_rt.slam.step_info import REMOVED
 
 SCHEMES = [
@@ -75,9 +75,9 @@ def test_bad_settings_are_named(field: str) -> None:
         bp_slam.BpSlamConfig(**{field: "up" if field == "height" else -1})
 
 
-@pytest.mark.parametrize("name", list(RIVALS))
-def test_every_rival_takes_what_the_default_takes(name: str) -> None:
+@pytest.mark.parametrize("rival", [bp_slam, bp_slam_aoa, channel_slam], ids=lambda rival: rival.__name__)
+def test_every_rival_takes_what_the_default_takes(rival: Any) -> None:
     """Names and order of the arguments of the four functions."""
     for function in ("init", "step", "predict", "estimate"):
-        own, default = (inspect.signature(getattr(each, function)) for each in (RIVALS[name], slam))
+        own, default = (inspect.signature(getattr(each, function)) for each in (rival, slam))
         assert list(own.parameters) == list(default.parameters)

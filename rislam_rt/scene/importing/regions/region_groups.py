@@ -32,8 +32,6 @@ class RegionGroup(NamedTuple):
     node: str
     regions: Integers
     """Numbers of its flat regions."""
-    shell: bool
-    """Whether it is the shell of the room."""
 
 
 def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
@@ -56,7 +54,7 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
         elif _is_shell(bounds_of(facets, regions), box):
             whole[regions] = True  # a whole room under one name
         else:
-            others.append(RegionGroup(name, name, regions, False))
+            others.append(RegionGroup(name, name, regions))
     loose = np.flatnonzero(whole)
     things: list[Integers] = []
     for component in np.unique(facets.component[loose]):
@@ -73,8 +71,8 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
         if _is_shell(bounds, box):  # walls that were drawn apart
             shell += regions.tolist()
         else:
-            others.append(RegionGroup(kind_by_shape(bounds, box), "", regions, False))
-    return [RegionGroup("", "", np.array(sorted(shell), dtype=np.int64), True), *others]
+            others.append(RegionGroup(kind_by_shape(bounds, box), "", regions))
+    return [RegionGroup("", "", np.array(sorted(shell), dtype=np.int64)), *others]
 
 
 def _continues(facets: FlatRegions, regions: Integers, shell: Integers) -> bool:

@@ -5,8 +5,6 @@ of N particles shifts the mean by a standard deviation over sqrt(N) and takes 1/
 of resamplings such directions get lost. So whatever is drawn here is corrected to the exact first two moments.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
@@ -27,17 +25,6 @@ KERNEL_DIMS = 4
 """Number of dimensions for the kernel's width: start position and velocity in the plane; the rest follows from them."""
 
 
-class Whitened(NamedTuple):
-    """Weighted samples in coordinates in which they have mean zero and unit covariance, null directions left out."""
-
-    values: Floats
-    """Samples (N, K) in the whitened coordinates."""
-    mean: Floats
-    """Weighted mean (D,) of the samples."""
-    factor: Floats
-    """Factor (D, K) back to the samples: `sample = mean + factor @ value`."""
-
-
 def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Weighted mean (D,) and covariance (D, D) of agent particles (N, D)."""
     mean = weight @ values
@@ -45,8 +32,11 @@ def moments(weight: Floats, values: Floats) -> tuple[Floats, Floats]:
     return mean, (centred * weight[:, None]).T @ centred
 
 
-def whiten(weight: Floats, values: Floats) -> Whitened:
-    """Weighted agent particles (N, D) in coordinates of mean zero and unit covariance."""
+def whiten(weight: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
+    """Weighted agent particles (N, D) in coordinates (N, K) of mean zero and unit covariance, null directions left out.
+
+    Also their mean (D,), and the factor (D, K) back to them: `particle = mean + factor @ value`.
+    """
     mean, covariance = moments(weight, values)
     # a constant's rounding errors must not become a direction of their own
     scale = np.maximum(np.sqrt(np.diag(covariance)), ROUNDING * (1.0 + np.abs(mean)))
@@ -54,7 +44,7 @@ def whiten(weight: Floats, values: Floats) -> Whitened:
     keep = spread > 1e-10
     root = np.sqrt(spread[keep])
     kept = vectors[:, keep]
-    return Whitened((values - mean) / scale @ kept / root, mean, scale[:, None] * kept * root)
+    return (values - mean) / scale @ kept / root, mean, scale[:, None] * kept * root
 
 
 def standardise(weight: Floats, values: Floats) -> Floats:
@@ -74,7 +64,7 @@ def exact_noise(values: Floats, dims: int, *, rng: np.random.Generator) -> Float
     count = len(values)
     equal = np.full(count, 1.0 / count)
     noise = rng.standard_normal((count, dims))
-    known = whiten(equal, values).values
+    known, _, _ = whiten(equal, values)
     if count >= ROOM * max(known.shape[1], 1):
         noise = noise - equal @ noise
         noise = noise - known @ (known.T @ noise) / count
@@ -91,14 +81,13 @@ def posterior(log_weight: Floats, values: Floats) -> tuple[Floats, Floats]:
     returned.
     """
     weight, count = np.exp(log_weight), len(log_weight)
-    standard = whiten(np.full(count, 1.0 / count), values)
-    fitted = _likelihood(log_weight, standard.values) if standard.values.shape[1] else None
+    standard, mean, factor = whiten(np.full(count, 1.0 / count), values)
+    fitted = _likelihood(log_weight, standard) if standard.shape[1] else None
     if fitted is None:
         return moments(weight, values)
     slope, precision = fitted
     within = np.linalg.inv(precision)
-    factor = standard.factor
-    return standard.mean + factor @ within @ slope, factor @ within @ factor.T
+    return mean + factor @ within @ slope, factor @ within @ factor.T
 
 
 def _likelihood(log_weight: Floats, known: Floats) -> tuple[Floats, Floats] | None:
@@ -137,13 +126,13 @@ def resample(log_weight: Floats, values: Floats, count: int, *, rng: np.random.G
     """
     weight = np.exp(log_weight)
     mean, covariance = posterior(log_weight, values)
-    standard = whiten(weight, values)
+    standard, _, factor = whiten(weight, values)
     ancestors = systematic_ancestors(weight, count, rng=rng)
-    width = kernel_width(count, min(max(standard.values.shape[1], 1), KERNEL_DIMS))
-    chosen = standard.values[ancestors]
+    width = kernel_width(count, min(max(standard.shape[1], 1), KERNEL_DIMS))
+    chosen = standard[ancestors]
     moved = np.sqrt(1.0 - width**2) * chosen + width * rng.standard_normal(chosen.shape)
     moved = standardise(np.full(count, 1.0 / count), moved)
-    return ancestors, mean + moved @ square_root(covariance, standard.factor).T
+    return ancestors, mean + moved @ square_root(covariance, factor).T
 
 
 def square_root(covariance: Floats, near: Floats) -> Floats:

@@ -36,21 +36,14 @@ class Seen(NamedTuple):
     """Variances (A, 3) of the measurements."""
 
 
-class WeightUpdate(NamedTuple):
-    """Particles after a cycle's measurements, with their evidence."""
+def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine) -> tuple[Nested, float, float]:
+    """Weigh the particles of agent and landmarks by a cycle's observed returns (eqs. `landmarkRenew`, `agentRenew`).
 
-    belief: Nested
-    """The reweighted particles."""
-    log_evidence: float
-    """Log density of the measurements given all before, of those that the belief could explain."""
-    nis: float
-    """Squared innovation of the mean belief, normalised; chi^2 with 3 A degrees of freedom."""
-
-
-def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine) -> WeightUpdate:
-    """Weigh the particles of agent and landmarks by a cycle's observed returns (eqs. `landmarkRenew`, `agentRenew`)."""
+    Also the log density of those measurements that the belief could explain, given all before, and the squared
+    innovation of the mean belief, normalised: chi^2 with 3 A degrees of freedom.
+    """
     if not len(seen.seen):
-        return WeightUpdate(belief, 0.0, 0.0)
+        return belief, 0.0, 0.0
     mean, covariance = gaussian(belief)
     poses = poses_of(mean[:3], mean[6], seen.body)
     linear = linearise(seen.returns, mean[HEAD:].reshape(-1, 3), seen.anchor, poses)
@@ -70,7 +63,7 @@ def update(belief: Nested, seen: Seen, config: NestedConfig, engine: CloudEngine
                 sightings = _sightings(belief, int(feature), some, seen, linear.by_feature, config)
                 belief, evidence = absorb(belief, int(feature), sightings, engine)
                 total += evidence if np.isfinite(evidence) else 0.0
-    return WeightUpdate(belief, total, nis)
+    return belief, total, nis
 
 
 def _innovations(gap: Floats, by_state: Floats, covariance: Floats, noise: Floats) -> tuple[Floats, float]:

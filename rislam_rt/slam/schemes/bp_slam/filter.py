@@ -13,19 +13,8 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.schemes.bp_slam.config import BpSlamConfig
+from rislam_rt.slam.schemes.shared import gaussian_sums
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
-from rislam_rt.slam.schemes.shared.gaussian_sums import (
-    PredictedRanges,
-    Sums,
-    born,
-    carry,
-    join,
-    kinds_of,
-    no_sums,
-    predict_ranges,
-    prune,
-    range_moments,
-)
 from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.ranges import Odds, Scan, birth_ratio
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
@@ -46,7 +35,7 @@ class BpSlamState(NamedTuple):
 
     agent: DelayAgent
     """The agent: trajectory, height, heading, body and receiver."""
-    sums: Sums
+    sums: gaussian_sums.Sums
     """Potential features as Gaussian sums."""
     undetected: float
     """Expected number of features that exist and were never detected."""
@@ -60,7 +49,7 @@ def init(
 ) -> BpSlamState:  # fmt: skip
     """State of BP-SLAM before the first cycle: the start prior, no features. `ris` is not used; nothing is drawn."""
     agent = begin_agent(start, int(config.axes.sum()), body, sensor)
-    return BpSlamState(agent, no_sums(len(agent.course.mean)), config.initial_features, 0)
+    return BpSlamState(agent, gaussian_sums.no_sums(len(agent.course.mean)), config.initial_features, 0)
 
 
 def assumed_odds(config: BpSlamConfig, sensor: SensorModel) -> Odds:
@@ -79,7 +68,7 @@ def _move(state: BpSlamState, dt: float, config: BpSlamConfig) -> BpSlamState:
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
-    sums = carry(state.sums, step, config.wander)
+    sums = gaussian_sums.carry(state.sums, step, config.wander)
     sums = sums._replace(existence=config.survival_probability * sums.existence)
     unseen = config.survival_probability * (1.0 - config.detection_probability) * state.undetected
     return state._replace(agent=agent, sums=sums, undetected=unseen + config.birth_mean)
@@ -102,7 +91,7 @@ def step(
     agent = state.agent._replace(heading=float(heading))
     rows, scan, strong, model = hear_ranges(agent, measurement, config)
     fresh = 1.0 + birth_ratio(scan.length, state.undetected, odds._replace(detection_probability=FIRST_DETECTION))
-    sight = predict_ranges(state.sums, agent.course, agent.pose[0], model)
+    sight = gaussian_sums.predict_ranges(state.sums, agent.course, agent.pose[0], model)
     found = claims(state.sums, sight, agent.course, scan, fresh, odds)
     landmark = np.full(len(measurement), REMOVED)
     landmark[rows], nis = _claimed(state, sight, scan, found, config)
@@ -122,13 +111,13 @@ def _give_birth(
     rows, existence = newborn(found, fresh, config.birth_threshold)
     sums = state.sums
     if len(rows):
-        kinds = kinds_of(strong[rows], config.wanderers)
-        new = born(
+        kinds = gaussian_sums.kinds_of(strong[rows], config.wanderers)
+        new = gaussian_sums.born(
             scan.length[rows], scan.std[rows], kinds, existence, state.agent.course, state.agent.pose[0],
             config.birth_turns, state.next_ident,
         )  # fmt: skip
-        sums = join(sums, new)
-    sums = prune(sums, config.pruning_threshold, config.share_threshold, config.max_features)
+        sums = gaussian_sums.join(sums, new)
+    sums = gaussian_sums.prune(sums, config.pruning_threshold, config.share_threshold, config.max_features)
     return state._replace(sums=sums, next_ident=state.next_ident + len(rows))
 
 
@@ -139,12 +128,12 @@ def estimate(state: BpSlamState, config: BpSlamConfig) -> SlamEstimate:
 
 
 def _claimed(
-    state: BpSlamState, sight: PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
+    state: BpSlamState, sight: gaussian_sums.PredictedRanges, scan: Scan, found: Association, config: BpSlamConfig
 ) -> tuple[Integers, float]:
     """BP-SLAM's feature number (M,) of each range, `UNUSED` for none, and the NIS over the ranges so claimed."""
     sums, numbers = state.sums, np.full(len(scan.length), UNUSED)
     feature, shown = np.nonzero((found.feature[:, :-1] > 0.5) & (sums.existence > config.detection_threshold)[:, None])
     numbers[shown] = sums.ident[feature]
-    mean, variance = range_moments(sums, sight, state.agent.course)
+    mean, variance = gaussian_sums.range_moments(sums, sight, state.agent.course)
     nis = np.sum((scan.length[shown] - mean[feature]) ** 2 / (variance[feature] + scan.std[shown] ** 2))
     return numbers, float(nis)

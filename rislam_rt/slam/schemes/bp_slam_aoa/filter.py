@@ -10,20 +10,11 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.observations import free_space, is_los, observations_of
+from rislam_rt.slam.schemes.bp_slam_aoa import gaussian_features
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, claims, expect_scan, likelihoods, spread_of
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_birth import ComponentScan, born, hypothesise
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_update import absorb
-from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import (
-    POINT,
-    WALL,
-    Ends,
-    GaussianFeatures,
-    carry,
-    no_features,
-    predict_returns,
-    spread_over,
-)
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, advance
 from rislam_rt.slam.schemes.shared.gaussian_sums import join, prune
 from rislam_rt.slam.schemes.shared.loopy_association import Association
@@ -57,7 +48,7 @@ class BpSlamAoaState(NamedTuple):
 
     course: AgentTrajectory
     """The agent's trajectory [m], relative to the start."""
-    features: GaussianFeatures
+    features: gaussian_features.GaussianFeatures
     """Potential features as Gaussian sums."""
     fresh: float
     """Share of the features expected at the start that was never detected."""
@@ -89,7 +80,7 @@ def init(
     course = AgentTrajectory(mean, np.diag(std**2), mean, 3, np.diag(std**2), 0.0)
     motion_mode = np.array([1.0, 0.0, 0.0, 0.0])
     return BpSlamAoaState(
-        course, no_features(6), 1.0, 0, 0, motion_mode, float(start.heading), 1.0, start, body, sensor
+        course, gaussian_features.no_features(6), 1.0, 0, 0, motion_mode, float(start.heading), 1.0, start, body, sensor
     )  # fmt: skip
 
 
@@ -177,11 +168,11 @@ def _mode_changes(config: BpSlamAoaConfig) -> Floats:
 
 def _predict(
     state: BpSlamAoaState, dt: float, scan: ComponentScan, config: BpSlamAoaConfig
-) -> tuple[BpSlamAoaState, View, Ends]:  # fmt: skip
+) -> tuple[BpSlamAoaState, View, gaussian_features.Ends]:  # fmt: skip
     """Predict agent and features of BP-SLAM with angles to this cycle, by the motion mode that explains it best."""
     turn = rotation_z(np.asarray(state.heading))
     upper = state.sensor.radio.array.pattern == "upper"
-    ends = Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
+    ends = gaussian_features.Ends(turn @ state.body.tx_offset, turn @ state.body.rx_offset, turn, upper)
     levels, free, prior = _levels(config), free_space(state.sensor.radio), state.motion_mode @ _mode_changes(config)
 
     def ahead(level: int) -> tuple[BpSlamAoaState, View]:
@@ -194,10 +185,10 @@ def _predict(
                 or (level > 0 and state.cycle % LIVELY_STRIDE == 0)
             )
             course, carried = advance(state.course, dt, levels[level], keep)
-            features = carry(state.features, carried, config.drift_std)
+            features = gaussian_features.carry(state.features, carried, config.drift_std)
             features = features._replace(existence=config.survival_probability * features.existence)
             moved = state._replace(course=course, features=features)
-        predicted = predict_returns(moved.features, moved.course, ends, free)
+        predicted = gaussian_features.predict_returns(moved.features, moved.course, ends, free)
         return moved, expect_scan(moved.features, predicted, scan, state.sensor, config)
 
     moved, view = ahead(0)
@@ -250,15 +241,19 @@ def pose_moments(course: AgentTrajectory, start: StartPrior, count: int) -> tupl
     return position, velocity, covariance, position + position_errors(covariance, count)
 
 
-def known_map(features: GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float) -> MapEstimate:
+def known_map(
+    features: gaussian_features.GaussianFeatures, course: AgentTrajectory, start: StartPrior, threshold: float
+) -> MapEstimate:
     """Reported map of BP-SLAM with angles: the features that exist, each by its likeliest Gaussian, as points and
     walls; no wanderers."""
-    total = features.covariance + spread_over(features.slope, course)
+    total = features.covariance + gaussian_features.spread_over(features.slope, course)
     best = np.zeros(len(features.ident))
     np.maximum.at(best, features.owner, features.share)
     shown = (features.existence[features.owner] > threshold) & (features.share > 0.5)
     shown &= features.share >= best[features.owner]
-    points, walls = (np.flatnonzero(shown & (features.kind == kind)) for kind in (POINT, WALL))
+    points, walls = (
+        np.flatnonzero(shown & (features.kind == kind)) for kind in (gaussian_features.POINT, gaussian_features.WALL)
+    )
     image, spread = features.mean[walls], total[walls]
     size = np.linalg.norm(image, axis=1)
     normal = image / np.maximum(size, 1e-9)[:, None]

@@ -18,18 +18,8 @@ from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.schemes.channel_slam import tracker
 from rislam_rt.slam.schemes.channel_slam.config import ChannelSlamConfig
 from rislam_rt.slam.schemes.channel_slam.tracker import RangeTracks, assign, follow, no_tracks
+from rislam_rt.slam.schemes.shared import gaussian_sums
 from rislam_rt.slam.schemes.shared.delay_agent import DelayAgent, begin_agent, hear_ranges, move_agent, reported
-from rislam_rt.slam.schemes.shared.gaussian_sums import (
-    Sums,
-    born,
-    carry,
-    join,
-    kinds_of,
-    no_sums,
-    predict_ranges,
-    prune,
-    range_moments,
-)
 from rislam_rt.slam.schemes.shared.loopy_association import Association
 from rislam_rt.slam.schemes.shared.ranges import Bistatic, Scan
 from rislam_rt.slam.schemes.shared.report import ahead_of, known_points, outcome_of
@@ -46,7 +36,7 @@ class ChannelSlamState(NamedTuple):
 
     agent: DelayAgent
     """The agent: trajectory, height, heading, body and receiver."""
-    sums: Sums
+    sums: gaussian_sums.Sums
     """Gaussian sums of the virtual transmitters; `ident` is the label of the path."""
     tracks: RangeTracks
     """Tracks of ranges by label."""
@@ -62,7 +52,7 @@ def init(
 ) -> ChannelSlamState:  # fmt: skip
     """State of Channel-SLAM before the first cycle: the start prior, no paths. `ris` is not used; nothing is drawn."""
     agent = begin_agent(start, int(config.axes.sum()), body, sensor)
-    return ChannelSlamState(agent, no_sums(len(agent.course.mean)), no_tracks(), {}, 0)
+    return ChannelSlamState(agent, gaussian_sums.no_sums(len(agent.course.mean)), no_tracks(), {}, 0)
 
 
 def predict(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> SlamEstimate:
@@ -109,7 +99,7 @@ def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> Chan
     if dt == 0.0:
         return state
     agent, step = move_agent(state.agent, dt, config.sigma_a, config.course_stride)
-    return state._replace(agent=agent, sums=carry(state.sums, step, config.wander))
+    return state._replace(agent=agent, sums=gaussian_sums.carry(state.sums, step, config.wander))
 
 
 def _label(
@@ -130,7 +120,7 @@ def _label(
 def _keep(state: ChannelSlamState, rows: Booleans, config: ChannelSlamConfig) -> ChannelSlamState:
     """Channel-SLAM's state with some of its virtual transmitters, and without Gaussians of small share."""
     sums = state.sums._replace(existence=np.where(rows, 1.0, 0.0))
-    sums = prune(sums, 0.5, config.share_threshold, config.max_paths)
+    sums = gaussian_sums.prune(sums, 0.5, config.share_threshold, config.max_paths)
     present = set(sums.ident.tolist())
     strains = {name: value for name, value in state.strains.items() if name in present}
     return state._replace(sums=sums, strains=strains)
@@ -141,13 +131,13 @@ def _correct(
 ) -> tuple[ChannelSlamState, Floats]:
     """Channel-SLAM's state and squared innovations after a scan's ranges; transmitters that long misfit are dropped."""
     agent = state.agent
-    sight = predict_ranges(state.sums, agent.course, agent.pose[0], model)
+    sight = gaussian_sums.predict_ranges(state.sums, agent.course, agent.pose[0], model)
     own = (state.sums.ident[:, None] == label).astype(float)
     hit, shown = np.nonzero(own)
-    mean, variance = range_moments(state.sums, sight, agent.course)
+    mean, variance = gaussian_sums.range_moments(state.sums, sight, agent.course)
     squares = (scan.length[shown] - mean[hit]) ** 2 / (variance[hit] + scan.std[shown] ** 2)
     missed = 1.0 - own.sum(axis=1, keepdims=True)
-    found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0), 1)
+    found = Association(own, np.concatenate([own, missed], axis=1), 1.0 - own.sum(axis=0))
     sums, course = absorb(state.sums, sight, agent.course, scan, found, config.odds)
     strains = dict(state.strains)
     for name, square in zip(sums.ident[hit].tolist(), squares.tolist(), strict=True):
@@ -166,9 +156,9 @@ def _give_birth(
     sums = state.sums
     for row in rows:
         one = slice(row, row + 1)
-        new = born(
-            scan.length[one], scan.std[one], kinds_of(strong[one], config.wanderers), np.ones(1),
+        new = gaussian_sums.born(
+            scan.length[one], scan.std[one], gaussian_sums.kinds_of(strong[one], config.wanderers), np.ones(1),
             state.agent.course, state.agent.pose[0], config.birth_turns, int(label[row]),
         )  # fmt: skip
-        sums = join(sums, new)
+        sums = gaussian_sums.join(sums, new)
     return state._replace(sums=sums)

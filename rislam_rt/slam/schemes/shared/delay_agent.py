@@ -78,11 +78,11 @@ def hear_ranges(
 
 def reported(agent: DelayAgent, points: Points, num_samples: int) -> SlamEstimate:
     """SLAM estimate of a filter by delay alone: mean, covariance and samples of the pose, and features as the map."""
-    belief, axes = over_all_turns(agent.course), agent.course.axes
-    position, velocity = lift(belief.mean, agent.height)
+    (mean, spread), axes = over_all_turns(agent.course), agent.course.axes
+    position, velocity = lift(mean, agent.height)
     rows = np.r_[0:axes, 3 : 3 + axes]
     covariance = np.zeros((6, 6))
-    covariance[np.ix_(rows, rows)] = belief.covariance
+    covariance[np.ix_(rows, rows)] = spread
     samples = position + position_errors(covariance, num_samples)
     samples[:, axes:] = position[axes:]
     return SlamEstimate(position, velocity, agent.heading, covariance, samples, agent.body, _map(points))

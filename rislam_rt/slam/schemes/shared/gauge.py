@@ -11,8 +11,6 @@ trajectories, as good as any other (the gauge), and this module turns what it kn
 all.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Floats
@@ -22,17 +20,9 @@ LEAST_WAY = 1e-6
 """Displacement [m] or speed [m/s] below which there is no direction of motion."""
 
 
-class Reported(NamedTuple):
-    """Mean and covariance of the agent's present state over all trajectories that ranges cannot tell apart."""
-
-    mean: Floats
-    """Mean (2A,) of position [m] and velocity [m/s]."""
-    covariance: Floats
-    """Covariance (2A, 2A) of position and velocity."""
-
-
-def over_all_turns(course: AgentTrajectory) -> Reported:
-    """Mean and covariance of the agent's present state over the gauge of ranges: turns and mirrors about the start.
+def over_all_turns(course: AgentTrajectory) -> tuple[Floats, Floats]:
+    """Mean (2A,) and covariance (2A, 2A) of the agent's present position [m] and velocity [m/s] over the gauge of
+    ranges: turns and mirrors about the start.
 
     The displacement is `L (cos t, sin t)` off the direction told, `L` as filtered, `t` normal with zero mean and the
     standard deviation that dead reckoning gives: `E cos t = exp(-v / 2)`, `var cos t = (1 - exp(-v))^2 / 2`. The
@@ -44,7 +34,7 @@ def over_all_turns(course: AgentTrajectory) -> Reported:
     moved, way = present[:2] - course.mean[-width:][:2], told[:2] - told[-width:][:2]
     velocity = present[axes : axes + 2]
     if min(np.linalg.norm(each) for each in (moved, way, velocity)) < LEAST_WAY:
-        return Reported(present, course.covariance[:width, :width])
+        return present, course.covariance[:width, :width]
     size = np.array([np.linalg.norm(moved), np.linalg.norm(velocity)])
     turned = _frame(way / np.linalg.norm(way), axes)
     known = _of_shape(course, moved / size[0], velocity / size[1])
@@ -60,7 +50,7 @@ def over_all_turns(course: AgentTrajectory) -> Reported:
     mean[across] = origin[1], 0.0
     known[along, along] += place + 0.5 * learnt * (size * (1.0 - np.exp(-angle))) ** 2
     known[np.ix_(across, across)] = reckoned[np.ix_(across, across)]
-    return Reported(turned.T @ mean, turned.T @ known @ turned)
+    return turned.T @ mean, turned.T @ known @ turned
 
 
 def _frame(ahead: Floats, axes: int) -> Floats:

@@ -20,8 +20,6 @@ class Association(NamedTuple):
     """Probability (K, M+1) that a feature made measurement m; last column: none."""
     unclaimed: Floats
     """Probability (M,) that no legacy feature made the measurement."""
-    rounds: int
-    """Rounds until the messages stood still."""
 
 
 def associate(missed: Floats, pair: Floats, fresh: Floats, iterations: int, tolerance: float) -> Association:
@@ -43,13 +41,11 @@ def associate(missed: Floats, pair: Floats, fresh: Floats, iterations: int, tole
     others_m, others_k = 1.0 - np.eye(shown), 1.0 - np.eye(features)
     to_feature = np.broadcast_to(1.0 / fresh, pair.shape)
     to_measurement = ratio
-    rounds = 0
-    while rounds < iterations:
-        rounds += 1
+    for _ in range(iterations):
         to_measurement = ratio / (1.0 + (ratio * to_feature) @ others_m)
         last, to_feature = to_feature, 1.0 / (fresh + others_k @ to_measurement)
         if np.abs(to_feature - last).max(initial=0.0) <= tolerance * np.abs(to_feature).max(initial=0.0):
             break
     joint = np.concatenate([ratio * to_feature, np.ones((features, 1))], axis=1)
     marginal = joint / joint.sum(axis=1, keepdims=True)
-    return Association(to_feature, marginal, fresh / (fresh + to_measurement.sum(axis=0)), rounds)
+    return Association(to_feature, marginal, fresh / (fresh + to_measurement.sum(axis=0)))

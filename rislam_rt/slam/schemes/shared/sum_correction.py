@@ -5,8 +5,6 @@ is a mixture over its Gaussians, over the ranges that it may have made, over "mi
 multiplied in and the product brought back to one Gaussian of the same mean and covariance.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
@@ -19,17 +17,6 @@ NO_VARIANCE = 1e12
 """Variance [m^2] of a range that tells nothing."""
 ROUNDS, TOLERANCE = 30, 1e-3
 """Largest number of rounds of loopy association, and the change of messages at which it ends: finer than the sums."""
-
-
-class Pull(NamedTuple):
-    """Equivalent single range of C Gaussians of a feature, in place of all ranges that each may have made."""
-
-    miss: Floats
-    """Innovation (C,) [m] of the equivalent range."""
-    variance: Floats
-    """Variance (C,) [m^2] of the equivalent range; `NO_VARIANCE` where ranges contradict each other, or none is."""
-    log_factor: Floats
-    """Logarithm (C,) of the factor on the Gaussian's share."""
 
 
 def claims(
@@ -69,13 +56,14 @@ def absorb(
         gain = by_course @ course.covariance
         spread = own + np.einsum("cn,cn->c", gain, by_course)
         seen = sight.length[part] + by_course @ (course.mean - ref)
-        pull = _pull(seen, spread, Scan(scan.length[near], scan.std[near]), found.to_feature[row, near], odds)
-        weight = share[part] * np.exp(pull.log_factor)
+        ranges = Scan(scan.length[near], scan.std[near])
+        miss, variance, log_factor = _pull(seen, spread, ranges, found.to_feature[row, near], odds)
+        weight = share[part] * np.exp(log_factor)
         total = weight.sum()
         existence[row] = existence[row] * total / (existence[row] * total + 1.0 - existence[row])
         share[part] = weight / total
-        course = _mix(course, gain, spread + pull.variance, pull.miss, existence[row] * share[part])
-        pulls[:, part] = pull.miss + seen - sight.length[part], pull.variance
+        course = _mix(course, gain, spread + variance, miss, existence[row] * share[part])
+        pulls[:, part] = miss + seen - sight.length[part], variance
     inner = np.einsum("cij,cj->ci", sums.covariance, sight.by_mean)
     # products of the messages are symmetric but for rounding
     course = course._replace(covariance=0.5 * (course.covariance + course.covariance.T))
@@ -90,8 +78,12 @@ def absorb(
     return moved, course
 
 
-def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> Pull:
-    """Equivalent single range of C Gaussians of one feature: moments of the correction over the ranges and "missed"."""
+def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds) -> tuple[Floats, ...]:
+    """Equivalent single range of C Gaussians of one feature, for the correction: moments over the ranges and "missed".
+
+    Innovation (C,) [m]; variance (C,) [m^2], `NO_VARIANCE` where ranges contradict each other, or none is; logarithm
+    (C,) of the factor on the Gaussian's share.
+    """
     ratio = _ratios(seen, spread, scan, odds) * message
     none = 1.0 - odds.detection_probability
     total = none + ratio.sum(axis=1)
@@ -104,7 +96,7 @@ def _pull(seen: Floats, spread: Floats, scan: Scan, message: Floats, odds: Odds)
     lost = np.where(told, 1.0 - after / spread, 1.0)
     variance = np.where(told, np.maximum(after, 1e-18) / lost, NO_VARIANCE)
     miss = np.where(told, mean * (spread + variance) / spread, 0.0)
-    return Pull(miss, variance, np.log(total))
+    return miss, variance, np.log(total)
 
 
 def _mix(course: AgentTrajectory, gain: Floats, variance: Floats, miss: Floats, weight: Floats) -> AgentTrajectory:

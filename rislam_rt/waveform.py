@@ -1,14 +1,10 @@
-"""The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`, equal power over |f| < B/2, and the tones that sample its band."""
+"""Floor 3: waveforms of the sounding. The flat-band pulse `s(t) = sqrt(E B) sinc(B t)`, equal power over |f| < B/2, and
+the tones that sample its band."""
 
 import numpy as np
 import scipy
 
 from rislam_rt.arrays import Complexes, Floats, phasor
-
-
-def effective_bandwidth(bandwidth: float) -> float:
-    """Effective (RMS) bandwidth zeta [Hz] of a flat band of width B [Hz], as in Proposition 1: B / sqrt(12)."""
-    return bandwidth / np.sqrt(12.0)
 
 
 def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
@@ -37,14 +33,6 @@ def autocorrelation(tau: Floats, bandwidth: float, energy: float = 1.0, *, deriv
     if derivative == 2:
         return energy * scale**2 * (2.0 * scipy.special.spherical_jn(2, x) - np.sinc(x / np.pi)) / 3.0
     raise ValueError(f"derivative: {derivative} received; give 0, 1 or 2")
-
-
-def flat_pulse(time: Floats, bandwidth: float, energy: float = 1.0, *, derivative: int = 0) -> Floats:
-    """Values (...,) of the flat-band pulse, or of its first derivative, at times (...,) [s]; real, centred on 0.
-
-    Samples at any rate of at least B carry its whole energy: `sum s^2 / rate = E`.
-    """
-    return np.sqrt(bandwidth / energy) * autocorrelation(time, bandwidth, energy, derivative=derivative)
 
 
 def subcarrier_frequencies(num_subcarriers: int, bandwidth: float) -> Floats:
