@@ -41,7 +41,7 @@ class Elevations(NamedTuple):
 def elevations(rise: Floats, std: Floats, cosines: Floats) -> Elevations:
     """Predicted elevations over the horizon of returns of sines (R,), standard deviations (R,) and direction cosines
     (R, 2)."""
-    return Elevations(rise, std, np.stack([-cosines[:, 1], cosines[:, 0]], axis=1))
+    return Elevations(rise, std, cosines[:, ::-1] * [-1.0, 1.0])
 
 
 def nothing_heard(count: int) -> Floats:

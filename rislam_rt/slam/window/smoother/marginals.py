@@ -4,17 +4,17 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN
-from rislam_rt.slam.window.smoother.window_gaussian import Window, pose_design
+from rislam_rt.slam.window.smoother.window_gaussian import Window, mapped, pose_design
 
 
 def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Floats:
     """Marginal variance (N, 3) of predictions for poses in slots (N,), by slopes (N, 3, 4 + 3F) with respect to pose
     and features."""
     size, first = len(window.head), int(slot.min(initial=window.num_poses - 1))
-    (along, used), free = pose_design(window), window.accel.shape[1]
+    along, free = pose_design(window)[first:], window.accel.shape[1]
     design = np.zeros((window.num_poses - first, POSE, len(window.covariance)))
     design[:, TURN, 6] = 1.0
-    design[:, :free, used] = along[first:]
+    design[:, :free, :HEAD], design[:, :free, size:] = along[..., :HEAD], along[..., HEAD:]
     wide, slot = design @ window.covariance, slot - first
     pose, cross, inner = (
         wide @ np.swapaxes(design, 1, 2),
@@ -29,6 +29,5 @@ def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Float
 
 def pose_covariance(window: Window, axis: int) -> Floats:
     """Covariance (K, K) of all poses of the sliding window along one axis."""
-    design, used = pose_design(window)
-    along = design[:, axis]
-    return np.asarray(along @ window.covariance[np.ix_(used, used)] @ along.T)
+    along = pose_design(window)[:, axis]
+    return mapped(along, mapped(along, window.covariance).T)
