@@ -27,6 +27,15 @@ def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Float
     return np.asarray(found + np.vecdot(flat @ inner, flat).reshape(found.shape))
 
 
+def way_variance(window: Window, one: Integers, two: Integers) -> Floats:
+    """Variances (N, 3) of the ways between poses `one` (N,) and `two` (N,) of the sliding window."""
+    design = pose_design(window)
+    apart = (design[two, :3] - design[one, :3]).reshape(-1, design.shape[2])
+    wide = mapped(apart, window.covariance)
+    own = np.vecdot(wide[:, :HEAD], apart[:, :HEAD]) + np.vecdot(wide[:, len(window.head) :], apart[:, HEAD:])
+    return np.asarray(np.maximum(own, 0.0).reshape(-1, 3))
+
+
 def pose_covariance(window: Window, axis: int) -> Floats:
     """Covariance (K, K) of all poses of the sliding window along one axis."""
     along = pose_design(window)[:, axis]

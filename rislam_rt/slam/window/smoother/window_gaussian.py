@@ -351,6 +351,13 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     return hessian, gradient
 
 
+def step_covariances(window: Window, count: int) -> Floats:
+    """Covariances (K, A, A) of the accelerations over the sliding window's first K steps."""
+    free = window.accel.shape[1]
+    at = len(window.head) + np.arange(count * free).reshape(count, free)
+    return window.covariance[at[:, :, None], at[:, None, :]]
+
+
 def weigh_holds(window: Window) -> Window:
     """Sliding window with each direction prior's posterior probability, from what all else tells of its wall."""
     holds = window.holds
