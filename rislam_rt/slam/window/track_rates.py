@@ -140,13 +140,10 @@ def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> F
     quadratic in time; what is expected of any return beforehand counts as `memory` components."""
     count = np.bincount(which)
     rows = np.stack([np.ones(len(time)), time, time**2], axis=1)
-    start = length - length[np.searchsorted(which, np.arange(len(count)))][which]
-
-    def total(value: Floats) -> Floats:
-        return np.stack([np.bincount(which, weight * side) for side in value.reshape(len(time), -1).T], axis=1)
-
-    normal = total(rows[:, :, None] * rows[:, None]).reshape(-1, 3, 3) + 1e-9 * np.eye(3)
-    best = np.linalg.solve(normal, total(rows * start[:, None])[..., None])[..., 0]
+    first = np.searchsorted(which, np.arange(len(count)))
+    start, heavy = length - length[first][which], weight[:, None] * rows
+    normal = np.add.reduceat(heavy[:, :, None] * rows[:, None], first) + 1e-9 * np.eye(3)
+    best = np.linalg.solve(normal, np.add.reduceat(heavy * start[:, None], first)[..., None])[..., 0]
     square = np.bincount(which, weight * (start - np.vecdot(rows, best[which])) ** 2)
     free = count - 3.0
     shown = np.maximum(square / free, 1.0)
