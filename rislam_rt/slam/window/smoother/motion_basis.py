@@ -82,10 +82,9 @@ def step_transition(dt: float, angle: float, free: int) -> Floats:
     return found
 
 
-def step_back(dt: float, angle: float, free: int) -> Floats:
+def step_back(found: Floats) -> Floats:
     """Matrix (7, 7 + A) from pose, velocity and compass offset after a step, and its accelerations, to those before it:
-    the inverse of `step_transition`."""
-    found = step_transition(dt, angle, free)
+    the inverse of what `step_transition` has found."""
     back = found[3:6, 3:6].T
     before, push = found.copy(), found[3:6, HEAD:]
     before[3:6, 3:6], before[3:6, HEAD:] = back, -back @ push

@@ -248,7 +248,7 @@ def extend(
 def slide(window: Window) -> Window:
     """Marginalise the oldest pose of the sliding window at the present estimate."""
     size, free = len(window.head), window.accel.shape[1]
-    first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
+    first = np.append([0, 1, 2], np.arange(HEAD - 1, size))
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
     oldest = Quadratic(*(field[0] for field in window.slots))
     hessian[first[:, None], first] += oldest.hessian
@@ -256,7 +256,8 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, angle, accel = float(window.step[0]), float(window.velocity_turn[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = step_back(dt, angle, free)
+    carry = step_transition(dt, angle, free)
+    back = step_back(carry)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
@@ -270,7 +271,6 @@ def slide(window: Window) -> Window:
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(_surplus(window.precision[0], window.variance[0]))
-    carry = step_transition(dt, angle, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
