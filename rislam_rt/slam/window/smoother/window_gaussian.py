@@ -332,11 +332,12 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
         inner -= shared @ shared.T
     cross = flat.T @ slots[:, :free, POSE:].reshape(count, -1)
     pull = slope[:, :free].ravel() @ flat
-    moving = ((slice(HEAD), slice(HEAD)), (slice(size, None), slice(HEAD, None)))  # all but features, in both orders
-    for at, part in moving:
-        hessian[at, HEAD:size], hessian[HEAD:size, at], gradient[at] = cross[part], cross[part].T, pull[part]
-        for to, other in moving:
-            hessian[at, to] = inner[part, other]
+    # all but the features, as they stand in the window and in the design
+    moving = ((slice(HEAD), slice(HEAD)), (slice(size, None), slice(HEAD, None)))
+    for row, part in moving:
+        hessian[row, HEAD:size], hessian[HEAD:size, row], gradient[row] = cross[part], cross[part].T, pull[part]
+        for column, other in moving:
+            hessian[row, column] = inner[part, other]
     hessian[HEAD:size, HEAD:size] = slots[:, POSE:, POSE:].sum(axis=0)
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
