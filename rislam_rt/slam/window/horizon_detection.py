@@ -128,6 +128,8 @@ def weigh_tilts(
     """Weigh the tilts of a cycle by which of the returns that are `asked` (R,), and detected with probabilities
     `shows` (R,) were they above the plane, are `heard` (R,)."""
     near, above = _near(returns, log_like), np.ones(len(returns.rise))
+    if not len(near.row):
+        return HorizonEvidence(tilts, above, log_like, 0.0)
     (each, lowest), row, fresh = _above(near, tilts), near.row, log_like.copy()
     chance = _chance(each, shows[row], asked[row], heard[row])
     joint = np.log(chance).sum(axis=2)
