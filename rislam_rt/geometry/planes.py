@@ -15,10 +15,10 @@ def mirror(point: Floats, normal: Floats, offset: Floats) -> Floats:
 
 
 def crossing(start: Floats, stop: Floats, own: Floats, far: Floats) -> Floats:
-    """Points (N, 3) where the segments between places (N, 3) cross a plane, at signed distances (N,) from their ends;
-    one of the ends where they do not cross it."""
+    """Points (..., 3) where the segments between places (..., 3) cross a plane, at signed distances (...,) from their
+    ends; one of the ends where they do not cross it."""
     share = np.clip(own / np.where(np.abs(own - far) > 1e-9, own - far, 1e-9), 0.0, 1.0)
-    return np.asarray(start + share[:, None] * (stop - start))
+    return np.asarray(start + share[..., None] * (stop - start))
 
 
 def mirror_direction(direction: Floats, normal: Floats) -> Floats:

@@ -55,7 +55,7 @@ def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) 
     along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
     distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
     pattern = element_pattern(spec, (ray @ spec.normal)[..., None, None] / distance)
-    return _leg_share(spec, wavelength) * np.sqrt(pattern) * wavelength / (4.0 * np.pi * distance), distance
+    return (_leg_share(spec, wavelength) * wavelength / (4.0 * np.pi)) * np.sqrt(pattern) / distance, distance
 
 
 def far_field_response(

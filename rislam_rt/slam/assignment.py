@@ -97,9 +97,12 @@ def squared_distance(gap: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     x, y, z = gap[..., 0], gap[..., 1], gap[..., 2]
     a, b, c = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 0, 2]
     d, e, f = covariance[..., 1, 1], covariance[..., 1, 2], covariance[..., 2, 2]
-    ca, cb, cc = d * f - e * e, c * e - b * f, b * e - c * d
+    ca, cb, cc, ce = d * f - e * e, c * e - b * f, b * e - c * d, b * c - a * e
     det = np.maximum(a * ca + b * cb + c * cc, 1e-300)
     # adjugate times gap
-    one, two = ca * x + cb * y + cc * z, cb * x + (a * f - c * c) * y + (b * c - a * e) * z
-    three = cc * x + (b * c - a * e) * y + (a * d - b * b) * z
+    one, two, three = (
+        ca * x + cb * y + cc * z,
+        cb * x + (a * f - c * c) * y + ce * z,
+        cc * x + ce * y + (a * d - b * b) * z,
+    )
     return np.asarray((x * one + y * two + z * three) / det), np.log(det)

@@ -12,14 +12,7 @@ from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.nested.particles.particle_belief import Nested, gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
-from rislam_rt.slam.window.smoother.motion_basis import (
-    HEAD,
-    POSE,
-    head_order,
-    last_pose_matrix,
-    pose_matrix,
-    pose_unknowns,
-)
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE, TURN, last_pose_matrix, pose_matrix
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
 from rislam_rt.slam.window.solver_limits import STILL
 
@@ -59,14 +52,13 @@ def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool)
     """Gaussian view's smoothest motion along the particles' trail (K, 4) to now: window head (7 + 3F,), accelerations
     (K - 1, A)."""
     count, free, head = len(trail), len(std), mean.copy()
-    straight, order = np.zeros(count - 1), head_order(free)
+    straight, known = np.zeros(count - 1), HEAD if free > TURN else HEAD - 1
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)
     design = weight[:, None, None] * pose_matrix(step.tobytes(), straight.tobytes(), turns)
-    used = pose_unknowns(HEAD, (count - 1) * free, free)
-    speed = last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[3:6, used] / MET
-    calm = np.eye(len(used))[len(order) :] / np.tile(std, count - 1)[:, None]
-    rows = np.concatenate([design.reshape(-1, len(used)), speed, calm])
+    speed = last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[3:6] / MET
+    calm = np.eye(design.shape[2])[HEAD:] / np.tile(std, count - 1)[:, None]
+    rows = np.concatenate([design.reshape(-1, design.shape[2]), speed, calm])
     values = np.concatenate([(weight[:, None] * trail[:, :free]).ravel(), mean[3:6] / MET, np.zeros(len(calm))])
     found = np.linalg.lstsq(rows, values, rcond=None)[0]
-    head[order] = found[: len(order)]
-    return head, found[len(order) :].reshape(-1, free)
+    head[:known] = found[:known]
+    return head, found[HEAD:].reshape(-1, free)

@@ -61,10 +61,8 @@ def _log_ratio(state: WindowState, turn: Floats) -> float:
 def _log_likelihoods(state: WindowState, turn: Floats) -> Floats:
     """Log likelihoods (2, K, L) of the motion modes in the window's first K steps, over which the body turned by `turn`
     (K,) [rad]: did the agent go where it faces, and did it not."""
-    window, count, free = state.window, len(turn), state.window.accel.shape[1]
-    size, every = len(window.head), np.arange(count)
-    inside = window.covariance[size : size + count * free, size : size + count * free]
-    spread = inside.reshape(count, free, count, free)[every, :2, every, :2]
+    window, count = state.window, len(turn)
+    spread = window_gaussian.step_covariances(window, count)[:, :2, :2]
     shift = np.stack([_asked_for(window, angle) for angle in (turn, np.zeros(count))])
     found = motion.log_likelihood(window.accel[:count, :2], spread, window.solved[:count, 0], shift)
     found[..., motion.is_level_only()] = -np.inf

@@ -120,8 +120,9 @@ def associate_cycle(
         expected, scene.sensor.cell_length, clear * above, None if sides is None else np.maximum(sides, OTHER)
     )
     lead = groups.leader
-    untold = np.isin(expected.forms[lead, 0], [row for row in landmarks.panels if row >= 0]) & (beside is not None)
+    untold = np.zeros(len(lead), dtype=np.bool_)
     if beside is not None:
+        untold = np.isin(expected.forms[lead, 0], [row for row in landmarks.panels if row >= 0])
         groups = _absorbed(groups, expected, untold.nonzero()[0], beside, scene.sensor.cell_length)
     extra = groups.disturbance + groups.mean_share()[1][:, None] * groups.gap**2
     if len(observed.seen):

@@ -41,7 +41,7 @@ class Elevations(NamedTuple):
 def elevations(rise: Floats, std: Floats, cosines: Floats) -> Elevations:
     """Predicted elevations over the horizon of returns of sines (R,), standard deviations (R,) and direction cosines
     (R, 2)."""
-    return Elevations(rise, std, np.stack([-cosines[:, 1], cosines[:, 0]], axis=1))
+    return Elevations(rise, std, cosines[:, ::-1] * [-1.0, 1.0])
 
 
 def nothing_heard(count: int) -> Floats:
@@ -82,8 +82,13 @@ def _above(near: _Near, tilts: Tilts) -> tuple[Floats, Integers]:
 def expected_above(returns: Elevations, log_like: Floats, tilts: Tilts) -> Floats:
     """Probability (R,) that returns arrive above the plane of the array, averaged over its tilts."""
     near, found = _near(returns, log_like), np.ones(len(returns.rise))
-    found[near.row] = np.tensordot(tilts.weight, _above(near, tilts)[0], 2)
+    found[near.row] = _averaged(tilts.weight, _above(near, tilts)[0])
     return found
+
+
+def _averaged(weight: Floats, value: Floats) -> Floats:
+    """Means (R,) of values (L, N, R) of near returns over the tilts, by weights (L, N)."""
+    return np.asarray(weight.ravel() @ value.reshape(weight.size, -1))
 
 
 def above_within(returns: Elevations, lift: Floats, variance: Floats) -> Floats:
@@ -123,6 +128,8 @@ def weigh_tilts(
     """Weigh the tilts of a cycle by which of the returns that are `asked` (R,), and detected with probabilities
     `shows` (R,) were they above the plane, are `heard` (R,)."""
     near, above = _near(returns, log_like), np.ones(len(returns.rise))
+    if not len(near.row):
+        return HorizonEvidence(tilts, above, log_like, 0.0)
     (each, lowest), row, fresh = _above(near, tilts), near.row, log_like.copy()
     chance = _chance(each, shows[row], asked[row], heard[row])
     joint = np.log(chance).sum(axis=2)
@@ -131,12 +138,12 @@ def weigh_tilts(
     # each return by what the others tell
     others = weight[..., None] / chance
     others /= others.sum(axis=(0, 1))
-    above[row] = np.einsum("lnr,lnr->r", others, each)
+    above[row] = (others * each).sum(axis=(0, 1))
     size = len(RISES) + 1
     first = np.bincount((lowest + size * np.arange(len(row))).ravel(), others.ravel(), size * len(row))
     by_rise = first.reshape(-1, size)[:, :-1].cumsum(axis=1).T
     fresh[row] += np.log(_chance(by_rise, shows[row], asked[row], heard[row])).T
-    apart = np.log(np.tensordot(tilts.weight, chance, 2)).sum()
+    apart = np.log(_averaged(tilts.weight, chance)).sum()
     gain = float(np.log(total) + joint.max() - apart)
     return HorizonEvidence(tilts._replace(weight=weight / total), above, fresh, gain)
 

@@ -17,7 +17,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion
 from rislam_rt.slam.window.smoother.cholesky import form_and_log_det, inverse
 from rislam_rt.slam.window.smoother.motion_basis import TURN
-from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.smoother.window_gaussian import Window, step_covariances
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
 from rislam_rt.slam.window.state import WindowState
 
@@ -65,10 +65,7 @@ def learn_motion(state: WindowState) -> WindowState:
 def likelihoods(window: Window, count: int, told: VerticalInformation) -> Floats:
     """Log likelihoods (N, K, L) of the L motion modes in the window's first K steps, for N groups of axes; upwards,
     from what is told of all its steps, were the floor uneven, whether it is or not."""
-    size, free = len(window.head), window.accel.shape[1]
-    every = np.arange(count)
-    inside = window.covariance[size : size + count * free, size : size + count * free]
-    block = inside.reshape(count, free, count, free)[every, :, every]
+    block = step_covariances(window, count)
     covariance = inverse(told.information + np.diag(window.uneven))
     mean, variance = (covariance @ told.slope)[:count, None], covariance.diagonal()[:count, None, None]
     found = np.stack([
@@ -77,7 +74,7 @@ def likelihoods(window: Window, count: int, told: VerticalInformation) -> Floats
         else motion.log_likelihood(
             window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group[0]]
         )
-        for number, group in enumerate(GROUPS[: free - 1])
+        for number, group in enumerate(GROUPS[: block.shape[1] - 1])
     ])  # fmt: skip
     found[0, :, motion.is_level_only()] = -np.inf
     return found

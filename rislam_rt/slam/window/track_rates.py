@@ -16,7 +16,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.egomotion import MEASURED
 from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.marginals import pose_covariance
+from rislam_rt.slam.window.smoother.marginals import way_variance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
 from rislam_rt.slam.window.solver_limits import STILL
 from rislam_rt.slam.window.state import WindowState
@@ -140,13 +140,10 @@ def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> F
     quadratic in time; what is expected of any return beforehand counts as `memory` components."""
     count = np.bincount(which)
     rows = np.stack([np.ones(len(time)), time, time**2], axis=1)
-    start = length - length[np.searchsorted(which, np.arange(len(count)))][which]
-
-    def total(value: Floats) -> Floats:
-        return np.stack([np.bincount(which, weight * side) for side in value.reshape(len(time), -1).T], axis=1)
-
-    normal = total(rows[:, :, None] * rows[:, None]).reshape(-1, 3, 3) + 1e-9 * np.eye(3)
-    best = np.linalg.solve(normal, total(rows * start[:, None])[..., None])[..., 0]
+    first = np.searchsorted(which, np.arange(len(count)))
+    start, heavy = length - length[first][which], weight[:, None] * rows
+    normal = np.add.reduceat(heavy[:, :, None] * rows[:, None], first) + 1e-9 * np.eye(3)
+    best = np.linalg.solve(normal, np.add.reduceat(heavy * start[:, None], first)[..., None])[..., 0]
     square = np.bincount(which, weight * (start - np.vecdot(rows, best[which])) ** 2)
     free = count - 3.0
     shown = np.maximum(square / free, 1.0)
@@ -157,11 +154,8 @@ def _shares(found: _Histories, state: WindowState) -> Floats:
     """Probability (T,) that each track's length follows the poses, as half of all paths do; of the others a quarter
     keep their length, as over opposite walls, and the rest have any rate that the agent's speed allows."""
     (rate, spread), (whole, _) = found.slope(found.left), found.slope(found.length)
-    wide = np.stack([pose_covariance(state.window, axis) for axis in range(3)])
-    one, two = found.ends.T
-    pose = np.maximum(wide[:, one, one] + wide[:, two, two] - 2.0 * wide[:, one, two], 0.0)
-    mean = np.stack([found.mean(side) for side in found.toward.T])
-    doubt = (mean**2 * pose).sum(axis=0) / found.span**2
+    mean = np.stack([found.mean(side) for side in found.toward.T], axis=1)
+    doubt = np.vecdot(mean**2, way_variance(state.window, *found.ends.T)) / found.span**2
     along = 0.5 * _normal(rate, spread + found.own_variance + doubt)
     kept = 0.5 / 4.0 * _normal(whole, spread)
     return along / (along + kept + 0.5 * 3.0 / 4.0 / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))

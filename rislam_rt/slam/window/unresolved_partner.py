@@ -62,18 +62,21 @@ def _log_ratio(view: CycleAssociation, observed: Observations, both: Integers) -
     alone = groups.disturbance[row] + np.maximum(view.scatter[lead], 1.0)[:, None] * observed.std[pick] ** 2
     merged = alone + groups.share_variance[row][:, None] * groups.gap[row] ** 2
     noise = observed.log_amplitude_std[pick] ** 2 + (0.5 * CONSTANTS.fading) ** 2
-    ratio = _log_density(left - share * groups.gap[row], merged_slope, view.covariance, merged)
-    ratio += _log_normal(level - groups.log_amplitude[row], noise + groups.log_amplitude_std[row] ** 2)
-    ratio -= _log_density(left, slope, view.covariance, alone)
-    ratio -= _log_normal(level - expected.log_amplitude[lead], noise + expected.log_amplitude_std[lead] ** 2)
-    return ratio
+    with_mate, by_itself = _log_density(
+        np.stack([left - share * groups.gap[row], left]), np.stack([merged_slope, slope]), view.covariance,
+        np.stack([merged, alone]),
+    )  # fmt: skip
+    with_mate += _log_normal(level - groups.log_amplitude[row], noise + groups.log_amplitude_std[row] ** 2)
+    by_itself += _log_normal(level - expected.log_amplitude[lead], noise + expected.log_amplitude_std[lead] ** 2)
+    return np.asarray(with_mate - by_itself)
 
 
 def _log_density(left: Floats, slope: Floats, covariance: Floats, extra: Floats) -> Floats:
-    """Log densities (A,) of residuals (A, 3) with slopes (A, 3, N) by unknowns of a covariance (N, N), and variances
-    (A, 3) besides."""
-    spread = slope @ covariance @ np.swapaxes(slope, 1, 2)
-    spread[:, [0, 1, 2], [0, 1, 2]] += extra
+    """Log densities (..., A) of residuals (..., A, 3) with slopes (..., A, 3, N) by unknowns of a covariance (N, N),
+    and variances (..., A, 3) besides."""
+    flat = slope.reshape(-1, slope.shape[-1])
+    spread = (flat @ covariance).reshape(slope.shape) @ np.swapaxes(slope, -1, -2)
+    spread[..., [0, 1, 2], [0, 1, 2]] += extra
     square, log_det = squared_distance(left, spread)
     return np.asarray(-0.5 * (square + log_det))
 

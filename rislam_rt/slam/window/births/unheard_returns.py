@@ -16,7 +16,7 @@ from rislam_rt.slam.predicted_returns import poses_of, reflect
 from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.horizon_detection import Elevations, above_within, elevations
+from rislam_rt.slam.window.horizon_detection import above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import poses
@@ -53,23 +53,23 @@ def log_unheard(
     out = reflect(ends.tx, place[rows, None], summary.middle) - ends.rx
     length = np.linalg.norm(out, axis=2)
     ray = (rotation_z(-ends.heading) @ (out / length[..., None])[..., None])[..., 0]
-    off = log.seen - np.concatenate([length[..., None], ray[..., :2]], axis=2)[:, slot]
-    off[..., 0] = scene.sensor.nearest(off[..., 0])
-    spacing = scene.radio.array.spacing
-    off[..., 1:] -= np.where(log.mirrored(spacing), np.round(off[..., 1:] * spacing) / spacing, 0.0)
-    off[..., 1:] = (rotation_z(ends.heading[slot])[:, :2, :2] @ off[..., 1:, None])[..., 0]
     doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[rows])[:, -1:])
     near = scene.sensor.cell_length + doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
-    wall, heard = (np.abs(off) < near[:, None]).all(axis=2).nonzero()
+    gap = scene.sensor.nearest(log.seen[:, 0] - length[:, slot])
+    wall, heard = (np.abs(gap) < near[:, :1]).nonzero()
+    off, spacing = log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing
+    off -= np.where(log.mirrored(spacing)[heard], np.round(off * spacing) / spacing, 0.0)
+    off = (rotation_z(ends.heading)[:, :2, :2][slot[heard]] @ off[..., None])[..., 0]
+    inside = (np.abs(off) < near[wall, 1:]).all(axis=1)
     present = np.zeros(length.shape, dtype=np.bool_)
-    present[wall, slot[heard]] = True
+    present[wall[inside], slot[heard[inside]]] = True
     # no elevation is known to less than `STEP`
     rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP
     shows, deep = _shows(context, table, rows, length, summary), (-CONSTANTS.dip - rise) / std
     if not anyhow:
         shows *= deep < 0.0
+    shows *= _above(context, rise, std, ray)
     for number, row in enumerate(rows.tolist()):
-        shows[number] *= _above(context, elevations(rise[number], std[number], ray[number, :, :2]))
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
         found[row] = log_silence(shows[number, span], present[number, span])
@@ -79,13 +79,16 @@ def log_unheard(
     return found
 
 
-def _above(context: WindowState, returns: Elevations) -> Floats:
-    """Probability (K,) that the returns of the window's cycles, one each, arrive above the plane of the array."""
+def _above(context: WindowState, rise: Floats, std: Floats, ray: Floats) -> Floats:
+    """Probability (N, K) that N returns arrive above the plane of the array in each of the window's cycles, with sines
+    of elevation (N, K) within deviations (N, K), along rays (N, K, 3) in the body's axes."""
     if context.scene.radio.array.pattern != "upper":
-        return np.ones(len(returns.rise))
-    lift = np.vecdot(returns.slopes, context.attitude[:, :2])
-    variance = (returns.slopes[:, None] @ context.attitude_covariance[:, :2, :2] @ returns.slopes[..., None])[:, 0, 0]
-    return above_within(returns, lift, variance)
+        return np.ones(rise.shape)
+    returns = elevations(rise.ravel(), std.ravel(), ray[..., :2].reshape(-1, 2))
+    slopes = returns.slopes.reshape(*rise.shape, 2)
+    lift = np.vecdot(slopes, context.attitude[:, :2])
+    variance = (slopes[..., None, :] @ context.attitude_covariance[:, :2, :2] @ slopes[..., None])[..., 0, 0]
+    return above_within(returns, lift.ravel(), variance.ravel()).reshape(rise.shape)
 
 
 def _shows(context: WindowState, table: Hypotheses, rows: Integers, length: Floats, summary: TrackSummary) -> Floats:

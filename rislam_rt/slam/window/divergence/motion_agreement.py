@@ -11,7 +11,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.marginals import pose_covariance
+from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
@@ -92,11 +92,9 @@ def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
 def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
     """Mean velocity (3,) [m/s] over the last `PAST` cycles, and its standard deviations (3,)."""
     cycles, time = _latest(window)
-    ends = [-1, -1 - cycles]
-    place = window_gaussian.poses(window)[ends, :3]
-    wide = np.array([pose_covariance(window, axis)[np.ix_(ends, ends)] for axis in range(3)])
-    variance = np.trace(wide, axis1=1, axis2=2) - 2.0 * wide[:, 0, 1]
-    return (place[0] - place[1]) / time, np.sqrt(np.maximum(variance, 0.0)) / time + 1e-6
+    place = window_gaussian.poses(window)[:, :3]
+    variance = way_variance(window, np.array([-1 - cycles]), np.array([-1]))[0]
+    return (place[-1] - place[-1 - cycles]) / time, np.sqrt(variance) / time + 1e-6
 
 
 def _latest(window: Window) -> tuple[int, float]:

@@ -1,6 +1,7 @@
 """Landmark table: what the map knows of each feature besides its place: kind, existence, strength, reflectivity,
 occlusion."""
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,9 +12,8 @@ from rislam_rt.slam.panel_evidence import STRENGTHS, panel_rows, ris_probabiliti
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
 
 
-class WindowTable(NamedTuple):
-    """Landmark table of F features: kind and existence, reflectivity of walls, strength, panel identity and occlusion
-    of points."""
+class _Features(NamedTuple):
+    """Kind and existence of F features, reflectivity of walls, strength, panel identity and occlusion of points."""
 
     ident: Integers
     """(F,) number for life; rows are in its order."""
@@ -38,17 +38,21 @@ class WindowTable(NamedTuple):
     next_ident: int
     """Number of the next feature."""
 
-    @property
+
+class WindowTable(_Features):
+    """Landmark table of F features, with what follows from it and is computed once."""
+
+    @cached_property
     def points(self) -> Integers:
         """Rows of the landmark table's features that are points."""
         return (~self.is_wall).nonzero()[0]
 
-    @property
+    @cached_property
     def walls(self) -> Integers:
         """Rows of the landmark table's features that are walls."""
         return self.is_wall.nonzero()[0]
 
-    @property
+    @cached_property
     def ris_probability(self) -> Floats:
         """Landmark table's probability (F, Q) that each feature is each of the panels; 0 for walls."""
         return ris_probabilities(self.log_ris, self.points)
@@ -58,12 +62,12 @@ class WindowTable(NamedTuple):
         """Panel identities (F,) of the features in the landmark table; of no meaning for walls."""
         return PanelIdentity(self.log_grid, self.log_ris, self.hidden)
 
-    @property
+    @cached_property
     def panels(self) -> tuple[int, ...]:
         """Row (Q,) in the landmark table of the point that is held for each panel, -1 where there is none."""
         return panel_rows(self.ris_probability)
 
-    @property
+    @cached_property
     def log_strength(self) -> tuple[Floats, Floats]:
         """Mean and standard deviation (F,) of the log strength of the landmark table's points; 0 for walls."""
         found, points = np.zeros((2, len(self.ident))), self.points

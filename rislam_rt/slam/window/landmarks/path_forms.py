@@ -94,29 +94,28 @@ def possible_legs(legs: Integers, features: Floats, covariance: Floats, anchor: 
 
 
 def margins(base: Floats, device: Floats, anchor: Floats, walls: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Margins (N,) [m] of forms over two walls: how far the bounce on the wall `walls[:, 1]` lies on the base's side of
-    the wall `walls[:, 0]`, for the ray from `device` (3,) or (N, 3) over both walls (N, 2, 3) to `base` (N, 3).
+    """Margins (..., N) [m] of forms over two walls: how far the bounce on the second of the `walls` (..., N, 2, 3) lies
+    on the base's side of the first, for the ray from `device` (3,) or (N, 3) over both walls to `base` (N, 3).
 
-    Also depths (N,): of the base before `walls[:, 0]`, and of its image and of the device before `walls[:, 1]`, which
+    Also depths (..., N): of the base before the first wall, and of its image and of the device before the second, which
     are on one side if the path can be.
     """
     normal, offset = planes(walls, anchor)
-    near = np.vecdot(base, normal[:, 0]) - offset[:, 0]
-    image = base - 2.0 * near[:, None] * normal[:, 0]
-    outer, own = np.vecdot(image, normal[:, 1]) - offset[:, 1], np.vecdot(device, normal[:, 1]) - offset[:, 1]
+    (first, second), (start, stop) = np.moveaxis(normal, -2, 0), np.moveaxis(offset, -1, 0)
+    near = np.vecdot(base, first) - start
+    image = base - 2.0 * near[..., None] * first
+    outer, own = np.vecdot(image, second) - stop, np.vecdot(device, second) - stop
     # where the ray from the device meets the outer wall: the next end for the inner one
-    mirrored = image - 2.0 * outer[:, None] * normal[:, 1]
-    edge = crossing(device, mirrored, own, -outer)
-    return np.sign(near) * (np.vecdot(edge, normal[:, 0]) - offset[:, 0]), near, outer, own
+    edge = crossing(device, image - 2.0 * outer[..., None] * second, own, -outer)
+    return np.sign(near) * (np.vecdot(edge, first) - start), near, outer, own
 
 
 def _margin_std(
     base: Floats, device: Floats, anchor: Floats, features: Floats, walls: Integers, covariance: Floats
 ) -> Floats:
     """Standard deviations (N,) [m] of the margins of legs over two walls (N, 2), from the covariance of these walls."""
-    moves = STEP * np.concatenate([np.zeros((1, 6)), np.eye(6)]).reshape(7, 1, 2, 3)
-    places = (features[walls] + moves).reshape(-1, 2, 3)
-    every = margins(np.tile(base, (7, 1)), device, np.tile(anchor[walls], (7, 1, 1)), places)[0].reshape(7, -1)
+    moves = STEP * np.eye(7, 6, -1).reshape(7, 1, 2, 3)
+    every = margins(base, device, anchor[walls], features[walls] + moves)[0]
     along = ((every[1:] - every[0]) / STEP).T
     rows = (3 * walls[:, :, None] + np.arange(3)).reshape(len(walls), 6)
     block = covariance[rows[:, :, None], rows[:, None, :]]

@@ -36,6 +36,6 @@ def form_and_log_det(matrix: Floats, right: Floats) -> tuple[float, float]:
 def inverse(matrix: Floats) -> Floats:
     """Inverse (D, D) of a symmetric positive definite matrix, exactly symmetric."""
     inside, _ = scipy.linalg.lapack.dpotri(_factorise(matrix), lower=1, overwrite_c=1)
-    full = inside + inside.T
-    np.fill_diagonal(full, np.diag(inside))
-    return np.asarray(full)
+    full, every = np.asarray(inside + inside.T), np.arange(len(inside))
+    full[every, every] *= 0.5
+    return full

@@ -102,10 +102,11 @@ def log_evidence(before: Floats, log_like: Floats, stay: float) -> Floats:
     top = log_like.max(axis=2)
     like, move = np.exp(log_like - top[:, :, None]).swapaxes(0, 1), transition(stay)
     message, found = np.broadcast_to(before, log_like[:, 0].shape), top.sum(axis=1)
-    for own in like:
+    for row, own in enumerate(like):
         message = (message @ move) * own
-        total = message.sum(axis=1)
-        message, found = message / total[:, None], found + np.log(total)
+        if row % 16 == 15 or row == len(like) - 1:  # nothing can vanish in fewer steps
+            total = message.sum(axis=1)
+            message, found = message / total[:, None], found + np.log(total)
     return np.asarray(found)
 
 
@@ -123,7 +124,7 @@ def smooth(before: Floats, log_like: Floats, stay: float) -> tuple[Floats, Float
     for row, (into, own) in enumerate(zip(coming, both, strict=True)):
         np.dot(message, ways, out=into)
         np.multiply(into, own, out=message)
-        if row % 16 == 15 or row == count - 1:  # nothing can vanish in fewer steps
+        if row % 16 == 15 or row == count - 1:
             each = message.reshape(chains, 2, levels)
             each /= each.sum(axis=2, keepdims=True)
     posterior = np.swapaxes(coming[..., :levels] * like * coming[::-1, :, levels:], 0, 1)

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats
 
 HEAD = 7
 """Number of the window's unknowns before the features: first position, its velocity, compass offset."""
@@ -21,22 +21,27 @@ POSE = 4
 
 @lru_cache(maxsize=4)
 def pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
-    """Matrix (K, A, M) that gives K poses along A axes from the first place and rate (`head_order`) and then the
-    accelerations of all steps, for times [s] of the steps and turns [rad] of the velocity over them, as bytes."""
+    """Matrix (K, A, 7 + (K - 1) A) that gives K poses along A axes from the head's numbers before the features and then
+    the accelerations of all steps, for times [s] of the steps and turns [rad] of the velocity over them, as bytes."""
     step, free = np.frombuffer(steps), 3 + turns
     count, (_, reach) = len(step) + 1, horizontal(steps, velocity_turn)
-    found = np.zeros((count, free, count + 1, free))
-    for axis in range(2):
-        found[:, axis, 1:, axis] = reach.real
-        found[:, axis, 1:, 1 - axis] = reach.imag if axis else -reach.imag
-    found[:, 2, 1:, 2] = horizontal(steps, np.zeros(len(step)).tobytes())[1].real
+    found = np.zeros((count, free, HEAD + len(step) * free))
+    speed, accel = found[:, :, 3:6], found[:, :, HEAD:].reshape(count, free, len(step), free)
+    straight = horizontal(steps, np.zeros(len(step)).tobytes())[1].real
+    for axis, to, way in (
+        (0, 0, reach.real),
+        (0, 1, -reach.imag),
+        (1, 0, reach.imag),
+        (1, 1, reach.real),
+        (2, 2, straight),
+    ):
+        speed[:, axis, to], accel[:, axis, :, to] = way[:, 0], way[:, 1:]
     for axis in range(3):
-        found[:, axis, 0, axis] = 1.0
+        found[:, axis, axis] = 1.0
     if turns:
-        found[:, TURN, 0, TURN], found[:, TURN, 2:, TURN] = 1.0, np.where(_after(count), step, 0.0)
-    used = np.delete(found.reshape(count, free, -1), free + TURN, axis=2) if turns else found.reshape(count, free, -1)
-    used.flags.writeable = False
-    return used
+        found[:, TURN, 6], accel[:, TURN, :, TURN] = 1.0, np.where(_after(count), step, 0.0)
+    found.flags.writeable = False
+    return found
 
 
 def _after(count: int) -> Booleans:
@@ -59,25 +64,6 @@ def horizontal(steps: bytes, velocity_turn: bytes) -> tuple[Complexes, Complexes
     return speed, reach
 
 
-FIRST = np.array([0, 1, 2, 6, 3, 4, 5])
-"""Indices of the head's numbers in the order of a basis: first places, then first rates."""
-
-
-def head_order(free: int) -> Integers:
-    """Indices of the window's unknowns that a motion basis of so many axes multiplies: first places, then first
-    rates."""
-    return FIRST if free > TURN else np.arange(6)
-
-
-@lru_cache(maxsize=16)
-def pose_unknowns(head: int, accelerations: int, free: int) -> Integers:
-    """Indices (M,) of the window's unknowns that a pose matrix of so many axes multiplies, after a head of so many
-    numbers so many accelerations."""
-    found = np.append(head_order(free), head + np.arange(accelerations))
-    found.flags.writeable = False
-    return found
-
-
 def rotation(angle: float) -> Floats:
     """Rotation (3, 3) of a velocity by a turn [rad]."""
     cos, sin = np.cos(angle), np.sin(angle)
@@ -96,10 +82,9 @@ def step_transition(dt: float, angle: float, free: int) -> Floats:
     return found
 
 
-def step_back(dt: float, angle: float, free: int) -> Floats:
+def step_back(found: Floats) -> Floats:
     """Matrix (7, 7 + A) from pose, velocity and compass offset after a step, and its accelerations, to those before it:
-    the inverse of `step_transition`."""
-    found = step_transition(dt, angle, free)
+    the inverse of what `step_transition` has found."""
     back = found[3:6, 3:6].T
     before, push = found.copy(), found[3:6, HEAD:]
     before[3:6, 3:6], before[3:6, HEAD:] = back, -back @ push
@@ -115,8 +100,7 @@ def last_pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     accelerations."""
     step, free = np.frombuffer(steps), 3 + turns
     design = np.eye(HEAD, HEAD + len(step) * free)
-    columns = pose_unknowns(HEAD, len(step) * free, free)
-    design[FIRST[:free, None], columns] = pose_matrix(steps, velocity_turn, turns)[-1]
+    design[[0, 1, 2, 6][:free]] = pose_matrix(steps, velocity_turn, turns)[-1]
     speed = horizontal(steps, velocity_turn)[0][-1]
     whole = np.stack([[speed.real, -speed.imag], [speed.imag, speed.real]])
     design[3:5, 3:5] = whole[:, :, 0]

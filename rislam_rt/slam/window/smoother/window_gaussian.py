@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
@@ -30,7 +30,6 @@ from rislam_rt.slam.window.smoother.motion_basis import (
     TURN,
     last_pose_matrix,
     pose_matrix,
-    pose_unknowns,
     step_back,
     step_transition,
 )
@@ -130,29 +129,31 @@ def begin_with(
     return alone._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=spread)
 
 
-def pose_design(window: Window) -> tuple[Floats, Integers]:
-    """Matrix (K, A, M) that gives the window's poses from M of its unknowns (see `motion_basis.pose_matrix`), and the
-    indices (M,) of these."""
-    design = pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns)
-    return design, pose_unknowns(len(window.head), window.accel.size, window.accel.shape[1])
+def pose_design(window: Window) -> Floats:
+    """Matrix (K, A, 7 + (K - 1) A) that gives the window's poses from its unknowns but the features (see
+    `motion_basis.pose_matrix`)."""
+    return pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns)
 
 
 def poses(window: Window) -> Floats:
     """Positions [m] and compass offsets [rad] of the window's poses (K, 4)."""
     free = window.accel.shape[1]
-    design, used = pose_design(window)
     found = np.empty((window.num_poses, POSE))
     found[:, TURN] = window.head[6]
-    found[:, :free] = design @ np.concatenate([window.head, window.accel.ravel()])[used]
+    found[:, :free] = pose_design(window) @ np.concatenate([window.head[:HEAD], window.accel.ravel()])
     return found
+
+
+def mapped(design: Floats, rows: Floats) -> Floats:
+    """Product (N, ...) of a design (N, 7 + (K - 1) A), which leaves out the window's features, with rows (D, ...) of
+    all its unknowns."""
+    return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[len(rows) + HEAD - design.shape[1] :])
 
 
 def _carried(window: Window, rows: Floats) -> Floats:
     """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
     its unknowns."""
-    size = len(window.head)
-    design = last_pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns)
-    return np.asarray(design[:, :HEAD] @ rows[:HEAD] + design[:, HEAD:] @ rows[size:])
+    return mapped(last_pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns), rows)
 
 
 def mean_now(window: Window) -> Floats:
@@ -247,7 +248,7 @@ def extend(
 def slide(window: Window) -> Window:
     """Marginalise the oldest pose of the sliding window at the present estimate."""
     size, free = len(window.head), window.accel.shape[1]
-    first = np.concatenate([[0, 1, 2, 6], np.arange(HEAD, size)])
+    first = np.append([0, 1, 2], np.arange(HEAD - 1, size))
     hessian, gradient = window.prior.hessian.copy(), window.prior.slope(window.head)
     oldest = Quadratic(*(field[0] for field in window.slots))
     hessian[first[:, None], first] += oldest.hessian
@@ -255,7 +256,8 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, angle, accel = float(window.step[0]), float(window.velocity_turn[0]), window.accel[0]
     change = np.eye(size, size + free)
-    back = step_back(dt, angle, free)
+    carry = step_transition(dt, angle, free)
+    back = step_back(carry)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
     wide[size:, size:] += np.diag(window.precision[0])
@@ -269,7 +271,6 @@ def slide(window: Window) -> Window:
     left = wide[:size, :size] - gain @ wide[size:, :size]
     shaken = change.T @ window.noise @ change
     shaken[size:, size:] += np.diag(_surplus(window.precision[0], window.variance[0]))
-    carry = step_transition(dt, angle, free)
     head = window.head.copy()
     head[:HEAD] = carry @ np.concatenate([head[:HEAD], accel])
     prior = Quadratic(0.5 * (left + left.T), steep[:size] - gain @ steep[size:], head)
@@ -323,17 +324,21 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
         weight[:, :3, :3] += window.rates.single
         slope[:, :3] += window.rates.slope(spot[:, :3])
     hessian, gradient = np.zeros((size + steps * free,) * 2), np.zeros(size + steps * free)
-    (design, used), count = pose_design(window), (steps + 1) * free
+    design, count = pose_design(window), (steps + 1) * free
     flat = design.reshape(count, -1)
     inner = flat.T @ (weight[:, :free, :free] @ design).reshape(count, -1)
     if window.rates:
         shared = flat.T @ window.rates.common.reshape(count, -1)
         inner -= shared @ shared.T
     cross = flat.T @ slots[:, :free, POSE:].reshape(count, -1)
-    hessian[used[:, None], used] = inner
-    hessian[used, HEAD:size], hessian[HEAD:size, used] = cross, cross.T
-    hessian[HEAD:size, HEAD:size] = slots.sum(axis=0)[POSE:, POSE:]
-    gradient[used] = slope[:, :free].ravel() @ flat
+    pull = slope[:, :free].ravel() @ flat
+    # all but the features, as they stand in the window and in the design
+    moving = ((slice(HEAD), slice(HEAD)), (slice(size, None), slice(HEAD, None)))
+    for row, part in moving:
+        hessian[row, HEAD:size], hessian[HEAD:size, row], gradient[row] = cross[part], cross[part].T, pull[part]
+        for column, other in moving:
+            hessian[row, column] = inner[part, other]
+    hessian[HEAD:size, HEAD:size] = slots[:, POSE:, POSE:].sum(axis=0)
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
@@ -345,6 +350,13 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     hessian[at, at] += window.precision.ravel()
     gradient[at] += (window.precision * window.accel).ravel()
     return hessian, gradient
+
+
+def step_covariances(window: Window, count: int) -> Floats:
+    """Covariances (K, A, A) of the accelerations over the sliding window's first K steps."""
+    free = window.accel.shape[1]
+    at = len(window.head) + np.arange(count * free).reshape(count, free)
+    return window.covariance[at[:, :, None], at[:, None, :]]
 
 
 def weigh_holds(window: Window) -> Window:
