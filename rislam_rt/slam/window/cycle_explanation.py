@@ -263,7 +263,7 @@ def _follow(
     left[free], left[picks] = True, False
     spare = left.nonzero()[0]
     reach = np.maximum(observed.seen[spare, 0], 0.5)
-    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
+    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + (CONSTANTS.walk if __import__('os').environ.get('FAST') else 0.05))
     if len(state.level) > 2:  # what turns without a compass turns all that it sees
         rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
     found, fresh = tracks.start(found, observed, spare, rate, state.cycle)

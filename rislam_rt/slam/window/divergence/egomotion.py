@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
@@ -26,22 +26,47 @@ a jump or a turn is: two agree on any horizontal motion."""
 
 
 class Rates(NamedTuple):
-    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival."""
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
+    an array hears some alike from two."""
 
     toward: Floats
-    """(T, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
+    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
     rate: Floats
-    """(T,) [m/s] rate at which the path length changes."""
+    """(E,) [m/s] rate at which the path length changes."""
     variance: Floats
-    """(T,) [m^2/s^2] of the rate."""
+    """(E,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(T,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
+    """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
+    whole: Floats | None = None
+    """(E,) of the whole length, where `rate` is that of what the believed motion leaves of it."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
     bend: Floats | None = None
-    """(T,) [m/s^2] at which the rates change."""
+    """(E,) [m/s^2] at which the rates change."""
     bend_variance: Floats | None = None
-    """(T,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+    """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+    owner: Integers | None = None
+    """(E,) track or path of each direction; None where each has one."""
+
+    @property
+    def count(self) -> int:
+        """Number T of the tracks and paths whose lengths have a rate."""
+        return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
+
+    def each(self, value: Floats) -> Floats:
+        """Values (..., E) by track or path: of those (..., T) given."""
+        return value if self.owner is None else value[..., self.owner]
+
+    def mixed(self, value: Floats) -> Floats:
+        """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
+        if self.owner is None or len(self.owner) == self.count:
+            return value
+        return np.asarray(value @ (self.owner[:, None] == np.arange(self.count)))
+
+    @property
+    def share(self) -> Floats:
+        """(E,) probability of each direction beforehand: a half where there are two."""
+        return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
 
 
 class Manoeuvres(NamedTuple):
@@ -71,13 +96,28 @@ class StartCheck(NamedTuple):
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
 
-def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float) -> Rates:
+def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float, spacing: float) -> Rates:
     """Rates at which the lengths of tracks and explained paths change, by weighted line fits over the log's last K
     cycles of `step` [s].
 
-    `heading` (K,) [rad] and estimated positions `place` (K, 3) [m] of these; `baseline` [m] between Tx and Rx. The line
-    is fitted to what the positions leave of the lengths' change, so that a turn or an acceleration bends none.
+    `heading` (K,) [rad] and estimated positions `place` (K, 3) [m] of these; `baseline` [m] between Tx and Rx,
+    `spacing` of the antennas in wavelengths. The line is fitted to what the positions leave of the lengths' change, so
+    that a turn or an acceleration bends none.
     """
+    return _fitted(log, heading, place, step, baseline, spacing, None)
+
+
+def accelerations(
+    log: Log, heading: Floats, place: Floats, step: float, baseline: float, spacing: float, steps: int
+) -> Rates:
+    """The same, as [m/s^2], of what a constant acceleration over the last `steps` adds to the estimated positions."""
+    return _fitted(log, heading, place, step, baseline, spacing, steps)
+
+
+def _fitted(
+    log: Log, heading: Floats, place: Floats, step: float, baseline: float, spacing: float, steps: int | None
+) -> Rates:
+    """Line fits of lengths over time, or over the way of a constant unit acceleration in the last `steps`."""
     first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
     known = log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
@@ -85,9 +125,11 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
         return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0))
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    names, which = unique_forms(every)
-    count = len(names)
+    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
+    count = len(owner)
     x = (log.cycle[rows] - log.cycle[-1]) * step
+    if steps is not None:
+        x = 0.5 * np.maximum(x + steps * step, 0.0) ** 2
     weight = 1.0 / log.std[rows, 0] ** 2
 
     def total(value: Floats) -> Floats:
@@ -100,7 +142,6 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     since = log.cycle[rows] - first
     angle = heading[since]
     cos, sin = np.cos(angle), np.sin(angle)
-    flat = log.seen[rows, 1:]
     toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
     toward /= np.bincount(which, minlength=count)[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
@@ -109,13 +150,17 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     sy, sxy = total(weight * length), total(weight * x * length)
     span = step * max(len(place) - 1, 1)
     rate, variance = (s * sxy - sx * sy) / spread, CONSTANTS.crowd * s / spread
-    rate += toward @ ((place[-1] - place[0]) / span)
+    whole = rate
+    if steps is None:
+        rate = whole = rate + toward @ ((place[-1] - place[0]) / span)
+    else:
+        whole = (s * total(weight * x * log.seen[rows, 0]) - sx * total(weight * log.seen[rows, 0])) / spread
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
-    doubt = total((log.std[rows, 1:] ** 2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
+    doubt = total((spread_of**2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
     blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
-    turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
+    turning = baseline * float(np.abs(np.diff(heading)).sum()) / (span if steps is None else 0.5 * (steps * step) ** 2)
     # the quadratic part of each length over time, beside its line
     u = x - (sx / s)[which]
     u2 = u**2 - (total(weight * u**2) / s)[which] - (total(weight * u**3) / spread * s)[which] * u
@@ -123,9 +168,11 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     bend = 2.0 * total(weight * u2 * log.seen[rows, 0]) / square
     passing = np.sum((place[-1] - place[0]) ** 2) / span**2 * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
     bend_variance = 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
+    owner = owner[enough]
     return Rates(
-        toward[enough], rate[enough], variance[enough], blur[enough], turning, bend[enough], bend_variance[enough]
-    )
+        toward[enough], rate[enough], variance[enough], blur[enough], whole[enough], turning, bend[enough],
+        bend_variance[enough], np.searchsorted(np.unique(owner), owner),
+    )  # fmt: skip
 
 
 def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None = None) -> StartCheck:
@@ -171,12 +218,13 @@ def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, ma
             every = _find_modes(found, starts, told, spread)
             best = int(np.argmax(every.evidence))
             likely, agreeing, _ = _likelihoods(found, every.velocity[best : best + 1], told[2])
-            agrees = np.maximum(agreeing.sum(axis=0)[0] / likely[0], 1e-300)
+            agrees = agreeing.sum(axis=0)[0] / found.each(likely[0])
             # what is not the told velocity's own error
             accel = half * std**2 * np.linalg.solve(spread, every.velocity[best] - told[:2])
             wanted = found.toward[:, :2] @ accel
             ratio = (found.bend - 0.5 * wanted) * wanted / found.bend_variance
-            bent = np.logaddexp(np.log(agrees) + ratio, np.log(np.maximum(1.0 - agrees, 1e-300))).sum()
+            gain = found.mixed(agrees * np.expm1(np.minimum(ratio, 700.0)))
+            bent = np.log1p(np.maximum(gain, -1.0 + 1e-15)).sum()
             total = float(np.logaddexp(total, np.log(share) + every.evidence[best] + bent))
     return total
 
@@ -184,6 +232,14 @@ def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, ma
 def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
     """Log evidence of the rates of path lengths under a velocity `told` (3,) [m/s] within `std` (3,)."""
     return float(_find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2)).evidence.max())
+
+
+def likeliest(found: Rates, told: Floats, std: Floats) -> tuple[Floats, float]:
+    """Velocity (3,) [m/s] that agrees best with the rates of path lengths and with what is told, `told` (3,) within
+    `std` (3,), and the log evidence of that."""
+    every = _find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2))
+    best = int(np.argmax(every.evidence))
+    return np.append(every.velocity[best], told[2]), float(every.evidence[best])
 
 
 def agreed_velocity(found: Rates) -> Floats:
@@ -229,16 +285,18 @@ NEAR, MOST = 0.01, 8
 
 
 def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats, Floats]:
-    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, T) of the
-    two ways to agree with their variances (2, S, T)."""
+    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, E) of the
+    two ways to agree, from each direction, with their variances (2, S, E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
     either_way = np.stack([variance, variance + found.turning**2])
-    likely = 0.25 * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
-    close = likely.sum(axis=0)
-    kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
+    likely = 0.25 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
+    close = found.mixed(likely.sum(axis=0))
+    whole = found.rate if found.whole is None else found.whole
+    kept = np.exp(-0.5 * whole**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
+    kept = found.mixed(found.share * kept)
     return close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk)), likely, either_way
 
 
@@ -249,7 +307,7 @@ def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _M
     v, prior, squares = start, np.linalg.inv(spread), (flat[:, :, None] * flat[:, None, :]).reshape(-1, 4)
     for last in (False,) * 6 + (True,):
         either, likely, variance = _likelihoods(found, v, told[2])
-        weight = (likely / variance).sum(axis=0) / either  # with which the tracks agree
+        weight = (likely / variance).sum(axis=0) / found.each(either)  # with which the tracks agree
         one, both, _, two = (weight @ squares + prior.ravel()).T  # the normal matrix's numbers
         det = one * two - both**2
         if last:

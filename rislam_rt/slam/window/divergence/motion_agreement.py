@@ -32,7 +32,7 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
     found = _rates(state, slice(None), step)
-    if len(found.rate) < egomotion.FEWEST:
+    if found.count < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
     std = np.sqrt(np.diag(window.covariance)[3:6])
@@ -65,13 +65,34 @@ def log_agreement(state: WindowState, after: Window) -> float:
     return other - one
 
 
+def log_manoeuvre(state: WindowState, steps: int) -> tuple[float, Floats]:
+    """Log likelihood ratio of a manoeuvre in the last `steps` against the motion as estimated, by the rates at which
+    the lengths of tracks and of explained paths changed over the last `PAST` cycles, and the acceleration (3,) [m/s^2]
+    that they agree on then."""
+    cycles, time = _latest(state.window)
+    if cycles < egomotion.MEASURED - 1 or not is_checked(state):
+        return -np.inf, np.zeros(3)
+    rows, body = slice(-1 - cycles, None), state.scene.body
+    pose = window_gaussian.poses(state.window)[rows]
+    found = egomotion.accelerations(
+        state.log, state.heading[rows] + pose[:, 3], pose[:, :3], time / cycles,
+        float(np.linalg.norm(body.tx_offset - body.rx_offset)), state.scene.radio.array.spacing, steps,
+    )  # fmt: skip
+    if found.count < egomotion.FEWEST:
+        return -np.inf, np.zeros(3)
+    std, still = 2.0 * _mean_velocity(state.window)[1] / time, np.zeros(3)
+    calm = egomotion.log_evidence(found, still, std)
+    agreed, log_evidence = egomotion.likeliest(found, still, np.hypot(std, CONSTANTS.liveliest))
+    return log_evidence - calm, agreed
+
+
 def _latest_rates(state: WindowState) -> egomotion.Rates | None:
     """Rates of path lengths over the last `PAST` cycles, with which motion must agree; None where they are too few."""
     cycles, time = _latest(state.window)
     if cycles < egomotion.MEASURED - 1:
         return None
     found = _rates(state, slice(-1 - cycles, None), time / cycles)
-    return found if len(found.rate) >= egomotion.FEWEST else None
+    return found if found.count >= egomotion.FEWEST else None
 
 
 def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
@@ -82,7 +103,8 @@ def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
     window, body = state.window, state.scene.body
     pose = window_gaussian.poses(window)[rows]
     baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
-    found = egomotion.rates(state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step, baseline)
+    spacing = state.scene.radio.array.spacing
+    found = egomotion.rates(state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step, baseline, spacing)
     if not window.turns:
         return found
     heading_std = np.sqrt(np.diag(pose_covariance(window, TURN))[rows].max())
