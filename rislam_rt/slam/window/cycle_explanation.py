@@ -253,6 +253,17 @@ def _follow(
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
     rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
+    if state.config.motion == "learnt":
+        lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
+        other, left_over = np.setdiff1d(np.arange(len(found.ident)), rows), np.setdiff1d(free, picks)
+        more, chosen = tracks.match(
+            lively.keep(np.isin(np.arange(len(found.ident)), other)), observed, left_over, state.cycle,
+            state.config.new_density, CONSTANTS.log_rare,
+        )  # fmt: skip
+        covariance = found.covariance.copy()
+        covariance[other[more]] = lively.covariance[other[more]]
+        found = found._replace(covariance=covariance)
+        rows, picks = np.append(rows, other[more]), np.append(picks, chosen)
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()
     silent[rows] = False

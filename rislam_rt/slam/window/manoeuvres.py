@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.motion_learning import livelier
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
 
@@ -25,14 +25,17 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     window = state.window
     if window.rates is None or state.config.motion != "learnt":
         return state
-    found = [(*motion_agreement.log_manoeuvre(state, steps), steps) for steps in ONSETS if steps <= len(window.step)]
+    found = [(*motion_agreement.log_manoeuvre(state, steps), steps) for steps in ONSETS if steps < len(window.step)]
     odds, accel, steps = max(found, key=lambda each: each[0], default=(-np.inf, np.zeros(3), 0))
-    if odds + CONSTANTS.log_rare <= 0.0:
+    if __import__('os').environ.get('MAN') == '2':
+        print('   odds', state.cycle, [(round(float(a), 1), np.round(b, 2)[:2].tolist(), c) for a, b, c in found], flush=True)
+    lively = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), CONSTANTS.rare)
+    if odds + np.log(lively / (1.0 - lively)) <= 0.0:
         return state
     if __import__('os').environ.get('MAN'):
         print('   manoeuvre', state.cycle, 'odds %.1f' % odds, np.round(accel, 2), steps, flush=True)
-    trial = window_gaussian.solve(window._replace(precision=livelier(window.precision, steps)))
-    trial.accel[-steps:, :2] = window.accel[-steps:, :2] + accel[:2]
+    trial = window_gaussian.solve(window._replace(precision=livelier(window.precision, steps + 1)))
+    trial.accel[-steps - 1 :, :2] = window.accel[-steps - 1 :, :2] + accel[:2]
     for _ in range(2):
         state = with_rates(state._replace(window=trial))
         trial = window_gaussian.solve(state.window)

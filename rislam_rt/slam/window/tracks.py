@@ -91,17 +91,18 @@ def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats, velocity
 
 
 def match(
-    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float
-) -> tuple[Integers, Integers]:
+    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float,
+    log_prior: float = 0.0,
+) -> tuple[Integers, Integers]:  # fmt: skip
     """Assign components `free` of a cycle to the tracks that they continue: rows of the tracks, and their components;
-    `strangers` is the density of new paths."""
+    `strangers` is the density of new paths, `log_prior` of what the tracks' prediction supposes."""
     count = len(tracks.ident)
     if not count or not len(free):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
     heard = share(tracks, cycle)
-    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard))
+    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard)) + log_prior
     steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady

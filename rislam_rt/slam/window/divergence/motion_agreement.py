@@ -69,10 +69,11 @@ def log_manoeuvre(state: WindowState, steps: int) -> tuple[float, Floats]:
     """Log likelihood ratio of a manoeuvre in the last `steps` against the motion as estimated, by the rates at which
     the lengths of tracks and of explained paths changed over the last `PAST` cycles, and the acceleration (3,) [m/s^2]
     that they agree on then."""
-    cycles, time = _latest(state.window)
+    step = state.window.step[:-1][-PAST:]  # the last pose is not measured yet
+    cycles, time = len(step), float(step.sum())
     if cycles < egomotion.MEASURED - 1 or not is_checked(state):
         return -np.inf, np.zeros(3)
-    rows, body = slice(-1 - cycles, None), state.scene.body
+    rows, body = slice(-2 - cycles, -1), state.scene.body
     pose = window_gaussian.poses(state.window)[rows]
     found = egomotion.accelerations(
         state.log, state.heading[rows] + pose[:, 3], pose[:, :3], time / cycles,
@@ -80,7 +81,7 @@ def log_manoeuvre(state: WindowState, steps: int) -> tuple[float, Floats]:
     )  # fmt: skip
     if found.count < egomotion.FEWEST:
         return -np.inf, np.zeros(3)
-    std, still = 2.0 * _mean_velocity(state.window)[1] / time, np.zeros(3)
+    std, still = _acceleration_std(state.window, steps), np.zeros(3)
     calm = egomotion.log_evidence(found, still, std)
     agreed, log_evidence = egomotion.likeliest(found, still, np.hypot(std, CONSTANTS.liveliest))
     return log_evidence - calm, agreed
@@ -119,6 +120,14 @@ def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
     wide = np.array([pose_covariance(window, axis)[np.ix_(ends, ends)] for axis in range(3)])
     variance = np.trace(wide, axis1=1, axis2=2) - 2.0 * wide[:, 0, 1]
     return (place[0] - place[1]) / time, np.sqrt(np.maximum(variance, 0.0)) / time + 1e-6
+
+
+def _acceleration_std(window: Window, steps: int) -> Floats:
+    """Standard deviations (3,) [m/s^2] of the mean acceleration over the window's last `steps` but one."""
+    free, size = window.accel.shape[1], len(window.covariance)
+    rows = slice(size - (steps + 1) * free, size - free)
+    last = window.covariance[rows, rows].reshape(steps, free, steps, free)
+    return np.sqrt(np.diag(last.mean(axis=(0, 2)))[:3])
 
 
 def _latest(window: Window) -> tuple[int, float]:
