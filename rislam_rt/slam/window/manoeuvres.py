@@ -29,7 +29,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     odds, accel, steps = max(found, key=lambda each: each[0], default=(-np.inf, np.zeros(3), 0))
     if __import__('os').environ.get('MAN') == '2':
         print('   odds', state.cycle, [(round(float(a), 1), np.round(b, 2)[:2].tolist(), c) for a, b, c in found], flush=True)
-    lively = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), CONSTANTS.rare)
+    lively = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), 1.0 - CONSTANTS.stay ** (steps or 1))
     if odds + np.log(lively / (1.0 - lively)) <= 0.0:
         return state
     if __import__('os').environ.get('MAN'):

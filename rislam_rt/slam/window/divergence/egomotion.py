@@ -234,12 +234,12 @@ def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
     return float(_find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2)).evidence.max())
 
 
-def likeliest(found: Rates, told: Floats, std: Floats) -> tuple[Floats, float]:
-    """Velocity (3,) [m/s] that agrees best with the rates of path lengths and with what is told, `told` (3,) within
-    `std` (3,), and the log evidence of that."""
-    every = _find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2))
+def likeliest(found: Rates, spread: Floats) -> tuple[Floats, float]:
+    """Velocity, or acceleration, (3,) that agrees best with the rates of path lengths and with a horizontal prior about
+    zero of covariance `spread` (2, 2), and the log evidence of that."""
+    every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), spread)
     best = int(np.argmax(every.evidence))
-    return np.append(every.velocity[best], told[2]), float(every.evidence[best])
+    return np.append(every.velocity[best], 0.0), float(every.evidence[best])
 
 
 def agreed_velocity(found: Rates) -> Floats:

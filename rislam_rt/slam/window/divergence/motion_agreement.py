@@ -8,6 +8,7 @@ estimate, and, more leniently, every `PAST` cycles, where to be wrong costs the 
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.smoother import motion, window_gaussian
@@ -81,10 +82,13 @@ def log_manoeuvre(state: WindowState, steps: int) -> tuple[float, Floats]:
     )  # fmt: skip
     if found.count < egomotion.FEWEST:
         return -np.inf, np.zeros(3)
-    std, still = _acceleration_std(state.window, steps), np.zeros(3)
-    calm = egomotion.log_evidence(found, still, std)
-    agreed, log_evidence = egomotion.likeliest(found, still, np.hypot(std, CONSTANTS.liveliest))
-    return log_evidence - calm, agreed
+    calm = _acceleration_covariance(state.window, steps)
+    facing = rotation_z(state.heading[-1])[:2, 0]
+    ahead = calm + CONSTANTS.liveliest**2 * np.outer(facing, facing)
+    anywhere = calm + CONSTANTS.liveliest**2 * np.eye(2)
+    ways = [egomotion.likeliest(found, spread) for spread in (ahead, anywhere)]
+    agreed, log_evidence = max(ways, key=lambda each: each[1])
+    return log_evidence - np.log(2.0) - egomotion.likeliest(found, calm)[1], agreed
 
 
 def _latest_rates(state: WindowState) -> egomotion.Rates | None:
@@ -122,12 +126,11 @@ def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
     return (place[0] - place[1]) / time, np.sqrt(np.maximum(variance, 0.0)) / time + 1e-6
 
 
-def _acceleration_std(window: Window, steps: int) -> Floats:
-    """Standard deviations (3,) [m/s^2] of the mean acceleration over the window's last `steps` but one."""
+def _acceleration_covariance(window: Window, steps: int) -> Floats:
+    """Covariance (2, 2) [m^2/s^4] of the mean horizontal acceleration over the window's last `steps` but one."""
     free, size = window.accel.shape[1], len(window.covariance)
     rows = slice(size - (steps + 1) * free, size - free)
-    last = window.covariance[rows, rows].reshape(steps, free, steps, free)
-    return np.sqrt(np.diag(last.mean(axis=(0, 2)))[:3])
+    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:2, :2])
 
 
 def _latest(window: Window) -> tuple[int, float]:
