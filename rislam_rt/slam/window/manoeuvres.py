@@ -25,17 +25,18 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     window = state.window
     if window.rates is None or state.config.motion != "learnt":
         return state
-    found = [(*motion_agreement.log_manoeuvre(state, steps), steps) for steps in ONSETS if steps < len(window.step)]
-    odds, accel, steps = max(found, key=lambda each: each[0], default=(-np.inf, np.zeros(3), 0))
-    if __import__('os').environ.get('MAN') == '2':
-        print('   odds', state.cycle, [(round(float(a), 1), np.round(b, 2)[:2].tolist(), c) for a, b, c in found], flush=True)
-    lively = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), 1.0 - CONSTANTS.stay ** (steps or 1))
-    if odds + np.log(lively / (1.0 - lively)) <= 0.0:
+    steps = ONSETS[state.cycle % len(ONSETS)]
+    if steps >= len(window.step):
+        return state
+    # who manoeuvres goes on doing so; who does not may have begun in any of the steps
+    share = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), 1.0 - CONSTANTS.stay**steps)
+    odds, accel = motion_agreement.weigh_manoeuvre(state, steps, np.log(share / (1.0 - share)))
+    if odds <= 0.0:
         return state
     if __import__('os').environ.get('MAN'):
         print('   manoeuvre', state.cycle, 'odds %.1f' % odds, np.round(accel, 2), steps, flush=True)
     trial = window_gaussian.solve(window._replace(precision=livelier(window.precision, steps + 1)))
-    trial.accel[-steps - 1 :, :2] = window.accel[-steps - 1 :, :2] + accel[:2]
+    trial.accel[-steps - 1 :, :2] = window.accel[-steps - 1 :, :2] + accel
     for _ in range(2):
         state = with_rates(state._replace(window=trial))
         trial = window_gaussian.solve(state.window)

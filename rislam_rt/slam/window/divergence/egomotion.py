@@ -234,12 +234,19 @@ def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
     return float(_find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2)).evidence.max())
 
 
-def likeliest(found: Rates, spread: Floats) -> tuple[Floats, float]:
-    """Velocity, or acceleration, (3,) that agrees best with the rates of path lengths and with a horizontal prior about
-    zero of covariance `spread` (2, 2), and the log evidence of that."""
-    every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), spread)
-    best = int(np.argmax(every.evidence))
-    return np.append(every.velocity[best], 0.0), float(every.evidence[best])
+def weigh_change(found: Rates, calm: Floats, ways: list[Floats], log_prior: float) -> tuple[float, Floats]:
+    """Posterior log odds that rates of path lengths change by a horizontal velocity or acceleration of one of the
+    covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,); `log_prior` are
+    the odds beforehand."""
+    starts, nothing = _starts(found, np.zeros(3)), np.zeros(3)
+    level = np.log(_likelihoods(found, starts, 0.0)[0]).sum(axis=1)
+    if level.max() - level[0] + log_prior <= 0.0:  # no prior makes a change likelier than that
+        return -np.inf, nothing[:2]
+    modes = [_find_modes(found, starts, nothing, spread) for spread in ways]
+    best = max(modes, key=lambda each: each.evidence.max())
+    at = int(np.argmax(best.evidence))
+    log_ratio = best.evidence[at] - np.log(len(ways)) - _find_modes(found, starts[:1], nothing, calm).evidence[0]
+    return float(log_ratio) + log_prior, best.velocity[at]
 
 
 def agreed_velocity(found: Rates) -> Floats:

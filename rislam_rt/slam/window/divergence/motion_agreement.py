@@ -66,29 +66,28 @@ def log_agreement(state: WindowState, after: Window) -> float:
     return other - one
 
 
-def log_manoeuvre(state: WindowState, steps: int) -> tuple[float, Floats]:
-    """Log likelihood ratio of a manoeuvre in the last `steps` against the motion as estimated, by the rates at which
-    the lengths of tracks and of explained paths changed over the last `PAST` cycles, and the acceleration (3,) [m/s^2]
-    that they agree on then."""
-    step = state.window.step[:-1][-PAST:]  # the last pose is not measured yet
-    cycles, time = len(step), float(step.sum())
-    if cycles < egomotion.MEASURED - 1 or not is_checked(state):
-        return -np.inf, np.zeros(3)
-    rows, body = slice(-2 - cycles, -1), state.scene.body
-    pose = window_gaussian.poses(state.window)[rows]
+def weigh_manoeuvre(state: WindowState, steps: int, log_prior: float) -> tuple[float, Floats]:
+    """Posterior log odds of a manoeuvre that has lasted for `steps` until the last measurement, and its horizontal
+    acceleration (2,) [m/s^2], by the rates at which the lengths of tracks and of explained paths changed over the last
+    `PAST` cycles.
+
+    It is an acceleration of the liveliest mode, where the agent faces or in any direction.
+    """
+    window, body = state.window, state.scene.body
+    passed = window.step[:-1][-PAST:]  # the last pose is not measured yet
+    if len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
+        return -np.inf, np.zeros(2)
+    rows = slice(-2 - len(passed), -1)
+    pose = window_gaussian.poses(window)[rows]
     found = egomotion.accelerations(
-        state.log, state.heading[rows] + pose[:, 3], pose[:, :3], time / cycles,
+        state.log, state.heading[rows] + pose[:, 3], pose[:, :3], float(passed.mean()),
         float(np.linalg.norm(body.tx_offset - body.rx_offset)), state.scene.radio.array.spacing, steps,
     )  # fmt: skip
     if found.count < egomotion.FEWEST:
-        return -np.inf, np.zeros(3)
-    calm = _acceleration_covariance(state.window, steps)
-    facing = rotation_z(state.heading[-1])[:2, 0]
-    ahead = calm + CONSTANTS.liveliest**2 * np.outer(facing, facing)
-    anywhere = calm + CONSTANTS.liveliest**2 * np.eye(2)
-    ways = [egomotion.likeliest(found, spread) for spread in (ahead, anywhere)]
-    agreed, log_evidence = max(ways, key=lambda each: each[1])
-    return log_evidence - np.log(2.0) - egomotion.likeliest(found, calm)[1], agreed
+        return -np.inf, np.zeros(2)
+    calm, facing = _acceleration_covariance(window, steps), rotation_z(state.heading[-1])[:2, 0]
+    ways = [calm + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
+    return egomotion.weigh_change(found, calm, ways, log_prior)
 
 
 def _latest_rates(state: WindowState) -> egomotion.Rates | None:
