@@ -25,6 +25,10 @@ FEWEST = 3
 a jump or a turn is: two agree on any horizontal motion."""
 
 
+NOTHING = np.zeros(2)
+"""No motion."""
+
+
 class Rates(NamedTuple):
     """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
     an array hears some alike from two."""
@@ -47,6 +51,8 @@ class Rates(NamedTuple):
     """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
     owner: Integers | None = None
     """(E,) track or path of each direction; None where each has one."""
+    believed: Floats = NOTHING
+    """(2,) horizontal velocity or acceleration to which those that are asked for are added."""
 
     @property
     def count(self) -> int:
@@ -150,11 +156,14 @@ def _fitted(
     sy, sxy = total(weight * length), total(weight * x * length)
     span = step * max(len(place) - 1, 1)
     rate, variance = (s * sxy - sx * sy) / spread, CONSTANTS.crowd * s / spread
-    whole = rate
+    whole, believed = rate, NOTHING
     if steps is None:
         rate = whole = rate + toward @ ((place[-1] - place[0]) / span)
     else:
         whole = (s * total(weight * x * log.seen[rows, 0]) - sx * total(weight * log.seen[rows, 0])) / spread
+        clock = 0.5 * np.maximum((np.arange(len(place)) - len(place) + 1 + steps) * step, 0.0) ** 2
+        clock -= clock.mean()
+        believed = clock @ place[:, :2] / (clock @ clock)
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
@@ -171,7 +180,7 @@ def _fitted(
     owner = owner[enough]
     return Rates(
         toward[enough], rate[enough], variance[enough], blur[enough], whole[enough], turning, bend[enough],
-        bend_variance[enough], np.searchsorted(np.unique(owner), owner),
+        bend_variance[enough], np.searchsorted(np.unique(owner), owner), believed,
     )  # fmt: skip
 
 
@@ -303,8 +312,12 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     close = found.mixed(likely.sum(axis=0))
     whole = found.rate if found.whole is None else found.whole
     kept = np.exp(-0.5 * whole**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
-    kept = found.mixed(found.share * kept)
-    return close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk)), likely, either_way
+    # nothing at rest changes its length by more than twice the agent's speed
+    total = velocity + found.believed
+    wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(total, total) + climb**2)[:, None]
+    other = (1.0 - CONSTANTS.rare) * np.exp(-0.5 * whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
+    other = other + CONSTANTS.rare / (4.0 * CONSTANTS.walk)
+    return close + 0.5 / 4.0 * found.mixed(found.share * (kept + 3.0 * other)), likely, either_way
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
