@@ -252,7 +252,11 @@ def _follow(
     speed = float(np.linalg.norm(view.mean[3:6]))
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
-    rows, picks = tracks.match(found, observed, free, state.cycle, state.config.new_density)
+    lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
+    found, rows, picks = tracks.match_over_motions(
+        found, lively if state.config.motion == "learnt" else None, observed, free, state.cycle,
+        state.config.new_density,
+    )  # fmt: skip
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()
     silent[rows] = False

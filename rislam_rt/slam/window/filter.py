@@ -30,6 +30,7 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
+from rislam_rt.slam.window.manoeuvres import with_manoeuvre
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log, squares
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
@@ -81,7 +82,7 @@ def step(
     else:
         heading += state.turned
     turn, restarted = heading - float(state.heading[-1]), state.lost_log_odds == 0.0
-    state = with_rates(_move(state, dt, heading))
+    state = with_manoeuvre(with_rates(_move(state, dt, heading)))
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
     heard = components_to_explain(measurement, scene)

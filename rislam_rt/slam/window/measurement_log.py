@@ -10,6 +10,22 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 
 
+class Ends(NamedTuple):
+    """Components of T tracks or paths, those that the array hears alike from two directions once for each: E ends, N
+    components in all."""
+
+    row: Integers
+    """(N,) row of each component in the log."""
+    which: Integers
+    """(N,) end that it belongs to."""
+    cosines: Floats
+    """(N, 2) direction cosines at that end."""
+    std: Floats
+    """(N, 2) their standard deviations there."""
+    owner: Integers
+    """(E,) track or path of each end: 0 to T - 1, and the other ends of those that have two."""
+
+
 class Log(NamedTuple):
     """Components measured in the window's cycles, N of them in the order of time, and the path that each was associated
     with."""
@@ -74,6 +90,36 @@ class Log(NamedTuple):
         cosine, across, std = np.abs(self.seen[:, 1:]), np.abs(self.seen[:, :0:-1]), self.std[:, 1:]
         inside = np.hypot(1.0 / spacing - cosine, across) < 1.0 + CONSTANTS.fit * std[:, ::-1]
         return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
+
+    def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "Ends":
+        """Components `rows` (A,) of tracks or paths `which` (A,), with those of which most are `mirrored` once for
+        either end, behind all others.
+
+        The cosine along the other axis tells by how much one at the array's end errs, of whose sign nothing is known.
+        """
+        cosines, std, count = self.seen[rows, 1:], self.std[rows, 1:], int(which.max(initial=-1)) + 1
+        excess = np.zeros((count, 2))
+        np.add.at(excess, which, self.take(rows).mirrored(spacing) - 0.5)
+        both = excess[which] > 0.0
+        if not both.any():
+            return Ends(rows, which, cosines, std, np.arange(count))
+        rim, period = np.sqrt(np.maximum(1.0 - cosines[:, ::-1] ** 2, 0.0)), 1.0 / spacing
+        end = np.where(both, np.minimum(cosines + period * (cosines < 0.0), rim), cosines)
+        other = np.where(both, np.maximum(end - period, -rim), cosines)
+        std = np.where(both, np.minimum(std, std[:, ::-1]), std)
+        twice, owner = both.any(axis=1), (excess > 0.0).any(axis=1).nonzero()[0]
+        again = count + np.searchsorted(owner, which[twice])
+        return Ends(
+            np.append(rows, rows[twice]), np.append(which, again), np.concatenate([end, other[twice]]),
+            np.concatenate([std, std[twice]]), np.append(np.arange(count), owner),
+        )  # fmt: skip
+
+    def at_ends(self, ends: "Ends") -> "Log":
+        """Measurement log of the components of `ends`, each with the direction that it has there."""
+        log = self.take(ends.row)
+        seen, std = log.seen.copy(), log.std.copy()
+        seen[:, 1:], std[:, 1:] = ends.cosines, ends.std
+        return log._replace(seen=seen, std=std)
 
     @property
     def explained(self) -> Booleans:

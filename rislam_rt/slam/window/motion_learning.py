@@ -143,9 +143,9 @@ def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
     return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
-def livelier(precision: Floats) -> Floats:
-    """Prior precisions (K - 1, A) of the window's accelerations, the last steps' lowered to the liveliest motion mode,
-    but not vertically."""
+def livelier(precision: Floats, steps: int = LATELY) -> Floats:
+    """Prior precisions (K - 1, A) of the window's accelerations, those of the last `steps` lowered to the liveliest
+    motion mode, but not vertically."""
     found, lively = precision.copy(), COLUMNS[: precision.shape[1]] != 1
-    found[-LATELY:, lively] = np.minimum(found[-LATELY:, lively], CONSTANTS.liveliest**-2.0)
+    found[-steps:, lively] = np.minimum(found[-steps:, lively], CONSTANTS.liveliest**-2.0)
     return found

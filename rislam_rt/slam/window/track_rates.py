@@ -15,6 +15,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.egomotion import MEASURED
+from rislam_rt.slam.window.measurement_log import Ends
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
@@ -26,7 +27,8 @@ class _Histories(NamedTuple):
     """Components of T tracks, N in all, track by track in the order of time, and what the poses leave of them."""
 
     which: Integers
-    """(N,) track of each component."""
+    """(N,) direction of which track each component is of: one for each track but those that an array hears alike from
+    two directions."""
     slot: Integers
     """(N,) pose of the window."""
     time: Floats
@@ -47,6 +49,8 @@ class _Histories(NamedTuple):
     """(T,) [m/s] mean speed of the agent in between."""
     own_variance: Floats
     """(T,) [m^2/s^2] of the rate of its own."""
+    owner: Integers
+    """(T,) track of each direction."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (T,) over each track's history of values (N,)."""
@@ -80,52 +84,51 @@ def rate_factor(state: WindowState) -> RateFactor | None:
         return None
     rows = rows[np.argsort(log.track[rows], kind="stable")]
     which = np.cumsum(np.diff(log.track[rows], prepend=log.track[rows[0]]) != 0)
-    found = _histories(state, rows, which, log.cycle[rows] - first)
+    found = _histories(state, log.both_ends(rows, which, state.scene.radio.array.spacing), first)
     return _factor(found, _shares(found, state), state)
 
 
-def _histories(state: WindowState, rows: Integers, which: Integers, slot: Integers) -> _Histories:
-    """Histories of the tracks whose rates are asked, given as rows (N,) of the log with their tracks (N,) and slots
-    (N,)."""
+def _histories(state: WindowState, ends: Ends, start: int) -> _Histories:
+    """Histories of the tracks whose rates are asked, from the window's first cycle `start` on."""
     window, log, body = state.window, state.log, state.scene.body
+    rows, which, slot = ends.row, ends.which, log.cycle[ends.row] - start
     place, clock = window_gaussian.poses(window)[:, :3], np.concatenate([[0.0], np.cumsum(window.step)])
     first = np.searchsorted(which, np.arange(which[-1] + 1))
-    ends = np.stack([slot[first], slot[np.append(first[1:], len(slot)) - 1]], axis=1)
+    spans = np.stack([slot[first], slot[np.append(first[1:], len(slot)) - 1]], axis=1)
 
     def total(value: Floats) -> Floats:
         return np.asarray(np.bincount(which, value), dtype=np.float64)
 
     weight = log.std[rows, 0] ** -2.0
     time = clock[slot] - (total(weight * clock[slot]) / total(weight))[which]
-    toward, doubt = _directions(state, rows, which, slot, time)
+    toward, doubt = _directions(state, ends, slot, time)
     moved, joined = np.diff(place[slot], axis=0), np.diff(which) == 0
     follow = np.append(0.0, np.cumsum(np.where(joined, np.vecdot(0.5 * (toward[1:] + toward[:-1]), moved), 0.0)))
     way = np.append(0.0, np.cumsum(np.where(joined, np.linalg.norm(moved, axis=1), 0.0)))
-    span = clock[ends[:, 1]] - clock[ends[:, 0]]
+    span = clock[spans[:, 1]] - clock[spans[:, 0]]
     last = np.append(first[1:], len(slot)) - 1
     speed = (way[last] - way[first]) / span
     baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
     turned = np.append(0.0, np.cumsum(np.abs(np.diff(state.heading))))
-    turning = baseline * (turned[ends[:, 1]] - turned[ends[:, 0]]) / span
+    turning = baseline * (turned[spans[:, 1]] - turned[spans[:, 0]]) / span
     length = log.seen[rows, 0]
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     apart = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
     own = (apart**2 + doubt) * speed**2 + turning**2 + STILL**2
     weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
     return _Histories(
-        which, slot, time, length, weight, toward, length - (follow - follow[first][which]), ends, span, speed, own
+        which, slot, time, length, weight, toward, length - (follow - follow[first][which]), spans, span, speed, own,
+        ends.owner,
     )  # fmt: skip
 
 
-def _directions(
-    state: WindowState, rows: Integers, which: Integers, slot: Integers, time: Floats
-) -> tuple[Floats, Floats]:
+def _directions(state: WindowState, ends: Ends, slot: Integers, time: Floats) -> tuple[Floats, Floats]:
     """Directions of arrival (N, 3) in the room's axes, times -2, smoothed by a line over time for each track, and the
     variance (T,) of their error along a way of one metre."""
-    seen, angle = state.log.seen[rows, 1:], state.heading[slot]
+    which, seen, angle = ends.which, ends.cosines, state.heading[slot]
     cos, sin = np.cos(angle), np.sin(angle)
     flat = np.stack([cos * seen[:, 0] - sin * seen[:, 1], sin * seen[:, 0] + cos * seen[:, 1]], axis=1)
-    weight = state.log.std[rows, 1:].mean(axis=1) ** -2.0
+    weight = ends.std.mean(axis=1) ** -2.0
     s, sx, sxx = (np.bincount(which, weight * time**power) for power in range(3))
     sy, sxy = (np.stack([np.bincount(which, weight * x * side) for side in flat.T]) for x in (1.0, time))
     rate = (s * sxy - sx * sy) / (s * sxx - sx**2)
@@ -156,9 +159,11 @@ def _shares(found: _Histories, state: WindowState) -> Floats:
     (rate, spread), (whole, _) = found.slope(found.left), found.slope(found.length)
     mean = np.stack([found.mean(side) for side in found.toward.T], axis=1)
     doubt = np.vecdot(mean**2, way_variance(state.window, *found.ends.T)) / found.span**2
-    along = 0.5 * _normal(rate, spread + found.own_variance + doubt)
+    half = 1.0 / np.bincount(found.owner)[found.owner]
+    along = 0.5 * half * _normal(rate, spread + found.own_variance + doubt)
     kept = 0.5 / 4.0 * _normal(whole, spread)
-    return along / (along + kept + 0.5 * 3.0 / 4.0 / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
+    either = np.bincount(found.owner, along)[found.owner]
+    return along / (either + kept + 0.5 * 3.0 / 4.0 / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
 
 
 def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:

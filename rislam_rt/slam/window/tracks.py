@@ -91,23 +91,41 @@ def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats, velocity
 
 
 def match(
-    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float
-) -> tuple[Integers, Integers]:
+    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float,
+    log_prior: float = 0.0,
+) -> tuple[Integers, Integers]:  # fmt: skip
     """Assign components `free` of a cycle to the tracks that they continue: rows of the tracks, and their components;
-    `strangers` is the density of new paths."""
+    `strangers` is the density of new paths, `log_prior` of what the tracks' prediction supposes."""
     count = len(tracks.ident)
     if not count or not len(free):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
     heard = share(tracks, cycle)
-    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard))
+    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard)) + log_prior
     steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady
     )
     rows, columns = cheapest(pair_costs(candidates, observed.take(free), GATE, strangers))
     return rows, free[columns]
+
+
+def match_over_motions(
+    calm: WindowTracks, lively: WindowTracks | None, observed: Observations, free: Integers, cycle: int,
+    strangers: float,
+) -> tuple[WindowTracks, Integers, Integers]:  # fmt: skip
+    """Assign components to tracks as predicted by the motion as believed, `calm`, and to what is left of these as in a
+    manoeuvre, `lively`, which is a rare event: the tracks, each with the prediction that holds, and as in `match`."""
+    rows, picks = match(calm, observed, free, cycle, strangers)
+    if lively is None:
+        return calm, rows, picks
+    left = np.ones(len(calm.ident), dtype=np.bool_)
+    left[rows] = False
+    more, chosen = match(lively.keep(left), observed, np.setdiff1d(free, picks), cycle, strangers, CONSTANTS.log_rare)
+    more, covariance = left.nonzero()[0][more], calm.covariance.copy()
+    covariance[more] = lively.covariance[more]
+    return calm._replace(covariance=covariance), np.append(rows, more), np.append(picks, chosen)
 
 
 def share(tracks: WindowTracks, cycle: int) -> Floats:

@@ -34,14 +34,14 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
         return context
     names = context.tracks.ident[rows]
     track_rows = [((context.log.track == name) & ~context.log.explained).nonzero()[0] for name in names]
-    full = [place for place, at in enumerate(track_rows) if len(at) >= 5 and not _mirrored(context, at)]
+    full = [place for place, at in enumerate(track_rows) if len(at) >= 5]
     if not full:
         return context
     rows, track_rows = rows[full], [track_rows[place] for place in full]
     mean, covariance = window_gaussian.now(context.window)
     known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
-    histories = summarise_tracks(context, track_rows)
-    told = explanations(context, rows, histories, view, mean, covariance)
+    histories, owner = summarise_tracks(context, track_rows)
+    told = explanations(context, rows, histories, owner, view, mean, covariance)
     panels = context.landmarks.panels
     lonely = missing_legs(context, rows, mean)
     beside = (
@@ -50,7 +50,7 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     bases = [int(one.forms[0, 0]) for one in told]
     over = [(one.track, one.log_evidence, panels.index(base) if base >= 0 and base in panels else -1)
             for one, base in zip(told, bases, strict=True)]  # fmt: skip
-    decisions, shares = decide_tracks(context, track_rows, histories, known, over, lonely, beside)
+    decisions, shares = decide_tracks(context, track_rows, histories, owner, known, over, lonely, beside)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms, part), share in zip(told, shares, strict=True):
@@ -81,17 +81,6 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     return context if born < 0 else _without_rival(context, decisions[born].identity, panels)
 
 
-def _mirrored(context: WindowState, at: Integers) -> bool:
-    """Whether a track (rows of the log) was reported now in one and now in the other of two directions that the array
-    hears alike.
-
-    A Gaussian about the mean of both is no model of that: it tells of places in between.
-    """
-    log, spacing = context.log.take(at), context.scene.radio.array.spacing
-    both = np.ptp(log.seen[:, 1:], axis=0) > 0.5 / spacing
-    return bool((both & (log.mirrored(spacing).mean(axis=0) > 0.5)).any())
-
-
 def _log_same_direction(
     context: WindowState, rows: Integers, track_rows: list[Integers], histories: TrackSummary, mean: Floats
 ) -> Floats:
@@ -108,7 +97,7 @@ def _log_same_direction(
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
     panel = np.append(context.tracks.side[old] >= PANEL, np.isin(points, panels[panels >= 0]))
     ray, length = bearings(context, rows, mean)
-    variance = (histories.weight[..., 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
+    variance = (histories.weight[: len(rows), :, 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]
     log_odds += np.log(np.maximum(ray[:, 2], 0.1))[:, None]  # against any direction of the half sphere

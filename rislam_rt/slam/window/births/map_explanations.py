@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import Poses, linearise
 from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.smoother.window_gaussian import poses
 from rislam_rt.slam.window.solver_limits import MOST, NEAR, STRENGTHS
 from rislam_rt.slam.window.state import WindowState
 
@@ -33,10 +35,11 @@ class MapExplanation(NamedTuple):
 
 
 def explanations(
-    context: WindowState, rows: Integers, histories: TrackSummary, view: CycleAssociation, mean: Floats,
-    covariance: Floats,
+    context: WindowState, rows: Integers, histories: TrackSummary, owner: Integers, view: CycleAssociation,
+    mean: Floats, covariance: Floats,
 ) -> list[MapExplanation]:  # fmt: skip
-    """Explanations of tracks, `rows` (T,) of all, by predicted returns of the map."""
+    """Explanations of tracks, `rows` (T,) of all, by predicted returns of the map; `owner` (E,) is the track of each of
+    the histories."""
     expected, groups = view.expected, view.groups
     if not len(groups.leader):
         return []
@@ -44,12 +47,22 @@ def explanations(
     inside, wide = covariance[HEAD:, HEAD:], 1e-14 * np.eye(len(mean) - HEAD)
     root = np.asarray(np.linalg.cholesky(inside + 1e-9 * np.diag(np.diag(inside)) + wide), dtype=np.float64)
     found: list[MapExplanation] = []
-    for row, place in enumerate(rows):
-        off = np.abs(lead + share * groups.gap - context.tracks.mean[place, :, 0]) / NEAR
+    ends = np.bincount(owner)[owner]
+    for row, track in enumerate(owner.tolist()):
+        seen = context.tracks.mean[rows[track], :, 0] if ends[row] == 1 else _latest(histories, row, context)
+        off = np.abs(lead + share * groups.gap - seen) / NEAR
         near = (off < 1.0).all(axis=1).nonzero()[0]
         for column in near[np.argsort(off[near].sum(axis=1))][:MOST].tolist():
-            found.append(_explanation(context, histories, row, view, column, mean[HEAD:].reshape(-1, 3), root))
+            one = _explanation(context, histories, row, view, column, mean[HEAD:].reshape(-1, 3), root)
+            found.append(one._replace(track=track, log_evidence=one.log_evidence - float(np.log(ends[row]))))
     return found
+
+
+def _latest(histories: TrackSummary, row: int, context: WindowState) -> Floats:
+    """Length and cosines (3,) of a track's last normal point, in the body frame."""
+    last = int((histories.weight[row, :, 0] > 0.0).sum()) - 1
+    turn = rotation_z(np.array(-float(context.heading[-1] + poses(context.window)[-1, 3])))[:2, :2]
+    return np.append(histories.seen[row, last, 0], turn @ histories.seen[row, last, 1:])
 
 
 def _explanation(

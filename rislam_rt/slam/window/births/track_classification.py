@@ -103,14 +103,15 @@ _TEMPLATES = (
 
 
 def _weigh(
-    context: WindowState, track_rows: list[Integers], summary: TrackSummary, known: KnownFeatures, lonely: Floats
-) -> tuple[Hypotheses, Fits, Floats, Floats]:
-    """Fit all hypotheses of what caused T tracks; returns them, fits, log evidences (H,), and path lengths (H,) [m]: as
-    heard, or whole periods of the sounding more."""
-    landmarks, scene, near = context.landmarks, context.scene, len(summary.seen)
-    owner = np.arange(near)
+    context: WindowState, track_rows: list[Integers], summary: TrackSummary, owner: Integers, known: KnownFeatures,
+    lonely: Floats,
+) -> tuple[Hypotheses, Fits, Floats, Floats]:  # fmt: skip
+    """Fit all hypotheses of what caused T tracks, of which `owner` (E,) tells each summary's; returns them, fits, log
+    evidences (H,), and path lengths (H,) [m]: as heard, or whole periods of the sounding more."""
+    landmarks, scene, near = context.landmarks, context.scene, len(owner)
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
-        summary, owner = summary.farther(scene.sensor)
+        summary, end = summary.farther(scene.sensor)
+        owner = owner[end]
     table = hypotheses(summary, known, landmarks)
     if len(owner) > near:
         table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
@@ -126,7 +127,8 @@ def _weigh(
         table, fits, summary, known, landmarks, scene.use_vt
     )
     evidence += log_beside(table, summary, known, context)
-    best = np.full(near, -np.inf)
+    evidence -= np.log(np.bincount(owner[:near]))[owner[track]]
+    best = np.full(len(track_rows), -np.inf)
     np.maximum.at(best, owner[track], np.where(np.isfinite(fits.cost), evidence, -np.inf))
     # so far behind nothing counts any more, whatever else speaks for it
     fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * CERTAIN, np.inf, fits.cost))
@@ -146,27 +148,27 @@ def _weigh(
 
 
 def decide_tracks(
-    context: WindowState, track_rows: list[Integers], summary: TrackSummary, known: KnownFeatures,
-    told: list[tuple[int, float, int]],
-    lonely: Floats, beside: Floats,
+    context: WindowState, track_rows: list[Integers], summary: TrackSummary, owner: Integers, known: KnownFeatures,
+    told: list[tuple[int, float, int]], lonely: Floats, beside: Floats,
 ) -> tuple[list[TrackDecision], Floats]:  # fmt: skip
     """Decide what caused each of T tracks, and return the decisions with the posteriors (E,) of the explanations by the
     map.
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
-    `track_rows` are the tracks' rows of the log; `lonely` (T,) is the log probability that so few single-bounce returns
-    are heard beside a return over two unknown walls, `beside` (T,) the log odds that its direction speaks for a path
-    over unknown walls.
+    `track_rows` are the tracks' rows of the log, `owner` (E,) the track of each summary; `lonely` (T,) is the log
+    probability that so few single-bounce returns are heard beside a return over two unknown walls, `beside` (T,) the
+    log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table, fits, evidence, length = _weigh(context, track_rows, summary, known, lonely)
+    table, fits, evidence, length = _weigh(context, track_rows, summary, owner, known, lonely)
     track = table.trials.track
     over = identify(context, track_rows, table, fits, evidence)
     evidence += over.gain
     for number, panel in enumerate(landmarks.panels):
         if panel >= 0:
             evidence += np.where(IS_IMAGE[table.kind] & (table.known == panel), over.elsewhere[track, number], 0.0)
+    summary = summary.take(np.arange(len(track_rows)))
     smooth, _ = smooth_paths(summary)
     none = smooth + log_no_kind(summary.mean[0], scene.use_vt) + beside
     over_panels = np.logaddexp.reduce(over.elsewhere, axis=1) - np.log(scene.num_panels)

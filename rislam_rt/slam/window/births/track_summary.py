@@ -93,10 +93,16 @@ class TrackSummary(_Points):
         return rays(self.mean[0], 0.0)
 
 
-def summarise_tracks(state: WindowState, rows: list[Integers]) -> TrackSummary:
+def summarise_tracks(state: WindowState, rows: list[Integers]) -> tuple[TrackSummary, Integers]:
     """Condense the histories of T tracks, each given as rows of the log in time, to normal points with weights and pose
-    errors."""
+    errors; also returns the track (E,) of each summary: what the array hears alike from two directions has two, the
+    second behind all others."""
     log, window = state.log, state.window
+    which = np.repeat(np.arange(len(rows)), [len(at) for at in rows])
+    alike = log.both_ends(np.concatenate(rows), which, state.scene.radio.array.spacing)
+    if len(alike.owner) > len(rows):
+        log = log.at_ends(alike)
+        rows = [(alike.which == end).nonzero()[0] for end in range(len(alike.owner))]
     mean, covariance = now(window)
     place, time = poses(window), np.concatenate([[0.0], np.cumsum(window.step)])
     ends = poses_of(place[:, :3], state.heading + place[:, 3], state.scene.body)
@@ -143,7 +149,8 @@ def summarise_tracks(state: WindowState, rows: list[Integers]) -> TrackSummary:
     root = np.linalg.cholesky(covariance[:6, :6] + np.diag(1e-6 * scale + 1e-14))
     across = np.stack([0.0 * found.seen[..., 0], found.seen[..., 2], -found.seen[..., 1]], axis=-1)
     found = found._replace(twist=across[..., None] * turned[:, :, None])
-    return found._replace(uncertainty=np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64))
+    uncertainty = np.asarray(root[:3] + found.time[..., None, None] * root[3:6], dtype=np.float64)
+    return found._replace(uncertainty=uncertainty), alike.owner
 
 
 def heading_roots(window: Window) -> Floats:

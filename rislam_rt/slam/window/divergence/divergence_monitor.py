@@ -65,7 +65,7 @@ def jump(view: CycleAssociation, observed: Observations, use_vt: bool) -> Floats
     if len(row) < egomotion.FEWEST:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
-    found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)))
+    found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)), gap)
     by = egomotion.agreed_velocity(found)
     return by if float(by @ by) > CELL**2 else np.zeros(3)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
@@ -26,22 +26,50 @@ a jump or a turn is: two agree on any horizontal motion."""
 
 
 class Rates(NamedTuple):
-    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival."""
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
+    an array hears some alike from two."""
 
     toward: Floats
-    """(T, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
+    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
     rate: Floats
-    """(T,) [m/s] rate at which the path length changes."""
+    """(E,) [m/s] rate at which the path length changes."""
     variance: Floats
-    """(T,) [m^2/s^2] of the rate."""
+    """(E,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(T,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
+    """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
+    whole: Floats
+    """(E,) of the whole length, where `rate` is that of what the positions leave of it."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
     bend: Floats | None = None
-    """(T,) [m/s^2] at which the rates change."""
+    """(E,) [m/s^2] at which the rates change."""
     bend_variance: Floats | None = None
-    """(T,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+    """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+    owner: Integers | None = None
+    """(E,) track or path of each direction; None where each has one."""
+    believed: Floats | None = None
+    """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
+    rest may have any rate."""
+
+    @property
+    def count(self) -> int:
+        """Number T of the tracks and paths whose lengths have a rate."""
+        return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
+
+    def each(self, value: Floats) -> Floats:
+        """Values (..., E) by track or path: of those (..., T) given."""
+        return value if self.owner is None else value[..., self.owner]
+
+    def mixed(self, value: Floats) -> Floats:
+        """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
+        if self.owner is None or len(self.owner) == self.count:
+            return value
+        return np.asarray(value @ (self.owner[:, None] == np.arange(self.count)))
+
+    @property
+    def share(self) -> Floats:
+        """(E,) probability of each direction beforehand: a half where there are two."""
+        return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
 
 
 class Manoeuvres(NamedTuple):
@@ -71,27 +99,58 @@ class StartCheck(NamedTuple):
     """[rad] by which the compass shows too little, if it is that which is wrong."""
 
 
-def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float) -> Rates:
-    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over the log's last K
-    cycles of `step` [s].
+class Heard(NamedTuple):
+    """What rates of path lengths are fitted to: the log's components in the cycles of K poses."""
 
-    `heading` (K,) [rad] and estimated positions `place` (K, 3) [m] of these; `baseline` [m] between Tx and Rx. The line
-    is fitted to what the positions leave of the lengths' change, so that a turn or an acceleration bends none.
-    """
+    log: Log
+    """All components that were measured; the last cycle's are those of the last pose."""
+    heading: Floats
+    """(K,) [rad] the agent's headings."""
+    place: Floats
+    """(K, 3) [m] its estimated positions."""
+    step: float
+    """[s] from pose to pose."""
+    baseline: float
+    """[m] from Tx to Rx."""
+    spacing: float
+    """[wavelengths] of the antennas."""
+
+
+def rates(heard: Heard) -> Rates:
+    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
+    positions leave of the lengths' change, so that a turn or an acceleration bends none."""
+    return _fitted(heard, None)
+
+
+def accelerations(heard: Heard, steps: int) -> Rates:
+    """Rates [m/s^2] at which the lengths of tracks and explained paths change with the way of a constant acceleration
+    over the last `steps`, by weighted line fits to what the positions leave of the lengths' change: 0 for a path that
+    follows the positions as they are."""
+    return _fitted(heard, steps)
+
+
+def _fitted(heard: Heard, steps: int | None) -> Rates:
+    """Rates of path lengths by time, or by the way of an acceleration over the last `steps`."""
+    log, heading, place, step, baseline, spacing = heard
     first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
     known = log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     if not len(rows):
-        return Rates(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0))
+        return Rates(np.zeros((0, 3)), *np.zeros((4, 0)))
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    names, which = unique_forms(every)
-    count = len(names)
+    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
+    count = len(owner)
     x = (log.cycle[rows] - log.cycle[-1]) * step
+    if steps is not None:
+        x = 0.5 * np.maximum(x + steps * step, 0.0) ** 2
     weight = 1.0 / log.std[rows, 0] ** 2
 
     def total(value: Floats) -> Floats:
         return np.asarray(np.bincount(which, value, count), dtype=np.float64)
+
+    def slope(value: Floats) -> Floats:
+        return np.asarray((s * total(weight * x * value) - sx * total(weight * value)) / spread)
 
     s, sx, sxx = total(weight), total(weight * x), total(weight * x**2)
     spread = s * sxx - sx**2
@@ -100,22 +159,28 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     since = log.cycle[rows] - first
     angle = heading[since]
     cos, sin = np.cos(angle), np.sin(angle)
-    flat = log.seen[rows, 1:]
     toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
     toward /= np.bincount(which, minlength=count)[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
-    length = log.seen[rows, 0] - np.vecdot(toward[which], place[since] - place[-1])
-    sy, sxy = total(weight * length), total(weight * x * length)
-    span = step * max(len(place) - 1, 1)
-    rate, variance = (s * sxy - sx * sy) / spread, CONSTANTS.crowd * s / spread
-    rate += toward @ ((place[-1] - place[0]) / span)
+    rate = slope(log.seen[rows, 0] - np.vecdot(toward[which], place[since] - place[-1]))
+    span, variance = step * max(len(place) - 1, 1), CONSTANTS.crowd * s / spread
+    if steps is None:
+        rate = whole = rate + toward @ ((place[-1] - place[0]) / span)
+        believed = np.zeros(2)
+    else:
+        whole, clock = (
+            slope(log.seen[rows, 0]),
+            0.5 * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0) ** 2,
+        )
+        clock = step**2 * (clock - clock.mean())
+        believed = clock @ place[:, :2] / (clock @ clock)
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
-    doubt = total((log.std[rows, 1:] ** 2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
+    doubt = total((spread_of**2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
     blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
-    turning = baseline * float(np.abs(np.diff(heading)).sum()) / span
+    turning = baseline * float(np.abs(np.diff(heading)).sum()) / (span if steps is None else 0.5 * (steps * step) ** 2)
     # the quadratic part of each length over time, beside its line
     u = x - (sx / s)[which]
     u2 = u**2 - (total(weight * u**2) / s)[which] - (total(weight * u**3) / spread * s)[which] * u
@@ -123,9 +188,11 @@ def rates(log: Log, heading: Floats, place: Floats, step: float, baseline: float
     bend = 2.0 * total(weight * u2 * log.seen[rows, 0]) / square
     passing = np.sum((place[-1] - place[0]) ** 2) / span**2 * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
     bend_variance = 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
+    owner = owner[enough]
     return Rates(
-        toward[enough], rate[enough], variance[enough], blur[enough], turning, bend[enough], bend_variance[enough]
-    )
+        toward[enough], rate[enough], variance[enough], blur[enough], whole[enough], turning, bend[enough],
+        bend_variance[enough], np.searchsorted(np.unique(owner), owner), believed,
+    )  # fmt: skip
 
 
 def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None = None) -> StartCheck:
@@ -171,12 +238,13 @@ def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, ma
             every = _find_modes(found, starts, told, spread)
             best = int(np.argmax(every.evidence))
             likely, agreeing, _ = _likelihoods(found, every.velocity[best : best + 1], told[2])
-            agrees = np.maximum(agreeing.sum(axis=0)[0] / likely[0], 1e-300)
+            agrees = agreeing.sum(axis=0)[0] / found.each(likely[0])
             # what is not the told velocity's own error
             accel = half * std**2 * np.linalg.solve(spread, every.velocity[best] - told[:2])
             wanted = found.toward[:, :2] @ accel
             ratio = (found.bend - 0.5 * wanted) * wanted / found.bend_variance
-            bent = np.logaddexp(np.log(agrees) + ratio, np.log(np.maximum(1.0 - agrees, 1e-300))).sum()
+            gain = found.mixed(agrees * np.expm1(np.minimum(ratio, 700.0)))
+            bent = np.log1p(np.maximum(gain, -1.0 + 1e-15)).sum()
             total = float(np.logaddexp(total, np.log(share) + every.evidence[best] + bent))
     return total
 
@@ -184,6 +252,21 @@ def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, ma
 def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
     """Log evidence of the rates of path lengths under a velocity `told` (3,) [m/s] within `std` (3,)."""
     return float(_find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2)).evidence.max())
+
+
+def weigh_change(found: Rates, calm: Floats, ways: list[Floats], log_prior: float) -> tuple[float, Floats]:
+    """Posterior log odds that rates of path lengths change by a horizontal velocity or acceleration of one of the
+    covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,); `log_prior` are
+    the odds beforehand."""
+    starts, nothing = _starts(found, np.zeros(3)), np.zeros(3)
+    level = np.log(_likelihoods(found, starts, 0.0)[0]).sum(axis=1)
+    if level.max() - level[0] + log_prior <= 0.0:  # no prior makes a change likelier than that
+        return -np.inf, nothing[:2]
+    modes = [_find_modes(found, starts, nothing, spread) for spread in ways]
+    best = max(modes, key=lambda each: each.evidence.max())
+    at = int(np.argmax(best.evidence))
+    log_ratio = best.evidence[at] - np.log(len(ways)) - _find_modes(found, starts[:1], nothing, calm).evidence[0]
+    return float(log_ratio) + log_prior, best.velocity[at]
 
 
 def agreed_velocity(found: Rates) -> Floats:
@@ -229,17 +312,24 @@ NEAR, MOST = 0.01, 8
 
 
 def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats, Floats]:
-    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, T) of the
-    two ways to agree with their variances (2, S, T)."""
+    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, E) of the
+    two ways to agree, from each direction, with their variances (2, S, E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
     either_way = np.stack([variance, variance + found.turning**2])
-    likely = 0.25 * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
-    close = likely.sum(axis=0)
-    kept = np.exp(-0.5 * found.rate**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
-    return close + 0.5 / 4.0 * (kept + 3.0 / (4.0 * CONSTANTS.walk)), likely, either_way
+    likely = 0.25 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
+    close = found.mixed(likely.sum(axis=0))
+    kept = np.exp(-0.5 * found.whole**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
+    other = np.full((1, 1), 1.0 / (4.0 * CONSTANTS.walk))
+    if found.believed is not None:
+        # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
+        speed = velocity + found.believed
+        wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed) + climb**2)[:, None]
+        still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
+        other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
+    return close + 0.5 / 4.0 * found.mixed(found.share * (kept + 3.0 * other)), likely, either_way
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
@@ -249,7 +339,7 @@ def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _M
     v, prior, squares = start, np.linalg.inv(spread), (flat[:, :, None] * flat[:, None, :]).reshape(-1, 4)
     for last in (False,) * 6 + (True,):
         either, likely, variance = _likelihoods(found, v, told[2])
-        weight = (likely / variance).sum(axis=0) / either  # with which the tracks agree
+        weight = (likely / variance).sum(axis=0) / found.each(either)  # with which the tracks agree
         one, both, _, two = (weight @ squares + prior.ravel()).T  # the normal matrix's numbers
         det = one * two - both**2
         if last:

@@ -8,6 +8,7 @@ estimate, and, more leniently, every `PAST` cycles, where to be wrong costs the 
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.smoother import motion, window_gaussian
@@ -32,7 +33,7 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
     found = _rates(state, slice(None), step)
-    if len(found.rate) < egomotion.FEWEST:
+    if found.count < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
     std = np.sqrt(np.diag(window.covariance)[3:6])
@@ -65,13 +66,32 @@ def log_agreement(state: WindowState, after: Window) -> float:
     return other - one
 
 
+def weigh_manoeuvre(state: WindowState, steps: int, log_prior: float) -> tuple[float, Floats]:
+    """Posterior log odds of a manoeuvre that has lasted for `steps` until the last measurement, and its horizontal
+    acceleration (2,) [m/s^2], by the rates at which the lengths of tracks and of explained paths changed over the last
+    `PAST` cycles.
+
+    It is an acceleration of the liveliest mode, where the agent faces or in any direction.
+    """
+    window = state.window
+    passed = window.step[:-1][-PAST:]  # the last pose is not measured yet
+    if len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
+        return -np.inf, np.zeros(2)
+    found = egomotion.accelerations(_heard(state, slice(-2 - len(passed), -1), float(passed.mean())), steps)
+    if found.count < egomotion.FEWEST:
+        return -np.inf, np.zeros(2)
+    calm, facing = _acceleration_covariance(window, steps), rotation_z(state.heading[-1])[:2, 0]
+    ways = [calm + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
+    return egomotion.weigh_change(found, calm, ways, log_prior)
+
+
 def _latest_rates(state: WindowState) -> egomotion.Rates | None:
     """Rates of path lengths over the last `PAST` cycles, with which motion must agree; None where they are too few."""
     cycles, time = _latest(state.window)
     if cycles < egomotion.MEASURED - 1:
         return None
     found = _rates(state, slice(-1 - cycles, None), time / cycles)
-    return found if len(found.rate) >= egomotion.FEWEST else None
+    return found if found.count >= egomotion.FEWEST else None
 
 
 def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
@@ -79,14 +99,20 @@ def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
 
     Where the heading is estimated, its deviation turns all directions: each rate by twice the way across.
     """
-    window, body = state.window, state.scene.body
-    pose = window_gaussian.poses(window)[rows]
-    baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
-    found = egomotion.rates(state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step, baseline)
+    found, window = egomotion.rates(_heard(state, rows, step)), state.window
     if not window.turns:
         return found
     heading_std = np.sqrt(np.diag(pose_covariance(window, TURN))[rows].max())
     return found._replace(blur=np.hypot(found.blur, 2.0 * heading_std))
+
+
+def _heard(state: WindowState, rows: slice, step: float) -> egomotion.Heard:
+    """What is heard at the window's poses `rows`, `step` [s] apart."""
+    body, pose = state.scene.body, window_gaussian.poses(state.window)[rows]
+    return egomotion.Heard(
+        state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step,
+        float(np.linalg.norm(body.tx_offset - body.rx_offset)), state.scene.radio.array.spacing,
+    )  # fmt: skip
 
 
 def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
@@ -95,6 +121,13 @@ def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
     place = window_gaussian.poses(window)[:, :3]
     variance = way_variance(window, np.array([-1 - cycles]), np.array([-1]))[0]
     return (place[-1] - place[-1 - cycles]) / time, np.sqrt(variance) / time + 1e-6
+
+
+def _acceleration_covariance(window: Window, steps: int) -> Floats:
+    """Covariance (2, 2) [m^2/s^4] of the mean horizontal acceleration over the window's last `steps` but one."""
+    free, size = window.accel.shape[1], len(window.covariance)
+    rows = slice(size - (steps + 1) * free, size - free)
+    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:2, :2])
 
 
 def _latest(window: Window) -> tuple[int, float]:

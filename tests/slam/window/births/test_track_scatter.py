@@ -85,9 +85,9 @@ def scatter_expected(log: Log) -> float:
     window = window_gaussian.solve(window)
     state = SimpleNamespace(
         log=log, window=window, heading=np.zeros(number), cycle=number - 1,
-        scene=SimpleNamespace(body=Body(), use_vt=False),
+        scene=SimpleNamespace(body=Body(), radio=RADIO, use_vt=False),
     )  # fmt: skip
-    found = summarise_tracks(state, [np.arange(number)])
+    found, _ = summarise_tracks(state, [np.arange(number)])
     return float(np.mean(found.scatter**2))
 
 

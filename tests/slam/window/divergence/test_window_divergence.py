@@ -9,7 +9,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
 from rislam_rt.slam.window.divergence import divergence_monitor, egomotion, motion_agreement
-from rislam_rt.slam.window.divergence.egomotion import Rates
+from rislam_rt.slam.window.divergence.egomotion import Heard, Rates
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
@@ -26,7 +26,7 @@ def _rates(velocity, rng, *, tracks=12, apart=4, error=0.01):
     toward *= -2.0 / np.linalg.norm(toward, axis=1)[:, None]
     rate = toward @ velocity + error * rng.standard_normal(tracks)
     rate[:apart] = rng.uniform(-2.0, 2.0, apart)
-    return Rates(toward, rate, np.full(tracks, error**2), np.zeros(tracks))
+    return Rates(toward, rate, np.full(tracks, error**2), np.zeros(tracks), rate)
 
 
 def test_a_start_told_right_is_left_alone():
@@ -53,7 +53,7 @@ def test_what_goes_to_and_fro_between_opposite_walls_speaks_against_no_start():
     toward = -2.0 * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [-0.3, -0.95, 0.0], [0.0, 0.0, 1.0], [0.5, 0.8, 0.33]])
     rate = toward @ TOLD
     rate[:2], rate[4] = 0.0, 1.0
-    one = egomotion.weigh(Rates(toward, rate, np.full(5, 0.03**2), np.zeros(5)), TOLD, STD)
+    one = egomotion.weigh(Rates(toward, rate, np.full(5, 0.03**2), np.zeros(5), rate), TOLD, STD)
     assert one.log_odds < 0.0
 
 
@@ -104,7 +104,7 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     step, count = 0.1, 8
     time = step * np.arange(count)[:, None]
     place = np.array([0.2, -0.1, 0.0]) * time + 0.5 * bend * np.array([0.3, 1.0, 0.0]) * time**2
-    found = egomotion.rates(_log(place, heading), np.full(count, heading), place, step, 0.0)
+    found = egomotion.rates(Heard(_log(place, heading), np.full(count, heading), place, step, 0.0, 0.5))
     assert len(found.rate) == 3
     velocity = (place[-1] - place[0]) / (step * (count - 1))
     # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
