@@ -107,7 +107,7 @@ class Log(NamedTuple):
         end = np.where(both, np.minimum(cosines + period * (cosines < 0.0), rim), cosines)
         other = np.where(both, np.maximum(end - period, -rim), cosines)
         std = np.where(both, np.minimum(std, std[:, ::-1]), std)
-        twice, owner = both.any(axis=1), (excess > 0.0).any(axis=1).nonzero()[0]
+        twice, owner = both.any(axis=1), np.flatnonzero((excess > 0.0).any(axis=1))
         again = count + np.searchsorted(owner, which[twice])
         return Ends(
             np.append(rows, rows[twice]), np.append(which, again), np.concatenate([end, other[twice]]),

@@ -93,3 +93,34 @@ def test_scatter_that_keeps_its_sign_counts_once_in_its_own_cycle():
     )
     found = log.sharper(np.array([0]))
     np.testing.assert_allclose(found**2, (1.0 + CONSTANTS.memory * 8.0) / 9.0)
+
+
+def _at_the_end(cosines, deviation):
+    """Log of as many components of one track, whose second cosine is near the end of the array's axis."""
+    seen = np.column_stack([np.full(len(cosines), 1.8), np.full(len(cosines), -0.0115), cosines])
+    log = empty_log()._replace(seen=seen, std=np.tile([2e-4, 3e-4, deviation], (len(cosines), 1)))
+    others = [name for name in log._fields if name not in ("std", "seen")]
+    return log._replace(**{name: np.zeros((len(cosines), *getattr(log, name).shape[1:])) for name in others})
+
+
+def test_a_direction_that_may_be_one_of_two_counts_from_both_ends():
+    """A wall along the array's own line: the cosine reads 1 or -1, its deviation a share of the period between."""
+    turns, rows, none = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0]), np.arange(6), np.zeros(6, dtype=np.int64)
+    for cosine, deviation, both in ((0.9998 * turns, 0.9, True), (0.9998 + 0.0 * turns, 0.9, True),
+                                    (0.9998 * turns, 0.02, False), (0.5 * turns, 0.9, False)):  # fmt: skip
+        found = _at_the_end(cosine, deviation).both_ends(rows, none, 0.5)
+        assert found.owner.tolist() == ([0, 0] if both else [0])
+        if both:
+            np.testing.assert_allclose(found.cosines[found.which == 0, 1], 0.9998, atol=2e-4)
+            np.testing.assert_allclose(found.cosines[found.which == 1, 1], -0.9998, atol=2e-4)
+            np.testing.assert_array_equal(found.cosines[:, 0], -0.0115)
+            # the other axis tells how much a cosine errs, of whose sign nothing is known
+            np.testing.assert_array_equal(found.std, 3e-4)
+            np.testing.assert_array_equal(found.row, np.tile(rows, 2))
+
+
+def test_only_tracks_at_the_end_of_an_axis_have_two_directions():
+    log = _at_the_end(np.array([0.9998, 0.3, -0.9998, 0.3]), 0.9)
+    found = log.both_ends(np.arange(4), np.array([0, 1, 0, 1]), 0.5)
+    assert found.owner.tolist() == [0, 1, 0]
+    assert found.row.tolist() == [0, 1, 2, 3, 0, 2]

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from rislam_rt.model import RadioConfig
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
@@ -32,7 +33,7 @@ def _state(log, *, use_vt=True):
     body = SimpleNamespace(tx_offset=np.zeros(3), rx_offset=np.zeros(3))
     return SimpleNamespace(
         window=window_gaussian.solve(window), log=log, cycle=COUNT - 1, heading=np.zeros(COUNT),
-        scene=SimpleNamespace(use_vt=use_vt, body=body),
+        scene=SimpleNamespace(use_vt=use_vt, body=body, radio=RadioConfig()),
     )  # fmt: skip
 
 

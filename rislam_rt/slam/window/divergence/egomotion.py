@@ -52,7 +52,7 @@ class Rates(NamedTuple):
     rest may have any rate."""
 
     @property
-    def count(self) -> int:
+    def number(self) -> int:
         """Number T of the tracks and paths whose lengths have a rate."""
         return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
 
@@ -62,9 +62,9 @@ class Rates(NamedTuple):
 
     def mixed(self, value: Floats) -> Floats:
         """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
-        if self.owner is None or len(self.owner) == self.count:
+        if self.owner is None or len(self.owner) == self.number:
             return value
-        return np.asarray(value @ (self.owner[:, None] == np.arange(self.count)))
+        return np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
 
     @property
     def share(self) -> Floats:

@@ -33,7 +33,7 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
     passes = window.step[window.step > 0.0]
     step = float(passes.mean()) if len(passes) else CYCLE
     found = _rates(state, slice(None), step)
-    if found.count < egomotion.FEWEST:
+    if found.number < egomotion.FEWEST:
         return None
     share = window.step.mean() / step
     std = np.sqrt(np.diag(window.covariance)[3:6])
@@ -78,7 +78,7 @@ def weigh_manoeuvre(state: WindowState, steps: int, log_prior: float) -> tuple[f
     if len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
         return -np.inf, np.zeros(2)
     found = egomotion.accelerations(_heard(state, slice(-2 - len(passed), -1), float(passed.mean())), steps)
-    if found.count < egomotion.FEWEST:
+    if found.number < egomotion.FEWEST:
         return -np.inf, np.zeros(2)
     calm, facing = _acceleration_covariance(window, steps), rotation_z(state.heading[-1])[:2, 0]
     ways = [calm + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
@@ -91,7 +91,7 @@ def _latest_rates(state: WindowState) -> egomotion.Rates | None:
     if cycles < egomotion.MEASURED - 1:
         return None
     found = _rates(state, slice(-1 - cycles, None), time / cycles)
-    return found if found.count >= egomotion.FEWEST else None
+    return found if found.number >= egomotion.FEWEST else None
 
 
 def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:

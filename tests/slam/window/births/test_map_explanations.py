@@ -1,14 +1,8 @@
-"""What the map explains: a known return is known again, whatever is expected to share its cell; and directions of which
-the array hears two alike."""
-
-from types import SimpleNamespace
+"""What the map explains: a known return is known again, whatever is expected to share its cell."""
 
 import numpy as np
 
-from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.births.births import _mirrored
 from rislam_rt.slam.window.births.map_explanations import _log_evidence, _Predicted
-from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.solver_limits import STRENGTHS
 
 REPORTED = np.tile([0.001, 0.002, 0.002], (8, 1))
@@ -43,19 +37,3 @@ def test_evidence_is_the_same_however_many_unknowns_there_are():
     many = np.concatenate([few, np.zeros((8, 1, 3, 40))], axis=-1)
     found = [_log_evidence(_Predicted(left, slopes, REPORTED), np.ones(1), COMPANY) for slopes in (few, many)]
     assert np.isclose(*found, rtol=1e-9)
-
-
-def test_a_direction_that_may_be_one_of_two_is_no_birth():
-    """A wall along the array's own line: the cosine reads 1 or -1, its deviation a share of the period between."""
-    scene = SimpleNamespace(radio=SimpleNamespace(array=SimpleNamespace(spacing=0.5)))
-    turns = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
-    cases = ((0.9998 * turns, 0.9, True), (0.9998 * turns, 0.02, False), (0.9998 + 0.0 * turns, 0.9, False),
-             (0.5 * turns, 0.9, False))  # fmt: skip
-    for cosine, deviation, expected in cases:
-        seen = np.column_stack([np.full(6, 1.8), np.full(6, -0.0115), cosine])
-        log = empty_log()._replace(std=np.tile([2e-4, 3e-4, deviation], (6, 1)), seen=seen)
-        log = log._replace(**{
-            name: np.zeros((6, *getattr(log, name).shape[1:])) for name in log._fields if name not in ("std", "seen")
-        })  # fmt: skip
-        assert _mirrored(SimpleNamespace(log=log, scene=scene), np.arange(6)) == expected
-    assert 0.02 < np.sqrt(1.0 - CONSTANTS.born) / 0.5 < 0.9

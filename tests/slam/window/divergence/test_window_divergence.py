@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rislam_rt.model import RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
@@ -119,6 +120,32 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     assert found.bend_variance[0] == pytest.approx(spread, abs=(4.0 * velocity @ velocity / 2.0) ** 2)
 
 
+@pytest.mark.parametrize("steps", [5, 10])
+def test_an_acceleration_that_the_positions_leave_out_is_told_by_all_lengths(steps):
+    """Of who is held for standing still, and was until so many steps ago."""
+    step, count, accel = 0.1, 12, np.array([0.6, -0.3, 0.0])
+    time = step * np.maximum(np.arange(count) - (count - 1 - steps), 0.0)
+    place = 0.5 * time[:, None] ** 2 * accel
+    heard = Heard(_log(place, 0.2), np.full(count, 0.2), 0.0 * place, step, 0.0, 0.5)
+    found = egomotion.accelerations(heard, steps)
+    np.testing.assert_allclose(found.rate, found.toward @ accel, atol=0.06)  # a point turns on the way
+    log_odds, told = egomotion.weigh_change(found, 1e-6 * np.eye(2), [np.eye(2)], 0.0)
+    assert log_odds > 0.0
+    np.testing.assert_allclose(told, accel[:2], atol=0.06)
+    still = egomotion.accelerations(heard._replace(place=place), steps)
+    assert egomotion.weigh_change(still, 1e-6 * np.eye(2), [np.eye(2)], 0.0)[0] < 0.0
+
+
+def test_what_is_at_rest_changes_its_length_by_no_more_than_twice_the_agents_speed():
+    """Two tracks of many agree on a motion; were the others' rates just any, two would be chance."""
+    toward = -2.0 * np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]])
+    rate = np.array([-1.6, -0.96, 0.0])
+    rest = Rates(toward, rate, np.full(3, 0.02**2), np.zeros(3), rate, believed=np.zeros(2))
+    free = rest._replace(believed=None)
+    bounded, any_rate = (egomotion.weigh_change(each, 1e-4 * np.eye(2), [np.eye(2)], 0.0)[0] for each in (rest, free))
+    assert bounded > any_rate + 3.0
+
+
 def _log(place, heading):
     """Measurements (3 tracks in each cycle) of a wall, a corner and a point from an agent's positions (K, 3)."""
     normal, corner, point = np.array([0.6, 0.8, 0.0]), np.array([-3.0, 2.0, 0.0]), np.array([1.0, 4.0, 1.5])
@@ -158,7 +185,7 @@ def test_tracks_speak_against_a_birth_that_turns_the_motion(turned, clear):
     before = _moving(velocity, 0.05, count)
     state = SimpleNamespace(
         window=before, log=_log(place, 0.0), heading=np.zeros(count), level=np.zeros((2, 3)),
-        scene=SimpleNamespace(body=SimpleNamespace(tx_offset=np.zeros(3), rx_offset=np.zeros(3))),
+        scene=SimpleNamespace(body=SimpleNamespace(tx_offset=np.zeros(3), rx_offset=np.zeros(3)), radio=RadioConfig()),
     )  # fmt: skip
     ratio = motion_agreement.log_agreement(state, _moving(velocity + turned * np.eye(3)[0], 0.002, count))
     at_length = TrackDecision(
@@ -221,9 +248,9 @@ def test_a_cycle_in_which_nothing_is_weighed_names_no_cause():
 
 def test_a_rate_whose_direction_is_not_told_counts_for_little():
     log = _log(0.1 * np.arange(8)[:, None] * np.array([0.2, -0.1, 0.0]), 0.0)
-    vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.9))
-    found = [egomotion.rates(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0).blur for one in (log, vague)]
-    np.testing.assert_allclose(found[1], 2.0 * 0.9 / np.sqrt(8.0))
+    vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.4))
+    found = [egomotion.rates(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0, 0.5)).blur for one in (log, vague)]
+    np.testing.assert_allclose(found[1], 2.0 * 0.4 / np.sqrt(8.0))
     assert (found[0] < 0.1).all()
 
 
