@@ -12,7 +12,7 @@ from rislam_rt.input_messages import share_text
 from rislam_rt.report.markdown import percent
 from rislam_rt.report.terminal_tables import print_cards
 from rislam_rt.report.unseen import write_unseen
-from rislam_rt.report.unseen.page import COLUMNS, ROWS
+from rislam_rt.report.unseen.page import COLUMNS, ROWS, about_lines
 from rislam_rt.report.unseen.score_cards import by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.studies.unseen import UnseenSpec
 from rislam_rt.studies.unseen.sweep import SNR
@@ -114,6 +114,8 @@ def test_files_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     content = json.loads((tmp_path / "x.json").read_text())
     assert content["tests"] == 3
     assert content["cards"]["b"]["failed"] == 1
+    along = spec.model_copy(update={"ways": "along_walls"})
+    assert [("along the walls" in " ".join(about_lines(s, RECORD, 0, 1, 1))) for s in (spec, along)] == [False, True]
     print_cards(rows(), timings)
     assert "relative RMSE [mm]" in capsys.readouterr().out
 

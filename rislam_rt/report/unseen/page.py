@@ -59,8 +59,9 @@ def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: 
     unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
     purpose = "for tests" if spec.is_test else "for development"
     counted = "never" if tests == 0 else "once" if tests == 1 else f"{tests} times"
+    way = "" if spec.ways == "anyhow" else '; **agents set out from rest along the walls** (`ways = "along_walls"`)'
     text = f"""Rooms {spec.first} to {spec.first + spec.rooms - 1} ({purpose}), drawn at random each from its number:
-    shape, ceiling, size, materials, furniture, scatterers, panel and motion ([how](../unseen_data.md)).
+    shape, ceiling, size, materials, furniture, scatterers, panel and motion ([how](../unseen_data.md)){way}.
     {config["cycles"] or "All"} cycles of 0.1 s, up to {config["depth"]} wall bounces. Written by
     `rislam-rt run pipelines/unseen.toml`, do not edit. Code `{record["code"]}`.{unfinished}"""
     count = f"""Test rooms (from {TEST} on) were run **{counted}**; every run of them is written into the ledger

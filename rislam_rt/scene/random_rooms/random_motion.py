@@ -1,6 +1,6 @@
 """Random motions of an agent: speed, rates of turn and of climb over time, integrated from a start that keeps clear."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,16 @@ STANDING, WALKING, BRAKING = (1.0, 3.0), (2.0, 6.0), 0.6
 """Ranges [s] of a random motion's stops and of the time between two, and the time [s] to brake or set off."""
 SPIN = (1.0, 3.0)
 """Range [rad] of a random motion's turn on the spot."""
+Ways = Literal["anyhow", "along_walls"]
+"""How random motions lie in their room: in any direction and moving from the first cycle on; or from rest, first
+parallel or at right angles to a wall, with right angles for corners."""
+WALL_SPEED = (0.2, 1.4)
+"""Range of speeds [m/s] of random motions along walls, log-uniform; in too small a room the way ends early."""
+REST, SETTING_OFF = (0.3, 1.0), (0.3, 1.0)
+"""Ranges of the rest [s] at the start of a random motion along walls, and of the acceleration [m/s^2] from it, which is
+that of its last halt too."""
+SHORTEST = 4.0
+"""Least time [s] after which a random motion along walls stands still for good."""
 _STARTS, _SLOWER = 64, 0.8
 
 
@@ -40,14 +50,15 @@ class MotionProfile(NamedTuple):
     climb: Floats
 
 
-def draw_motion_profile(kind: str, *, rng: np.random.Generator) -> MotionProfile:
-    """Draw the profile of a random motion of one of `MOTIONS`."""
+def draw_motion_profile(kind: str, ways: Ways = "anyhow", *, rng: np.random.Generator) -> MotionProfile:
+    """Draw the profile of a random motion of one of `MOTIONS` and of one of `Ways`, without the rest at its start."""
     time = _times()
     still, steady = np.zeros(CYCLES), np.ones(CYCLES)
     if kind == "straight":
         return MotionProfile(steady, still, still)
     if kind == "corner":
-        return MotionProfile(steady, _corners(time, rng), still)
+        angles = CORNER if ways == "anyhow" else (np.pi / 2.0, np.pi / 2.0)
+        return MotionProfile(steady, _corners(time, angles, rng), still)
     if kind in ("stop", "turn"):
         pace, stops = _stop_and_go(time, rng)
         turn = 0.5 * _wander(time, rng)
@@ -56,23 +67,30 @@ def draw_motion_profile(kind: str, *, rng: np.random.Generator) -> MotionProfile
     return MotionProfile(steady, wander, _climb(time, rng) if kind == "climb" else still)
 
 
-def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.random.Generator) -> Trajectory:
+def draw_motion(
+    outline: Floats, roof: Roof, course: MotionProfile, ways: Ways = "anyhow", *, rng: np.random.Generator
+) -> Trajectory:
     """Lay a random motion's profile into a floor plan, from a random start at a random speed, heading along the motion.
+
+    Where there is no room for it, it is slowed down; one along walls keeps its speed and comes to rest earlier.
 
     Raises
     ------
     SceneError
-        There is no room for it even at the slowest.
+        There is no room for it even at the slowest, or the shortest.
     """
-    heading = CYCLE * np.cumsum(course.turn)
-    rise = CYCLE * (np.cumsum(course.climb) - course.climb)
-    steps = CYCLE * course.pace[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    shape = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
-    speed = float(np.exp(rng.uniform(*np.log(SPEED))))
-    low, high = outline.min(axis=0), outline.max(axis=0)
-    while speed >= SLOWEST:
+    anyhow = ways == "anyhow"
+    speed = float(np.exp(rng.uniform(*np.log(SPEED if anyhow else WALL_SPEED))))
+    rest, push = (0.0, np.inf) if anyhow else (rng.uniform(*REST), rng.uniform(*SETTING_OFF))
+    low, high, end = outline.min(axis=0), outline.max(axis=0), CYCLE * CYCLES
+    while speed >= SLOWEST and end >= SHORTEST:
+        pace, rate, climb = course if anyhow else _from_rest(course, speed, push, rest, end)
+        heading = CYCLE * np.cumsum(rate)
+        rise = CYCLE * (np.cumsum(climb) - climb)
+        steps = CYCLE * pace[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        shape = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
         start = rng.uniform(low, high, size=(_STARTS, 2))
-        yaw = rng.uniform(-np.pi, np.pi, size=_STARTS)
+        yaw = rng.uniform(-np.pi, np.pi, size=_STARTS) if anyhow else _along_walls(outline, rng)
         cos, sin = np.cos(yaw), np.sin(yaw)
         turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
         place = start[:, None] + speed * np.einsum("sij,kj->ski", turn, shape)
@@ -83,10 +101,29 @@ def draw_motion(outline: Floats, roof: Roof, course: MotionProfile, *, rng: np.r
                 position = np.column_stack([place[number], height + rise])
                 angle = np.asarray(wrap(yaw[number] + heading))
                 ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-                velocity = np.column_stack([speed * course.pace[:, None] * ahead, course.climb])
+                velocity = np.column_stack([speed * pace[:, None] * ahead, climb])
                 return Trajectory(_times(), position, velocity, angle, Body())
-        speed *= _SLOWER
+        speed, end = (_SLOWER * speed, end) if anyhow else (speed, _SLOWER * end)
     raise SceneError("no room for a motion; draw another plan")
+
+
+def _from_rest(course: MotionProfile, speed: float, push: float, rest: float, end: float) -> MotionProfile:
+    """Profile of a random motion at `speed` [m/s] that rests, sets off straight on and stands again at `end` [s].
+
+    It sets off and brakes with `push` [m/s^2]; all else in the profile comes later by the time that setting off takes.
+    """
+    time = _times()
+    later = np.count_nonzero(push * (time - rest) < speed)
+    before = (np.ones(later), np.zeros(later), np.zeros(later))
+    pace, turn, climb = (np.concatenate(parts)[:CYCLES] for parts in zip(before, course, strict=True))
+    ramp = push / speed * np.maximum(np.minimum(time - rest, end - time), 0.0)
+    return MotionProfile(np.minimum(pace, ramp), turn, climb)
+
+
+def _along_walls(outline: Floats, rng: np.random.Generator) -> Floats:
+    """Draw first courses [rad] of random motions along walls, parallel or at right angles to an edge of the plan."""
+    edge = rng.choice(np.roll(outline, -1, axis=0) - outline, size=_STARTS)
+    return np.asarray(np.arctan2(edge[:, 1], edge[:, 0]) + 0.5 * np.pi * rng.integers(0, 4, size=_STARTS))
 
 
 def _times() -> Floats:
@@ -109,11 +146,12 @@ def _wander(time: Floats, rng: np.random.Generator) -> Floats:
     return np.asarray(waves @ weight[:3] + weight[3])
 
 
-def _corners(time: Floats, rng: np.random.Generator) -> Floats:
-    """Draw the rate of turn (K,) [rad/s] of a random motion with corners at random times, 4 to 10 s apart."""
+def _corners(time: Floats, angles: tuple[float, float], rng: np.random.Generator) -> Floats:
+    """Draw the rate of turn (K,) [rad/s] of a random motion with corners at random times, 4 to 10 s apart, of angles
+    in a range [rad]."""
     rate, at = np.zeros(len(time)), rng.uniform(2.0, 6.0)
     while at < time[-1]:
-        turn = rng.uniform(*CORNER) * rng.choice([-1.0, 1.0])
+        turn = rng.uniform(*angles) * rng.choice([-1.0, 1.0])
         rate[(time >= at) & (time < at + CORNER_TIME - 1e-9)] = turn / CORNER_TIME
         at += rng.uniform(4.0, 10.0)
     return rate

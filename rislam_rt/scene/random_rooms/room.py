@@ -13,7 +13,7 @@ from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_pieces
 from rislam_rt.scene.random_rooms.landmarks import MOST, PLACES, SHARES, draw_panel, draw_scatterer, hidden_share
 from rislam_rt.scene.random_rooms.random_floor_plan import SHAPES, area, draw_plan, extent
-from rislam_rt.scene.random_rooms.random_motion import MOTIONS, draw_motion, draw_motion_profile
+from rislam_rt.scene.random_rooms.random_motion import MOTIONS, Ways, draw_motion, draw_motion_profile
 from rislam_rt.scene.random_rooms.shell import CEILINGS, build_shell, draw_roof
 
 SHAPE_SHARES = (0.4, 0.2, 0.2, 0.2)
@@ -59,10 +59,13 @@ class RandomRoom:
     """Where the RIS panel is: `none`, `ceiling` or `wall`."""
     speed: float
     """Mean speed [m/s] over the motion."""
+    ways: Ways
+    """How the motion lies in the room, one of `Ways`."""
 
 
-def draw_room(seed: int) -> RandomRoom:
-    """Draw the random room of a seed, the same to the last bit on every call; it passes the scene check.
+def draw_room(seed: int, ways: Ways = "anyhow") -> RandomRoom:
+    """Draw the random room of a seed with a motion of one of `Ways`, the same to the last bit on every call; it passes
+    the scene check.
 
     Shape, ceiling, motion and whether there is a panel are drawn once; all else is drawn anew until it fits together,
     so that what is hard to fit is no rarer for it.
@@ -80,7 +83,7 @@ def draw_room(seed: int) -> RandomRoom:
     panel = "none" if rng.uniform() >= PANEL else "ceiling" if rng.uniform() < CEILING_PANEL else "wall"
     for attempt in range(1, _TRIES):
         try:
-            room = _attempt(seed, shape, ceiling, motion, panel, rng=np.random.default_rng([seed, attempt]))
+            room = _attempt(seed, shape, ceiling, motion, ways, panel, rng=np.random.default_rng([seed, attempt]))
         except SceneError:
             continue
         if not find_errors(room.scene, room.scene.name):
@@ -88,11 +91,13 @@ def draw_room(seed: int) -> RandomRoom:
     raise SceneError(f"seed: {seed}: nothing fits in {_TRIES} draws; take another seed")
 
 
-def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rng: np.random.Generator) -> RandomRoom:
+def _attempt(
+    seed: int, shape: str, ceiling: str, motion: str, ways: Ways, panel: str, *, rng: np.random.Generator
+) -> RandomRoom:
     """One draw of a random room, from floor plan to materials; refused where nothing fits in."""
     outline = draw_plan(shape, rng=rng)
     roof = draw_roof(outline, ceiling, rng=rng)
-    agent = draw_motion(outline, roof, draw_motion_profile(motion, rng=rng), rng=rng)
+    agent = draw_motion(outline, roof, draw_motion_profile(motion, ways, rng=rng), ways, rng=rng)
     ground = PlacementLimits(outline, roof, agent.position)
     most = min(MAX_PIECES, int(area(outline) / PER_PIECE))
     pieces = draw_pieces(ground, int(rng.integers(0, most + 1)), rng=rng)
@@ -110,7 +115,7 @@ def _attempt(seed: int, shape: str, ceiling: str, motion: str, panel: str, *, rn
         size=extent(outline), reflection=float(np.mean([r.material.reflection for r in reflectors[: len(shell)]])),
         pieces=len(pieces), below=sum(float(point[2]) < lowest for point in points),
         hidden=sum(hidden_share(point, agent.position, pieces) >= MOST for point in points), panel=panel,
-        speed=float(np.linalg.norm(agent.velocity, axis=1).mean()),
+        speed=float(np.linalg.norm(agent.velocity, axis=1).mean()), ways=ways,
     )  # fmt: skip
 
 

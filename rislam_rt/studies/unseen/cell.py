@@ -21,7 +21,7 @@ from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, P
 from rislam_rt.progress import tell_nobody
 from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene
-from rislam_rt.scene.random_rooms import RandomRoom, draw_room
+from rislam_rt.scene.random_rooms import RandomRoom, Ways, draw_room
 from rislam_rt.storage.netcdf import write_dataset
 from rislam_rt.studies.swept.cell import cell_spec
 from rislam_rt.studies.unseen.recording_file import Recording, write_recording
@@ -45,7 +45,7 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """
     spec = cell_spec(settings)
     prepare_channel(spec.channel)
-    room, setup = find_setup(int(settings["room"]), trace_key(spec))
+    room, setup = find_setup(int(settings["room"]), trace_key(spec), settings.get("ways", "anyhow"))
     schemes: dict[str, Any] = {}
     timing: dict[str, Any] = {"trace_seconds": setup.seconds}
     for asked in spec.schemes:
@@ -110,10 +110,11 @@ def trace_key(spec: PipelineSpec) -> str:
 
 
 @lru_cache(maxsize=2)
-def find_setup(seed: int, key: str) -> tuple[RandomRoom, RunSetup]:
-    """Draw the random room of a seed, its true motion and its paths; the last two are cached for further cells."""
+def find_setup(seed: int, key: str, ways: Ways = "anyhow") -> tuple[RandomRoom, RunSetup]:
+    """Draw the random room of a seed with one of `Ways`, its true motion and its paths; the last two are cached for
+    further cells."""
     spec = PipelineSpec.model_validate({**json.loads(key), "name": "trace", "schemes": ["no_ris"]})
-    room = draw_room(seed)
+    room = draw_room(seed, ways)
     return room, prepare_setup(room.scene, spec, rng=np.random.default_rng(seed))
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from rislam_rt.pipeline.specification.section import Count, Decibel
+from rislam_rt.scene.random_rooms import Ways
 from rislam_rt.studies.swept.spec import SweptSpec, VariantSection
 
 TEST = 10_000
@@ -21,6 +22,10 @@ class UnseenSpec(SweptSpec):
     """Seed of the first room."""
     rooms: Count = 60
     """Number of rooms, with consecutive seeds."""
+    ways: Ways = "anyhow"
+    """How agents go: in any direction and moving from the first cycle on; or from rest, first parallel or at right
+    angles to a wall, at walking speeds and with right angles for corners; receivers are then told a `top_speed` of
+    1.5 m/s unless `run` says another."""
     snr_db: list[Decibel] = Field(default=[13.0], min_length=1)
     """Reference SNRs: of the paper's sphere at 3 m, integrated over the signal and all antennas."""
     variants: list[VariantSection] = Field(default=[])

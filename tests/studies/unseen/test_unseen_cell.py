@@ -11,9 +11,11 @@ import pytest
 from rislam_rt.errors import ConfigError, StoreError
 from rislam_rt.model import empty_map
 from rislam_rt.scene import load_scene
+from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.studies import UnseenSpec, load_any
 from rislam_rt.studies.unseen import answers_from_arrays, build_unseen, count_tests, read_recording, replay, score_run
 from rislam_rt.studies.unseen.cell import find_setup, run_cell
+from rislam_rt.studies.unseen.sweep import WALL_TOP_SPEED
 from rislam_rt.sweeps import build_cells
 
 RUN = {
@@ -136,6 +138,27 @@ def test_more_rooms_and_levels_of_noise_are_added_to_those_that_ran(tmp_path: Pa
     )
     assert (len(few), len(many)) == (2, 6)
     assert few < many
+
+
+def test_agents_along_walls_are_other_cells_and_receivers_reckon_with_them(tmp_path: Path) -> None:
+    cells = {}
+    for name, lines in {"anyhow": (), "along_walls": ('ways = "along_walls"',)}.items():
+        spec = load_any(pipeline(tmp_path, *lines, f"first = {WITHOUT}", "rooms = 1"))
+        assert isinstance(spec, UnseenSpec)
+        (cells[name],) = build_cells(build_unseen(spec, tmp_path / "unseen.toml", tmp_path))
+    assert len({c.ident for c in cells.values()}) == 2
+    assert len({c.depends["room_sha256"] for c in cells.values()}) == 2
+    told = {name: c.depends["config"]["receiver"]["top_speed"] for name, c in cells.items()}
+    assert told == {"anyhow": 0.5, "along_walls": WALL_TOP_SPEED}
+    spec = load_any(tmp_path / "unseen.toml", ["run.receiver.top_speed=2.0"])
+    assert isinstance(spec, UnseenSpec)
+    (own,) = build_cells(build_unseen(spec, tmp_path / "unseen.toml", tmp_path))
+    assert own.depends["config"]["receiver"]["top_speed"] == 2.0
+    cell(WITHOUT, save="components", data=str(tmp_path), ways="along_walls")
+    recording = read_recording(tmp_path / f"room_{WITHOUT:05d}" / "13dB_no_ris.nc")
+    assert recording.traits["ways"] == "along_walls"
+    fast = [np.linalg.norm(draw_room(seed, "along_walls").scene.agent.velocity, axis=1).max() for seed in range(40)]
+    assert 0.5 < max(fast) < WALL_TOP_SPEED
 
 
 def test_rooms_for_development_and_for_tests_do_not_mix(tmp_path: Path) -> None:
