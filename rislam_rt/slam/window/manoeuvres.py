@@ -12,7 +12,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.motion_learning import livelier
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.solver_limits import ONSETS
+from rislam_rt.slam.window.solver_limits import LATELY
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
 
@@ -21,9 +21,9 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     """State whose last steps are as lively as can be, and accelerated as the tracks agree that they are, if these speak
     for a manoeuvre that the motion as believed leaves out.
 
-    One of the `ONSETS` is asked in each cycle, in turn.
+    It may have lasted for half a second or, asked in every other cycle, for a second.
     """
-    window, steps = state.window, ONSETS[state.cycle % len(ONSETS)]
+    window, steps = state.window, LATELY * (1 + state.cycle % 2)
     if window.rates is None or state.config.motion != "learnt" or steps >= len(window.step):
         return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps

@@ -10,7 +10,7 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 
 
-class Ends(NamedTuple):
+class ArrayEnds(NamedTuple):
     """Components of T tracks or paths, those that the array hears alike from two directions once for each: E ends, N
     components in all."""
 
@@ -91,7 +91,7 @@ class Log(NamedTuple):
         inside = np.hypot(1.0 / spacing - cosine, across) < 1.0 + CONSTANTS.fit * std[:, ::-1]
         return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
 
-    def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "Ends":
+    def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "ArrayEnds":
         """Components `rows` (A,) of tracks or paths `which` (A,), with those of which most are `mirrored` once for
         either end, behind all others.
 
@@ -102,19 +102,19 @@ class Log(NamedTuple):
         np.add.at(excess, which, self.take(rows).mirrored(spacing) - 0.5)
         both = excess[which] > 0.0
         if not both.any():
-            return Ends(rows, which, cosines, std, np.arange(count))
+            return ArrayEnds(rows, which, cosines, std, np.arange(count))
         rim, period = np.sqrt(np.maximum(1.0 - cosines[:, ::-1] ** 2, 0.0)), 1.0 / spacing
         end = np.where(both, np.minimum(cosines + period * (cosines < 0.0), rim), cosines)
         other = np.where(both, np.maximum(end - period, -rim), cosines)
         std = np.where(both, np.minimum(std, std[:, ::-1]), std)
         twice, owner = both.any(axis=1), np.flatnonzero((excess > 0.0).any(axis=1))
         again = count + np.searchsorted(owner, which[twice])
-        return Ends(
+        return ArrayEnds(
             np.append(rows, rows[twice]), np.append(which, again), np.concatenate([end, other[twice]]),
             np.concatenate([std, std[twice]]), np.append(np.arange(count), owner),
         )  # fmt: skip
 
-    def at_ends(self, ends: "Ends") -> "Log":
+    def at_ends(self, ends: "ArrayEnds") -> "Log":
         """Measurement log of the components of `ends`, each with the direction that it has there."""
         log = self.take(ends.row)
         seen, std = log.seen.copy(), log.std.copy()

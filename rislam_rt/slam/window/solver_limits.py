@@ -25,8 +25,6 @@ NEARBY = 2.0
 """Distance [m] beyond which two hypothetical features are not compared."""
 LATELY = 5
 """Number of last steps that a manoeuvre may cover: one that began within half a second."""
-ONSETS = (5, 10)
-"""Numbers of last steps over which a manoeuvre that only tracks tell of may have lasted: half a second, or a second."""
 DRAWS = 12
 """Samples of a place over which a panel's predicted gain is averaged."""
 CERTAIN = 30.0

@@ -15,7 +15,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.egomotion import MEASURED
-from rislam_rt.slam.window.measurement_log import Ends
+from rislam_rt.slam.window.measurement_log import ArrayEnds
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
@@ -88,7 +88,7 @@ def rate_factor(state: WindowState) -> RateFactor | None:
     return _factor(found, _shares(found, state), state)
 
 
-def _histories(state: WindowState, ends: Ends, start: int) -> _Histories:
+def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     """Histories of the tracks whose rates are asked, from the window's first cycle `start` on."""
     window, log, body = state.window, state.log, state.scene.body
     rows, which, slot = ends.row, ends.which, log.cycle[ends.row] - start
@@ -122,7 +122,7 @@ def _histories(state: WindowState, ends: Ends, start: int) -> _Histories:
     )  # fmt: skip
 
 
-def _directions(state: WindowState, ends: Ends, slot: Integers, time: Floats) -> tuple[Floats, Floats]:
+def _directions(state: WindowState, ends: ArrayEnds, slot: Integers, time: Floats) -> tuple[Floats, Floats]:
     """Directions of arrival (N, 3) in the room's axes, times -2, smoothed by a line over time for each track, and the
     variance (T,) of their error along a way of one metre."""
     which, seen, angle = ends.which, ends.cosines, state.heading[slot]

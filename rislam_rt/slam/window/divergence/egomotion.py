@@ -163,36 +163,47 @@ def _fitted(heard: Heard, steps: int | None) -> Rates:
     toward /= np.bincount(which, minlength=count)[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
-    rate = slope(log.seen[rows, 0] - np.vecdot(toward[which], place[since] - place[-1]))
+    heard_length = log.seen[rows, 0]
+    rate = slope(heard_length - np.vecdot(toward[which], place[since] - place[-1]))
     span, variance = step * max(len(place) - 1, 1), CONSTANTS.crowd * s / spread
+    velocity = (place[-1] - place[0]) / span
     if steps is None:
-        rate = whole = rate + toward @ ((place[-1] - place[0]) / span)
-        believed = np.zeros(2)
+        rate = whole = rate + toward @ velocity
+        believed, unit = np.zeros(2), span
+        bend, bend_variance = _bends(which, x, weight, heard_length, float(velocity @ velocity))
     else:
-        whole, clock = (
-            slope(log.seen[rows, 0]),
-            0.5 * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0) ** 2,
-        )
-        clock = step**2 * (clock - clock.mean())
-        believed = clock @ place[:, :2] / (clock @ clock)
+        whole, unit = slope(heard_length), 0.5 * (steps * step) ** 2
+        way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
+        way -= way.mean()
+        believed = way @ place[:, :2] / (way @ way)
+        bend = bend_variance = np.zeros(count)
     enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
-    blur = 2.0 * baseline * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
+    blur = 2.0 * baseline * s / np.maximum(total(weight * heard_length), 1e-9)
     doubt = total((spread_of**2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
     blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
-    turning = baseline * float(np.abs(np.diff(heading)).sum()) / (span if steps is None else 0.5 * (steps * step) ** 2)
-    # the quadratic part of each length over time, beside its line
-    u = x - (sx / s)[which]
-    u2 = u**2 - (total(weight * u**2) / s)[which] - (total(weight * u**3) / spread * s)[which] * u
-    square = np.maximum(total(weight * u2**2), 1e-300)
-    bend = 2.0 * total(weight * u2 * log.seen[rows, 0]) / square
-    passing = np.sum((place[-1] - place[0]) ** 2) / span**2 * s / np.maximum(total(weight * log.seen[rows, 0]), 1e-9)
-    bend_variance = 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
+    turning = baseline * float(np.abs(np.diff(heading)).sum()) / unit
     owner = owner[enough]
     return Rates(
         toward[enough], rate[enough], variance[enough], blur[enough], whole[enough], turning, bend[enough],
         bend_variance[enough], np.searchsorted(np.unique(owner), owner), believed,
     )  # fmt: skip
+
+
+def _bends(which: Integers, x: Floats, weight: Floats, length: Floats, square_speed: float) -> tuple[Floats, Floats]:
+    """Quadratic parts (E,) [m/s^2] of lengths (N,) over times `x` (N,), beside their lines, and the variances of these,
+    for an agent of squared speed `square_speed` [m^2/s^2] which passes points."""
+
+    def total(value: Floats) -> Floats:
+        return np.asarray(np.bincount(which, weight * value), dtype=np.float64)
+
+    s = total(np.ones(len(x)))
+    u = x - (total(x) / s)[which]
+    line = total(u**3) / np.maximum(total(u**2), 1e-300)
+    u2 = u**2 - (total(u**2) / s)[which] - line[which] * u
+    square = np.maximum(total(u2**2), 1e-300)
+    passing = square_speed * s / np.maximum(total(length), 1e-9)
+    return 2.0 * total(u2 * length) / square, 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
 
 
 def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None = None) -> StartCheck:
