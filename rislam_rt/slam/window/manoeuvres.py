@@ -21,7 +21,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     """State whose last steps are as lively as can be, and accelerated as the tracks agree that they are, if these speak
     for a manoeuvre that the motion as believed leaves out.
 
-    It may have lasted for half a second or, asked in every other cycle, for a second.
+    It may have lasted for 5 steps or, asked in every other cycle, for 10.
     """
     window, steps = state.window, LATELY * (1 + state.cycle % 2)
     if window.rates is None or state.config.motion != "learnt" or steps >= len(window.step):

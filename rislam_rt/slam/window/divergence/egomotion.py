@@ -38,7 +38,7 @@ class Rates(NamedTuple):
     blur: Floats
     """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
     whole: Floats
-    """(E,) of the whole length, where `rate` is that of what the positions leave of it."""
+    """(E,) rate of the measured length itself; `rate` may be that of what the positions leave of it."""
     turning: float = 0.0
     """[m/s] speed of Tx and Rx against each other, as the body turns."""
     bend: Floats | None = None
@@ -62,7 +62,7 @@ class Rates(NamedTuple):
 
     def mixed(self, value: Floats) -> Floats:
         """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
-        if self.owner is None or len(self.owner) == self.number:
+        if self.owner is None or np.array_equal(self.owner, np.arange(self.number)):
             return value
         return np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
 
@@ -177,7 +177,7 @@ def _fitted(heard: Heard, steps: int | None) -> Rates:
         way -= way.mean()
         believed = way @ place[:, :2] / (way @ way)
         bend = bend_variance = np.zeros(count)
-    enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0
+    enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9  # at the rim, but for rounding
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * s / np.maximum(total(weight * heard_length), 1e-9)
     doubt = total((spread_of**2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
@@ -326,7 +326,9 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, E) of the
     two ways to agree, from each direction, with their variances (2, S, E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
-    variance = found.variance + found.blur**2 * np.vecdot(velocity, velocity)[:, None]
+    # a direction errs in all of the motion, what the positions have taken out of the lengths included
+    speed = velocity if found.believed is None else velocity + found.believed
+    variance = found.variance + found.blur**2 * np.vecdot(speed, speed)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
     either_way = np.stack([variance, variance + found.turning**2])
@@ -336,7 +338,6 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     other = np.full((1, 1), 1.0 / (4.0 * CONSTANTS.walk))
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
-        speed = velocity + found.believed
         wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed) + climb**2)[:, None]
         still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still

@@ -75,7 +75,8 @@ def weigh_manoeuvre(state: WindowState, steps: int, log_prior: float) -> tuple[f
     """
     window = state.window
     passed = window.step[:-1][-PAST:]  # the last pose is not measured yet
-    if len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
+    silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
+    if silent or len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
         return -np.inf, np.zeros(2)
     found = egomotion.accelerations(_heard(state, slice(-2 - len(passed), -1), float(passed.mean())), steps)
     if found.number < egomotion.FEWEST:
