@@ -181,7 +181,7 @@ def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
     for time, one, info, heard in zip(times, answers.estimates, answers.infos, inputs.measurements, strict=True):
         std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
         numbers = [*one.position, *std, one.heading]
-        rows.append([f"{time:.16g}", *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
+        rows.append([repr(float(time)), *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
     last = answers.estimates[-1].map
     files = {"estimate.tum": tum_bytes(times, position, heading), "estimate.csv": csv_file(head, rows)}
     content = plain_result({f.name: value for f in fields(last) if (value := getattr(last, f.name)) is not None})

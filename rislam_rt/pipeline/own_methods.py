@@ -118,7 +118,7 @@ def own_code(
         It raised, or returned something else than phase levels of the panel.
     """
     with own_method_errors(name):
-        levels = np.asarray((designer or fresh_own(name))(belief, panel, radio, rng=rng))
+        levels = np.asarray((fresh_own(name) if designer is None else designer)(belief, panel, radio, rng=rng))
     wanted = f"give whole numbers ({panel.rows}, {panel.cols}) from 0 to {panel.levels - 1}"
     if levels.shape != (panel.rows, panel.cols) or levels.dtype.kind not in "iu":
         raise ConfigError(f"'{name}': {levels.dtype} of shape {levels.shape} returned; {wanted}")

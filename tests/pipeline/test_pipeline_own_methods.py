@@ -84,6 +84,16 @@ class Mapped(Away):
 class NoSuchParent(Mapped):
     part = {"parent": [5]}
 
+class ItsOwnParent(Mapped):
+    part = {"parent": [0]}
+
+class NegativeMap(Mapped):
+    part = {"covariance": [np.diag([1.0, 1.0, -1e-3])]}
+
+class NoneHeading(Away):
+    def estimate(self, state):
+        return pose_estimate(np.zeros(3), np.zeros(3), None, np.eye(6), state)
+
 class TooSure(Mapped):
     part = {"ris_probability": [7.0]}
 
@@ -229,6 +239,9 @@ def test_the_file_is_part_of_the_identity(mine: Path) -> None:
         ('["mine:Negative"]', "estimate: a covariance with an eigenvalue of -0.001"),
         ('["mine:NoHeading"]', "'mine:NoHeading': estimate: a heading of nan returned"),
         ('["mine:NoSuchParent"]', r"'mine:NoSuchParent': estimate: map: parent \[5\] returned; give rows"),
+        ('["mine:ItsOwnParent"]', r"map: parent \[0\] returned; give rows .* other than its own"),
+        ('["mine:NegativeMap"]', r"estimate: map: a covariance with an eigenvalue of -0.001 returned"),
+        ('["mine:NoneHeading"]', r"a heading of None returned; give a finite number of radians"),
         ('["mine:TooSure"]', r"map: ris_probability \[7.\] returned; give numbers from 0 to 1"),
         ('["mine:LongNormal"]', "map: wall_normal .* returned; give unit vectors"),
         ('["mine:Unnumbered"]', r"map: ident \[-1\] returned"),

@@ -38,7 +38,7 @@ REST, SETTING_OFF = (0.3, 1.0), (0.3, 1.0)
 """Ranges of the rest [s] at the start of a random motion along walls, and of the acceleration [m/s^2] from it, which is
 that of its last halt too."""
 SHORTEST = 4.0
-"""Least time [s] after which a random motion along walls stands still for good."""
+"""Least time [s] after which a random motion along walls halts for good; its turns, and a climb, go on in place."""
 _STARTS, _SLOWER = 64, 0.8
 
 

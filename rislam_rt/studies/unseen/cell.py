@@ -65,7 +65,8 @@ def _run(
     truth = build_truth(setup.scene, setup.paths, result, spec)
     scores = {"ran": name, **score_run(truth, recorder.inputs, recorder.answers)}
     if settings.get("save", "nothing") != "nothing":
-        folder = Path(settings.get("data", ".")) / f"room_{int(traits['seed']):05d}"
+        ways = "" if traits["ways"] == "anyhow" else f"_{traits['ways']}"
+        folder = Path(settings.get("data", ".")) / f"room_{int(traits['seed']):05d}{ways}"
         label, config = f"{cell_label(settings)}{name}", spec.model_dump(mode="json")
         write_recording(Recording(recorder.inputs, truth, name, config, traits, scores), folder / f"{label}.nc")
         if not (folder / "scene").exists():
