@@ -253,9 +253,10 @@ def _follow(
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
     lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
+    likely = float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1])
     found, rows, picks = tracks.match_over_motions(
-        found, lively if state.config.motion == "learnt" else None, observed, free, state.cycle,
-        state.config.new_density,
+        found, lively if likely > CONSTANTS.rare else None, observed, free, state.cycle, state.config.new_density,
+        np.log(likely),
     )  # fmt: skip
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()

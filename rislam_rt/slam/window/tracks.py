@@ -113,16 +113,17 @@ def match(
 
 def match_over_motions(
     calm: WindowTracks, lively: WindowTracks | None, observed: Observations, free: Integers, cycle: int,
-    strangers: float,
+    strangers: float, log_lively: float,
 ) -> tuple[WindowTracks, Integers, Integers]:  # fmt: skip
     """Assign components to tracks as predicted by the motion as believed, `calm`, and to what is left of these as in a
-    manoeuvre, `lively`, which is a rare event: the tracks, each with the prediction that holds, and as in `match`."""
+    manoeuvre, `lively`, of log probability `log_lively`: the tracks, each with the prediction that holds, and as in
+    `match`."""
     rows, picks = match(calm, observed, free, cycle, strangers)
     if lively is None:
         return calm, rows, picks
     left = np.ones(len(calm.ident), dtype=np.bool_)
     left[rows] = False
-    more, chosen = match(lively.keep(left), observed, np.setdiff1d(free, picks), cycle, strangers, CONSTANTS.log_rare)
+    more, chosen = match(lively.keep(left), observed, np.setdiff1d(free, picks), cycle, strangers, log_lively)
     more, covariance = left.nonzero()[0][more], calm.covariance.copy()
     covariance[more] = lively.covariance[more]
     return calm._replace(covariance=covariance), np.append(rows, more), np.append(picks, chosen)

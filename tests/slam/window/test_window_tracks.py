@@ -37,10 +37,10 @@ def test_what_no_calm_track_continues_goes_on_as_in_a_manoeuvre():
     found, _ = tracks.start(tracks.no_tracks(), heard, np.arange(2), np.full((2, 3), 0.02), 0)
     calm, lively = (tracks.advance(found, 0.1, 0.0, np.array([bend, 0.1, 0.1]), np.zeros(2)) for bend in (0.1, 2.0))
     heard = heard._replace(seen=seen + np.array([[0.03, 0.0, 0.0], [0.0, 0.0, 0.0]]))
-    both, rows, picks = tracks.match_over_motions(calm, lively, heard, np.arange(2), 1, 1e-3)
+    both, rows, picks = tracks.match_over_motions(calm, lively, heard, np.arange(2), 1, 1e-3, np.log(0.5))
     assert sorted(zip(rows.tolist(), picks.tolist(), strict=True)) == [(0, 0), (1, 1)]
     np.testing.assert_array_equal(both.covariance[0], lively.covariance[0])
     np.testing.assert_array_equal(both.covariance[1], calm.covariance[1])
-    same, rows, picks = tracks.match_over_motions(calm, None, heard, np.arange(2), 1, 1e-3)
+    same, rows, picks = tracks.match_over_motions(calm, None, heard, np.arange(2), 1, 1e-3, 0.0)
     assert same is calm
     assert (rows.tolist(), picks.tolist()) == ([1], [1])
