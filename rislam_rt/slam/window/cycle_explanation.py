@@ -252,12 +252,13 @@ def _follow(
     speed = float(np.linalg.norm(view.mean[3:6]))
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
-    lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
-    likely = float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1])
+    lively = found
+    if state.config.motion == "learnt":
+        lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
+    likely = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), CONSTANTS.rare)
     found, rows, picks = tracks.match_over_motions(
-        found, lively if likely > CONSTANTS.rare else None, observed, free, state.cycle, state.config.new_density,
-        np.log(likely),
-    )  # fmt: skip
+        found, lively, observed, free, state.cycle, state.config.new_density, float(np.log(likely / (1.0 - likely)))
+    )
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()
     silent[rows] = False

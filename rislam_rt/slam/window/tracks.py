@@ -91,42 +91,37 @@ def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats, velocity
 
 
 def match(
-    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float,
-    log_prior: float = 0.0,
-) -> tuple[Integers, Integers]:  # fmt: skip
-    """Assign components `free` of a cycle to the tracks that they continue: rows of the tracks, and their components;
-    `strangers` is the density of new paths, `log_prior` of what the tracks' prediction supposes."""
+    tracks: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float
+) -> tuple[Integers, Integers, float]:
+    """Assign components `free` of a cycle to the tracks that they continue: rows of the tracks, their components, and
+    the log likelihood ratio of that against all being new; `strangers` is the density of new paths."""
     count = len(tracks.ident)
     if not count or not len(free):
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), 0.0
     spread = np.zeros((count, 3, 3))
     spread[:, [0, 1, 2], [0, 1, 2]] = tracks.covariance[..., 0, 0]
     heard = share(tracks, cycle)
-    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard)) + log_prior
+    odds = np.log(heard / (1.0 + CONSTANTS.rare - heard))
     steady = np.zeros(count, dtype=np.bool_)
     candidates = Candidates(
         tracks.mean[..., 0], spread, tracks.log_amplitude, np.full(count, WANDER), odds, tracks.side, steady
     )
-    rows, columns = cheapest(pair_costs(candidates, observed.take(free), GATE, strangers))
-    return rows, free[columns]
+    costs = pair_costs(candidates, observed.take(free), GATE, strangers)
+    rows, columns = cheapest(costs)
+    return rows, free[columns], -0.5 * float(costs[rows, columns].sum())
 
 
 def match_over_motions(
-    calm: WindowTracks, lively: WindowTracks | None, observed: Observations, free: Integers, cycle: int,
-    strangers: float, log_lively: float,
+    calm: WindowTracks, lively: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float,
+    log_odds: float,
 ) -> tuple[WindowTracks, Integers, Integers]:  # fmt: skip
-    """Assign components to tracks as predicted by the motion as believed, `calm`, and to what is left of these as in a
-    manoeuvre, `lively`, of log probability `log_lively`: the tracks, each with the prediction that holds, and as in
-    `match`."""
-    rows, picks = match(calm, observed, free, cycle, strangers)
-    if lively is None:
+    """Assign components to tracks as predicted by the motion as believed, `calm`, or in a manoeuvre, `lively`, of prior
+    odds `log_odds`, whichever is likelier for all of them together: the tracks, and as in `match`."""
+    rows, picks, score = match(calm, observed, free, cycle, strangers)
+    if np.isin((calm.last == cycle - 1).nonzero()[0], rows).all():
         return calm, rows, picks
-    left = np.ones(len(calm.ident), dtype=np.bool_)
-    left[rows] = False
-    more, chosen = match(lively.keep(left), observed, np.setdiff1d(free, picks), cycle, strangers, log_lively)
-    more, covariance = left.nonzero()[0][more], calm.covariance.copy()
-    covariance[more] = lively.covariance[more]
-    return calm._replace(covariance=covariance), np.append(rows, more), np.append(picks, chosen)
+    other_rows, other_picks, other = match(lively, observed, free, cycle, strangers)
+    return (lively, other_rows, other_picks) if other + log_odds > score else (calm, rows, picks)
 
 
 def share(tracks: WindowTracks, cycle: int) -> Floats:
