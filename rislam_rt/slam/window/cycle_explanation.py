@@ -24,6 +24,7 @@ from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
+from rislam_rt.slam.window.motion_learning import log_manoeuvre
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
@@ -255,9 +256,8 @@ def _follow(
     lively = found
     if state.config.motion == "learnt":
         lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
-    likely = max(float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1]), CONSTANTS.rare)
     found, rows, picks = tracks.match_over_motions(
-        found, lively, observed, free, state.cycle, state.config.new_density, float(np.log(likely / (1.0 - likely)))
+        found, lively, observed, free, state.cycle, state.config.new_density, log_manoeuvre(state)
     )
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()

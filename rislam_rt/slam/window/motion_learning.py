@@ -143,6 +143,20 @@ def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
     return np.array([config.sigma_a, config.sigma_a, upwards, *rates]) ** -2.0
 
 
+def log_manoeuvre(state: WindowState) -> float:
+    """Log odds that the last step belongs to a manoeuvre of the liveliest motion mode: as rare as one is, or as the
+    chain of modes has it, and by what the map's returns tell of that step's horizontal acceleration."""
+    before = state.level[0] @ motion.transition(CONSTANTS.stay)
+    share = max(float(before[-1]), CONSTANTS.rare)
+    window, free = state.window, state.window.accel.shape[1]
+    if not len(window.accel):
+        return float(np.log(share / (1.0 - share)))
+    block = window.covariance[-free:, -free:][:2, :2]
+    told = motion.log_likelihood(window.accel[-1:, :2], block[None], window.solved[-1:, 0])[0]
+    calm = np.logaddexp.reduce(np.log(np.maximum(before[:-1], 1e-300)) + told[:-1]) - np.log1p(-min(before[-1], 0.999))
+    return float(np.log(share / (1.0 - share)) + told[-1] - calm)
+
+
 def livelier(precision: Floats, steps: int = LATELY) -> Floats:
     """Prior precisions (K - 1, A) of the window's accelerations, those of the last `steps` lowered to the liveliest
     motion mode, but not vertically."""
