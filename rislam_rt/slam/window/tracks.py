@@ -116,12 +116,18 @@ def match_over_motions(
     log_odds: float,
 ) -> tuple[WindowTracks, Integers, Integers]:  # fmt: skip
     """Assign components to tracks as predicted by the motion as believed, `calm`, or in a manoeuvre, `lively`, of prior
-    odds `log_odds`, whichever is likelier for all of them together: the tracks, and as in `match`."""
+    odds `log_odds`, whichever is likelier for all of them together: the tracks, and as in `match`.
+
+    One track alone that would go on only in a manoeuvre has reasons of its own, as a neighbour's pull.
+    """
     rows, picks, score = match(calm, observed, free, cycle, strangers)
-    if np.isin((calm.last == cycle - 1).nonzero()[0], rows).all():
+    late = (calm.last == cycle - 1).nonzero()[0]
+    kept = int(np.isin(late, rows).sum())
+    if kept + 1 >= len(late):
         return calm, rows, picks
     other_rows, other_picks, other = match(lively, observed, free, cycle, strangers)
-    return (lively, other_rows, other_picks) if other + log_odds > score else (calm, rows, picks)
+    likelier = other + log_odds > score and np.isin(late, other_rows).sum() > kept + 1
+    return (lively, other_rows, other_picks) if likelier else (calm, rows, picks)
 
 
 def share(tracks: WindowTracks, cycle: int) -> Floats:

@@ -36,9 +36,9 @@ def test_tracks_go_on_as_in_a_manoeuvre_if_that_is_likelier_for_all_of_them():
     heard = Observations(seen, np.full((4, 3), 1e-3), np.zeros(4), np.full(4, 0.1), np.ones(4))
     found, _ = tracks.start(tracks.no_tracks(), heard, np.arange(4), np.full((4, 3), 0.02), 0)
     calm, lively = (tracks.advance(found, 0.1, 0.0, np.array([bend, 0.1, 0.1]), np.zeros(2)) for bend in (0.1, 2.0))
-    for moved, followed in ((4, True), (1, False), (0, False)):
+    for moved, followed in ((3, True), (1, False), (0, False)):
         now = heard._replace(seen=seen + 0.03 * (np.arange(4) < moved)[:, None] * [1.0, 0.0, 0.0])
-        both, rows, picks = tracks.match_over_motions(calm, lively, now, np.arange(4), 1, 1.0, np.log(0.02))
+        both, rows, picks = tracks.match_over_motions(calm, lively, now, np.arange(4), 1, 1e-3, np.log(0.02))
         assert both is (lively if followed else calm)
         np.testing.assert_array_equal(rows, picks)
         assert len(rows) == (4 if followed else 4 - moved)
