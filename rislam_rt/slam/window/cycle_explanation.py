@@ -253,12 +253,13 @@ def _follow(
     speed = float(np.linalg.norm(view.mean[3:6]))
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
-    lively = found
-    if state.config.motion == "learnt":
+    if state.config.motion == "learnt" and state.window.covariance[-1, -1] > 0.0:
         lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
-    found, rows, picks = tracks.match_over_motions(
-        found, lively, observed, free, state.cycle, state.config.new_density, log_manoeuvre(state)
-    )
+        found, rows, picks = tracks.match_over_motions(
+            found, lively, observed, free, state.cycle, state.config.new_density, log_manoeuvre(state)
+        )
+    else:  # who is told the motion, or knows it particle by particle, looks for none
+        rows, picks, _ = tracks.match(found, observed, free, state.cycle, state.config.new_density)
     horizon = _weigh_tracks(found, rows, view.tilts)
     silent = late.copy()
     silent[rows] = False
