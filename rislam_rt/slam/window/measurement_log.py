@@ -99,7 +99,7 @@ class Log(NamedTuple):
         """
         cosines, std, count = self.seen[rows, 1:], self.std[rows, 1:], int(which.max(initial=-1)) + 1
         excess = np.zeros((count, 2))
-        np.add.at(excess, which, self.take(rows).mirrored(spacing) - 0.5)
+        np.add.at(excess, which, self.mirrored(spacing)[rows] - 0.5)
         both = excess[which] > 0.0
         if not both.any():
             return ArrayEnds(rows, which, cosines, std, np.arange(count))

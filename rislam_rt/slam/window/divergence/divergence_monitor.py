@@ -150,7 +150,8 @@ def with_free_compass(window: Window, std: float) -> Window:
     hessian[6, 6] = std**-2.0
     precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
     window = window._replace(accel=np.pad(window.accel, still), variance=np.pad(window.variance, still))
-    return _begun(window._replace(precision=precision), window.head, hessian)
+    # directions hang on the heading from now on: no rates of lengths with them
+    return _begun(window._replace(precision=precision, rates=None), window.head, hessian)
 
 
 def _begun(window: Window, head: Floats, hessian: Floats) -> Window:

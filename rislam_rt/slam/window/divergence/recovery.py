@@ -42,7 +42,7 @@ def check_motion(state: WindowState) -> tuple[WindowState, bool]:
         state = state._replace(
             motion_mode=np.concatenate([state.motion_mode, still]), level=np.concatenate([state.level, still])
         )
-    return state._replace(window=window._replace(rates=None)), True  # directions hang on the compass
+    return state._replace(window=window), True
 
 
 def restart(state: WindowState) -> WindowState:

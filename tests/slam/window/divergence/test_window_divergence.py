@@ -17,6 +17,7 @@ from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import motion, window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.smoother.rate_factor import RateFactor
 
 TOLD, STD = np.array([0.3, 0.1, 0.0]), np.full(3, 0.01)
 
@@ -331,3 +332,17 @@ def test_a_turn_is_read_from_directions_of_paths_alike_in_length(by):
     assert divergence_monitor.turn(view, heard(-angle), 0.01) == 0.0
     flat[:] = 0.05
     assert divergence_monitor.turn(view, heard(angle - by), 0.3) == 0.0
+
+
+def test_a_compass_that_is_found_wrong_takes_the_rates_of_its_directions_with_it():
+    """A free heading is one axis more, in which what lengths tell along known directions has no place."""
+    window = window_gaussian.begin(np.zeros(3), TOLD, np.full(7, 0.01))
+    for _ in range(4):
+        window = window_gaussian.extend(window, 0.1, np.full(3, 25.0))
+    many, none = window.num_poses, np.zeros((3, 3))
+    rates = RateFactor(np.zeros((many, 3, 3)), np.zeros((many, 3, 2)), np.zeros((many, 3)),
+                       window_gaussian.poses(window)[:, :3], none, none[0])  # fmt: skip
+    found = divergence_monitor.with_free_compass(window_gaussian.solve(window._replace(rates=rates)), 0.1)
+    assert found.turns
+    assert found.rates is None
+    assert np.isfinite(found.head).all()
