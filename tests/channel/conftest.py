@@ -3,6 +3,7 @@
 paper()      the paper's room: 6 x 6 x 3 m box, sphere at (2, 1, 1), panel at the middle of the ceiling
 l_shape()    a 6 x 6 x 3 m box without its corner x > 3, y > 3: two re-entrant walls
 parted()     the box with a partition at x = 3 that has a doorway, and a desk
+panels()     the box with two panels on the ceiling and one on a wall, of three sizes
 """
 
 from types import SimpleNamespace
@@ -10,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rislam_rt.model import Body, Material, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory
+from rislam_rt.model import Body, Material, Reflector, RisPanel, RisSpec, Scatterer, Scene, Trajectory, join_panels
 
 PLAIN = Material(reflection=0.85)
 
@@ -35,12 +36,12 @@ def box(low, high, prefix="", material=PLAIN):
     return tuple(polygon(prefix + name, corners, material) for name, corners in faces.items())
 
 
-def panel(center=(3.0, 3.0, 3.0), rows=6, cols=6, **options):
+def panel(center=(3.0, 3.0, 3.0), rows=6, cols=6, name="ris", **options):
     """The paper's panel, facing down."""
     spec = RisSpec(
         rows, cols, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), **options
     )
-    return RisPanel(spec, np.array(center), "ceiling")
+    return RisPanel(spec, np.array(center), "ceiling", name)
 
 
 def at(positions, tx=(-0.04, -0.03, 0.01), rx=(0.04, 0.03, -0.01)):
@@ -87,9 +88,19 @@ def parted():
     return scene([*box((0, 0, 0), (6, 6, 3)), *partition, *desk], ris=panel(center=(1.5, 3.0, 3.0)), name="parted")
 
 
+def panels():
+    upright = RisSpec(5, 3, np.array([0.015, 0.015]), np.array([-1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    three = (
+        panel(center=(2.0, 3.0, 3.0), name="a"), panel(center=(2.4, 3.1, 3.0), rows=4, cols=8, name="b"),
+        RisPanel(upright, np.array([6.0, 2.0, 1.5]), "wall_x1", "c"),
+    )  # fmt: skip
+    return scene(box((0, 0, 0), (6, 6, 3)), ris=join_panels(three))
+
+
 @pytest.fixture(scope="session")
 def rooms():
     """The builders above."""
     return SimpleNamespace(
-        polygon=polygon, box=box, panel=panel, at=at, scene=scene, paper=paper, l_shape=l_shape, parted=parted
-    )
+        polygon=polygon, box=box, panel=panel, at=at, scene=scene, paper=paper, l_shape=l_shape, parted=parted,
+        panels=panels,
+    )  # fmt: skip

@@ -3,24 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.model import PathKind, RadioConfig, RisCode, RisPanel, RisSpec, join_panels
+from rislam_rt.model import PathKind, RadioConfig, RisCode
 
 RADIO = RadioConfig()
-
-
-@pytest.fixture(scope="module")
-def room(rooms):
-    """Two panels on the ceiling and one on a wall, of three sizes."""
-    level = rooms.panel(center=(2.0, 3.0, 3.0))
-    near = rooms.panel(center=(2.4, 3.1, 3.0), rows=4, cols=8)
-    upright = RisSpec(5, 3, np.array([0.015, 0.015]), np.array([-1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-    panels = (
-        replace(level, name="a"), replace(near, name="b"), RisPanel(upright, np.array([6.0, 2.0, 1.5]), "wall_x1", "c")
-    )  # fmt: skip
-    return rooms.scene(rooms.box((0, 0, 0), (6, 6, 3)), ris=join_panels(panels))
 
 
 def by_identity(paths):
@@ -33,7 +20,8 @@ def by_identity(paths):
     return found
 
 
-def test_each_panel_has_the_paths_that_it_has_alone(room, rooms):
+def test_each_panel_has_the_paths_that_it_has_alone(rooms):
+    room = rooms.panels()
     poses, rng = rooms.at([[1.0, 1.2, 0.8], [4.0, 3.0, 1.0]]), np.random.default_rng(0)
     both = ImageSourceChannel(room, RADIO, 2)
     code = RisCode(rng.integers(4, size=(1, room.ris.spec.num_elements)), 4)

@@ -1,5 +1,6 @@
 """A panel that is not what its data sheet says, a link that damages codes, and warnings that reach the result."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,8 +74,6 @@ def test_bits_need_a_power_of_two():
 
 
 def test_an_agent_faster_than_the_receiver_reckons_with_is_said(room):
-    from dataclasses import replace
-
     scene = replace(room, agent=replace(room.agent, velocity=8.0 * room.agent.velocity))  # 0.8 m/s
 
     def said(*settings):
@@ -89,8 +88,6 @@ def test_an_agent_faster_than_the_receiver_reckons_with_is_said(room):
 
 
 def test_a_panel_too_wide_for_the_band_is_said_and_kept(run_short, room, short_spec, short_result, tmp_path):
-    from dataclasses import replace
-
     assert short_result.warnings == ()
     wide = replace(room.ris.spec, spacing=np.array([0.15, 0.15]))
     scene = replace(room, ris=replace(room.ris, spec=wide))

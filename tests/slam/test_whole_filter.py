@@ -9,7 +9,7 @@ import pytest
 from rislam_rt.arrays import Floats
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, build_sensor, measure
-from rislam_rt.model import Measurement, Paths, RadioConfig, RisCode, RisLegs, Scene, SensorModel, SlamEstimate
+from rislam_rt.model import Measurement, RadioConfig, RisCode, Scene, SensorModel, SlamEstimate
 from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import NestedConfig, SlamConfig, StartPrior, StepInfo, StepOutcome, estimate, init, step
@@ -52,23 +52,12 @@ def hear(receiver: ReceiverConfig, noise_psd: float, depth: int, seed: int) -> H
     codes = RisCode(rng.integers(panel.levels, size=(len(motion), panel.rows, panel.cols)), panel.levels)
     paths = rephase(ImageSourceChannel(scene, radio, depth).paths(motion), codes)
     measurements = [
-        measure(_one(paths, k), 0, float(motion.heading[k]), radio, receiver, None, rng=rng)[0]
+        measure(paths.of_cycle(k), 0, float(motion.heading[k]), radio, receiver, None, rng=rng)[0]
         for k in range(len(motion))
     ]
     wrong = 0.01 * rng.standard_normal((2, 3)) * [1.0, 1.0, 0.0]
     start = StartPrior(motion.position[0] + wrong[0], motion.velocity[0] + wrong[1], float(motion.heading[0]))
     return Heard(scene, build_sensor(radio, receiver), measurements, codes, start)
-
-
-def _one(paths: Paths, cycle: int) -> Paths:
-    """The paths of one cycle."""
-    from dataclasses import replace
-
-    one, legs = slice(cycle, cycle + 1), paths.ris
-    assert legs is not None
-    names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
-    fields = {name: getattr(paths, name)[one] for name in names}
-    return replace(paths, **fields, ris=RisLegs(legs.tx[one], legs.rx[one], legs.tx_leg, legs.rx_leg))
 
 
 def go(

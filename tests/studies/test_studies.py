@@ -221,7 +221,7 @@ def test_an_unexplained_path_is_exit_1_and_still_written(run, tmp_path, monkeypa
     def broken(*arguments, **options):
         found = validate_rooms(*arguments, **options)
         lost = OneSidedPath(0, "LOS", "analytic", "", "all its conditions hold", 0.0)
-        return [Validation(*row[:3], _with_one_sided(row.report, lost)) for row in found]
+        return [Validation(*row[:3], replace(row.report, one_sided=(*row.report.one_sided, lost))) for row in found]
 
     monkeypatch.setattr(module, "validate_rooms", broken)
     one = f"rooms=[{{scene='{ROOT}/scenes/empty_box', depth=0}}]"
@@ -233,8 +233,6 @@ def test_an_unexplained_path_is_exit_1_and_still_written(run, tmp_path, monkeypa
 
 
 def test_certificate_shows_the_pose_with_the_most_differences():
-    from dataclasses import replace
-
     scene = load_scene(ROOT / "scenes" / "l_room")
     spec = load_any(COMPARE, ["poses=4", f"rooms=[{{scene='{ROOT}/scenes/l_room', depth=1, picture=true}}]"])
     certificate = run_comparison([scene], spec).certificate
@@ -257,9 +255,3 @@ def test_least_snr_is_given_in_db():
     assert load_spec(SLAM).design.least_snr == 0.0
     assert load_spec(SLAM, ["design.least_snr_db=10.0"]).design.least_snr == pytest.approx(10.0)
     assert load_spec(SLAM, ["design.least_snr_db=-3.0"]).design.least_snr == pytest.approx(0.501187, rel=1e-6)
-
-
-def _with_one_sided(report, path):
-    from dataclasses import replace
-
-    return replace(report, one_sided=(*report.one_sided, path))

@@ -203,7 +203,6 @@ def test_claims_from_a_folder(tmp_path, monkeypatch, capsys):
     "content", ["{}", "[]", '"text"', '{"gains": [{}], "entries": []}', '{"gains": [], "entries": []}', "{"]
 )
 def test_results_of_another_form_are_one_line(tmp_path, content):
-    from rislam_rt.errors import ConfigError
     from rislam_rt.studies.claims import read_results
 
     (tmp_path / "fig4b.json").write_text(content)

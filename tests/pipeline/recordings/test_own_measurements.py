@@ -31,32 +31,33 @@ CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_
 Table = dict[str, list[float]]
 
 
+def write_csv(file: Path, table: Table, rows: int | None = None) -> Path:
+    """The table, or its first rows, as a CSV file."""
+    with file.open("w", newline="") as lines:
+        writer = csv.writer(lines)
+        writer.writerow(table)
+        writer.writerows(list(zip(*table.values(), strict=True))[:rows])
+    return file
+
+
+def point(value: np.ndarray) -> str:
+    """Three coordinates for the command line, to the last digit."""
+    return ",".join(map(repr, map(float, value)))
+
+
 def test_from_a_file_comes_the_answer_of_the_run(
     recorded: tuple[Inputs, np.ndarray], table: Table, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     inputs, position = recorded
-    file, poses = tmp_path / "mine.csv", tmp_path / "true.tum"
-    with file.open("w", newline="") as lines:
-        writer = csv.writer(lines)
-        writer.writerow(table)
-        writer.writerows(zip(*table.values(), strict=True))
+    file, poses = write_csv(tmp_path / "mine.csv", table), tmp_path / "true.tum"
     true = rislam_rt.load_scene("paper_room").agent[:CYCLES]
     poses.write_bytes(tum_bytes(true.time, true.position, true.heading))
-    told = (inputs.start.position, inputs.start.velocity, inputs.body.tx_offset, inputs.body.rx_offset)
-    start, speed, tx, rx = (",".join(map(repr, map(float, v))) for v in told)
-    pipeline = find_pipeline("trace_then_slam")
+    start, pipeline = point(inputs.start.position), find_pipeline("trace_then_slam")
     command(
-        file,
-        pipeline,
-        set_=CHANGES,
-        start=start,
-        velocity=speed,
-        tx=tx,
-        rx=rx,
-        truth=poses,
-        out=tmp_path / "out",
+        file, pipeline, set_=CHANGES, start=start, velocity=point(inputs.start.velocity),
+        tx=point(inputs.body.tx_offset), rx=point(inputs.body.rx_offset), truth=poses, out=tmp_path / "out",
         json=tmp_path / "said.json",
-    )
+    )  # fmt: skip
     said = capsys.readouterr().out
     assert f"cycles: {CYCLES}" in said
     assert "rmse_m: " in said
@@ -195,20 +196,12 @@ def test_a_start_told_wrong_is_said_where_nobody_knows_the_truth(
 ) -> None:
     """A speed wrong by 1 m/s, in a second's measurements: on the screen and in the table of cycles; told right, not."""
     inputs, _ = recorded
-    file, rows = tmp_path / "mine.csv", sum(time < inputs.time[10] for time in table["time_s"])
-    with file.open("w", newline="") as lines:
-        writer = csv.writer(lines)
-        writer.writerow(table)
-        writer.writerows(list(zip(*table.values(), strict=True))[:rows])
-    start, tx, rx = (
-        ",".join(map(repr, map(float, value)))
-        for value in (inputs.start.position, inputs.body.tx_offset, inputs.body.rx_offset)
-    )
+    file = write_csv(tmp_path / "mine.csv", table, sum(time < inputs.time[10] for time in table["time_s"]))
     for off in (0.0, 1.0):
-        speed = inputs.start.velocity + off * np.eye(3)[0]
         command(
-            file, find_pipeline("trace_then_slam"), set_=CHANGES, start=start, tx=tx, rx=rx,
-            velocity=",".join(map(repr, map(float, speed))), out=tmp_path / f"out{off}",
+            file, find_pipeline("trace_then_slam"), set_=CHANGES, start=point(inputs.start.position),
+            velocity=point(inputs.start.velocity + off * np.eye(3)[0]), tx=point(inputs.body.tx_offset),
+            rx=point(inputs.body.rx_offset), out=tmp_path / f"out{off}",
         )  # fmt: skip
         with (tmp_path / f"out{off}" / "estimate.csv").open() as lines:
             said = [row["outcome"] for row in csv.DictReader(lines)].count("diverged")
@@ -222,11 +215,8 @@ def test_the_estimate_has_the_times_of_the_file(
     table: Table, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Of a clock that counts from the epoch, as a recording's: other logs are joined by it."""
-    file, rows = tmp_path / "mine.csv", {**table, "time_s": [1.7e9 + time for time in table["time_s"]]}
-    with file.open("w", newline="") as lines:
-        writer = csv.writer(lines)
-        writer.writerow(rows)
-        writer.writerows(list(zip(*rows.values(), strict=True))[:60])
+    rows = {**table, "time_s": [1.7e9 + time for time in table["time_s"]]}
+    file = write_csv(tmp_path / "mine.csv", rows, 60)
     command(file, find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", out=tmp_path / "out")
     with (tmp_path / "out" / "estimate.csv").open() as lines:
         times = [float(row["time_s"]) for row in csv.DictReader(lines)]

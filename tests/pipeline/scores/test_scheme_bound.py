@@ -1,5 +1,6 @@
 """The bound that a run is held against: the benchmark's own figures, what may lower it, and what must not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.information import MotionPrior, assumed_std, build_landmark_model, heard_paths, posterior_bound
 from rislam_rt.information.priors import FLOOR_TILT, UPRIGHT_TILT
-from rislam_rt.model import PathKind
+from rislam_rt.model import MapEstimate, PathKind, empty_map
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.scheme_simulation import without_panel
@@ -177,10 +178,6 @@ def test_summary_holds_the_bound_and_the_map_score(short_result):
 
 def test_map_score_counts_points_and_not_images(room, short_result):
     """Nothing was found in so short a run: each of two landmarks is missed and costs half the squared cut-off."""
-    from dataclasses import replace
-
-    from rislam_rt.model.estimate import MapEstimate, empty_map
-
     assert map_score(room, empty_map()) == {"gospa_m": 1.0, "localisation_m": 0.0, "missed": 2, "false": 0}
     points = np.vstack([room.landmark_positions + np.array([0.0, 0.3, 0.0]), [[9.0, 9.0, 9.0]]])
     found = MapEstimate(

@@ -66,6 +66,13 @@ def _wall(*walls):
     return _seen(_mirror(tx, *walls), 0.0)
 
 
+def _latest(tracks):
+    """(T, 3) last lengths of tracks, and cosines in the room's axes."""
+    seen = np.stack(tracks)[:, -1]
+    turned = np.einsum("ij,tj->ti", rotation_z(np.array(HEADING))[:2, :2], seen[:, 1:])
+    return np.column_stack([seen[:, 0], turned])
+
+
 def _sightings(tracks, ratio):
     """Sightings of noise-free tracks whose amplitudes are `ratio` (T,) times free space."""
     seen = np.stack(tracks)
@@ -97,9 +104,7 @@ def test_a_corner_moves_as_a_point_does():
 def test_an_echo_is_where_both_walls_say():
     """Exact for walls at right angles, for any baseline; the scatterer is no echo of theirs."""
     tracks = [_wall("x"), _wall("y"), _wall("z"), _wall("x", "y"), _wall("x", "z"), _scatterer()]
-    seen = np.stack(tracks)[:, -1]
-    turned = np.einsum("ij,tj->ti", rotation_z(np.array(HEADING))[:2, :2], seen[:, 1:])
-    seen = np.column_stack([seen[:, 0], turned])
+    seen = _latest(tracks)
     offset = rotation_z(np.array(HEADING)) @ (BODY.tx_offset - BODY.rx_offset)
     strength = np.log([0.8, 0.7, 0.6, 0.56, 0.48, 0.02])
     std = np.full(seen.shape, 1e-9)
@@ -120,9 +125,7 @@ def test_an_image_is_where_point_and_walls_say(mirrors):
     legs = [_mirror(POINT[None], *names)[0] for names in (to_tx, to_rx)]
     path = _seen(np.tile(legs[1], (WINDOW, 1)), np.linalg.norm(legs[0] - tx, axis=1))
     tracks = [_wall("x"), _wall("y"), _wall("z"), _scatterer(), path]
-    seen = np.stack(tracks)[:, -1]
-    turned = np.einsum("ij,tj->ti", rotation_z(np.array(HEADING))[:2, :2], seen[:, 1:])
-    seen = np.column_stack([seen[:, 0], turned])
+    seen = _latest(tracks)
     ratio = {"x": 0.8, "y": 0.7}
     gain = [0.05 / (np.linalg.norm(p - tx[-1]) * np.linalg.norm(q - rx[-1])) for p, q in ((POINT, POINT), legs)]
     gain[1] *= np.prod([ratio[name] for name in to_tx + to_rx])

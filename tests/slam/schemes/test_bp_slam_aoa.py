@@ -8,7 +8,6 @@ from rooms import BODY, CYCLE, HEADING, RADIO
 
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Measurement, SensorModel
 from rislam_rt.slam import StartPrior, StepOutcome
@@ -255,10 +254,3 @@ def test_pruning_keeps_what_is_likely() -> None:
     left = prune(GaussianFeatures(**{**parts, "share": np.array([0.999, 1e-4, 1.0])}), 1e-4, 1e-3, 10)
     assert left.ident.tolist() == [4]
     assert left.share.tolist() == [1.0]
-
-
-@pytest.mark.parametrize("field", ["max_features", "sigma_a", "visible", "drift_std", "crowd", "survival_probability"])
-def test_bad_settings_are_named(field: str) -> None:
-    """With the name of the field."""
-    with pytest.raises(ConfigError, match=f"bp_slam_aoa.{field}"):
-        bp_slam_aoa.BpSlamAoaConfig(**{field: -1})

@@ -1,12 +1,8 @@
 """Channel-SLAM: how ranges are labelled, and what a virtual transmitter does with them."""
 
-from typing import Any
-
 import numpy as np
-import pytest
 from rooms import BODY, CYCLE, HEADING, RADIO, build_room, measurement_of
 
-from rislam_rt.errors import ConfigError
 from rislam_rt.model import SensorModel
 from rislam_rt.slam.schemes import channel_slam
 from rislam_rt.slam.schemes.channel_slam import ChannelSlamConfig
@@ -88,13 +84,3 @@ def test_no_two_ranges_continue_one_track() -> None:
     tracks, _ = follow(no_tracks(), np.array([-1]), np.array([3.0]), np.array([0.01]), 0.1, 0)
     found = assign(tracks, np.array([3.01, 3.001]), np.full(2, 0.01), 9.0)
     assert np.array_equal(found, [-1, 0])
-
-
-@pytest.mark.parametrize(
-    "field", ["max_paths", "max_misses", "gate", "share_threshold", "height", "specular_ratio", "wanderers"]
-)
-def test_bad_settings_are_named(field: str) -> None:
-    """With the name of the field."""
-    wrong: dict[str, Any] = {field: "up" if field == "height" else -1}
-    with pytest.raises(ConfigError, match=f"channel_slam.{field}"):
-        ChannelSlamConfig(**wrong)

@@ -68,11 +68,20 @@ def test_a_known_height_stays(scheme: Any, config: Any) -> None:
     assert np.all(scheme.estimate(state, config).samples[:, 2] == room.start.position[2])
 
 
-@pytest.mark.parametrize("field", ["max_features", "sigma_a", "detection_probability", "height", "wanderers"])
-def test_bad_settings_are_named(field: str) -> None:
-    """With the name of the field."""
-    with pytest.raises(ConfigError, match=f"bp_slam.{field}"):
-        bp_slam.BpSlamConfig(**{field: "up" if field == "height" else -1})
+@pytest.mark.parametrize(
+    ("config", "fields"),
+    [
+        (bp_slam.BpSlamConfig, "max_features sigma_a detection_probability height wanderers"),
+        (channel_slam.ChannelSlamConfig, "max_paths max_misses gate share_threshold height specular_ratio wanderers"),
+        (bp_slam_aoa.BpSlamAoaConfig, "max_features sigma_a visible drift_std crowd survival_probability"),
+    ],
+)
+def test_bad_settings_are_named(config: Any, fields: str) -> None:
+    """With the names of section and field."""
+    section = config.__module__.split(".")[-2]
+    for field in fields.split():
+        with pytest.raises(ConfigError, match=f"^{section}.{field}"):
+            config(**{field: "up" if field == "height" else -1})
 
 
 @pytest.mark.parametrize("rival", [bp_slam, bp_slam_aoa, channel_slam], ids=lambda rival: rival.__name__)
