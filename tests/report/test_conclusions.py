@@ -5,25 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report.conclusions import judge_run, panel_found_at, why_not
 from rislam_rt.report.page import build_page
-from rislam_rt.scene import load_scene
-from rislam_rt.shipped import find_pipeline
-
-
-@pytest.fixture(scope="module")
-def result():
-    settings = [
-        "channel=image_source",
-        "depth=1",
-        "cycles=6",
-        "receiver.estimator=bound",
-        'schemes=["random", "no_ris"]',
-    ]
-    spec = load_spec(find_pipeline("trace_then_slam"), settings)
-    return run_slam(load_scene("paper_room"), spec, rng=np.random.default_rng(7))
 
 
 def test_the_page_begins_with_the_error_of_every_scheme(result):

@@ -3,14 +3,12 @@
 import re
 import warnings
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import Material, PathKind
-from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.pipeline.scores.loss_causes import WORDS
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report import draw_figures
@@ -19,23 +17,11 @@ from rislam_rt.report.page import build_page
 from rislam_rt.report.room_figures import path_points
 from rislam_rt.report.terminal_tables import summary_rows
 from rislam_rt.report.time_curves import strongest_db
-from rislam_rt.scene import load_scene
 from rislam_rt.slam.step_info import LossCause
 
-ROOT = Path(__file__).parents[2]
 
-
-@pytest.fixture(scope="module")
-def result():
-    settings = ["channel=image_source", "cycles=6", "depth=1", "slam.num_samples=40", 'schemes=["random", "no_ris"]']
-    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
-    return run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
-
-
-def test_a_run_of_one_cycle_is_drawn_without_a_complaint():
-    settings = ["channel=image_source", "cycles=1", "depth=1", "slam.num_samples=40", 'schemes=["no_ris"]']
-    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
-    one = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+def test_a_run_of_one_cycle_is_drawn_without_a_complaint(run_short):
+    one = run_short("cycles=1", "slam.num_samples=40", 'schemes=["no_ris"]')
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         draw_figures(one)
@@ -162,13 +148,11 @@ def test_a_pane_that_the_carrier_passes_stands_on_the_page(result):
     assert said not in build_page(result, summarise(result), {})
 
 
-def test_page_says_what_is_lost_and_what_held_itself_for_lost():
+def test_page_says_what_is_lost_and_what_held_itself_for_lost(run_short):
     """A start told wrong by a metre and a metre a second, against one told right."""
     rows = {}
     for scale in (100, 1):
-        settings = ["channel=image_source", "cycles=10", "depth=1", 'schemes=["no_ris"]', f"told.start_scale={scale}"]
-        spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
-        lost = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+        lost = run_short("cycles=10", 'schemes=["no_ris"]', f"told.start_scale={scale}")
         rows[scale] = dict(summary_rows(summarise(lost)))
         page = build_page(lost, summarise(lost), {})
         assert ("lost with no panel." in page) == (scale == 100)

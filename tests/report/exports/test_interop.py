@@ -10,7 +10,6 @@ import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import PathKind, RadioConfig
-from rislam_rt.pipeline import load_spec, run_slam
 from rislam_rt.report.exports.deepmimo import deepmimo_files
 from rislam_rt.report.exports.rerun_recording import recording_bytes
 from rislam_rt.scene import load_scene
@@ -73,10 +72,7 @@ def test_deepmimo_describes_radio_room_and_motion(scenario, capsys):
     np.testing.assert_allclose(np.ravel(found.datasets[1].rx_vel), scene.agent.velocity[1], atol=1e-9)
 
 
-def test_rerun_verifies_a_recording(tmp_path):
-    settings = ["channel=image_source", "cycles=6", 'schemes=["random", "no_ris"]']
-    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", settings)
-    result = run_slam(load_scene(ROOT / "scenes" / "paper_room"), spec, rng=np.random.default_rng(7))
+def test_rerun_verifies_a_recording(result, tmp_path):
     file = tmp_path / "run.rrd"
     file.write_bytes(recording_bytes(result, "test"))
     program = str(Path(sys.executable).with_name("rerun"))

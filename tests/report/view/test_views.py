@@ -13,7 +13,7 @@ import pytest
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.model import Scene, SlamResult
-from rislam_rt.pipeline import load_spec, run_slam
+from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.report.exports.animation import gif_bytes
@@ -71,18 +71,6 @@ def read(page: str) -> tuple[Reader, list[object]]:
 @pytest.fixture(scope="module")
 def paper() -> Scene:
     return load_scene(ROOT / "scenes" / "paper_room")
-
-
-@pytest.fixture(scope="module")
-def result(paper: Scene) -> SlamResult:
-    settings = [
-        "channel=image_source",
-        "cycles=6",
-        "depth=1",
-        "receiver.estimator=bound",
-        'schemes=["random", "no_ris"]',
-    ]
-    return run_slam(paper, load_spec(PIPELINE, settings), rng=np.random.default_rng(7))
 
 
 def test_nothing_is_loaded_from_anywhere() -> None:
