@@ -1,6 +1,8 @@
-"""Arrays: their types, checks of dtype, shape and NaN that frozen dataclasses make of their fields, blocks of rows."""
+"""Arrays: their types, checks of dtype, shape and NaN that frozen dataclasses make of their fields, blocks of rows, and
+rows of several arrays together."""
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +13,8 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
+Columns = TypeVar("Columns", bound=tuple[Any, ...])
+"""Named tuple of arrays with as many rows each; some may be such tuples themselves."""
 
 
 def frozen(value: ArrayLike, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
@@ -86,3 +90,19 @@ def row_blocks(count: int, width: int, most: int = 2_000_000, least: int = 1) ->
     """Slices of an array's rows of `width` numbers, so that one holds about `most`, `least` rows or more."""
     step = max(least, most // max(width, 1))
     return [slice(first, min(first + step, count)) for first in range(0, count, step)]
+
+
+def take_rows(columns: Columns, rows: Any) -> Columns:
+    """The named tuple with some rows of each of its arrays, by number, mask or slice."""
+    make: Any = type(columns)._make  # type: ignore[attr-defined]
+    taken: Columns = make(take_rows(one, rows) if isinstance(one, tuple) else one[rows] for one in columns)
+    return taken
+
+
+def join_rows(parts: Iterable[Columns]) -> Columns:
+    """One named tuple of the arrays of several, one or more, the rows of each array under those of the one before."""
+    first, *more = parts
+    make: Any = type(first)._make  # type: ignore[attr-defined]
+    fields = zip(first, *more, strict=True)
+    joined: Columns = make(join_rows(each) if isinstance(each[0], tuple) else np.concatenate(each) for each in fields)
+    return joined

@@ -1,9 +1,11 @@
-"""Frozen arrays: checked, read-only, and copied unless nobody can change them."""
+"""Frozen arrays: checked, read-only, and copied unless nobody can change them. Rows of several arrays together."""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from rislam_rt.arrays import frozen
+from rislam_rt.arrays import frozen, join_rows, take_rows
 from rislam_rt.errors import GeometryError
 
 
@@ -41,3 +43,22 @@ def test_checks_hold_for_both():
 def test_what_is_no_array_of_numbers_is_refused_with_its_name(value):
     with pytest.raises(GeometryError, match=r"^x: .* received; give an array of float64$"):
         frozen(value, np.float64, (None,), "x")
+
+
+class Ends(NamedTuple):
+    first: Any
+    last: Any
+
+
+class Rays(NamedTuple):
+    number: Any
+    ends: Ends
+
+
+def test_rows_of_arrays_within_arrays_are_taken_and_joined():
+    rays = Rays(np.arange(3), Ends(np.arange(6.0).reshape(3, 2), np.array(["a", "b", "c"])))
+    for rows in (np.array([2, 0]), np.array([False, True, True]), slice(1)):
+        some = take_rows(rays, rows)
+        assert isinstance(some.ends, Ends)
+        np.testing.assert_array_equal(some.ends.first, rays.ends.first[rows])
+        np.testing.assert_array_equal(join_rows([some, rays]).ends.last, [*rays.ends.last[rows], *"abc"])

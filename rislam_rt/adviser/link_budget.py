@@ -7,11 +7,11 @@ import numpy as np
 
 from rislam_rt.adviser.forecast_codes import codes_of, paths_under_codes
 from rislam_rt.adviser.reasons import Reasons, build_reasons
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, take_rows
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound_receiver import NEGLIGIBLE
-from rislam_rt.measurement.components import NoiselessComponents, merge, select_paths, single
+from rislam_rt.measurement.components import NoiselessComponents, merge, single
 from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Paths, Scene, SensorModel
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
@@ -41,7 +41,7 @@ def forecast_detection(paths: Paths, cycle: int, heading: float, settings: Setti
     missed, strongest, covered = np.ones(count), np.zeros(count), np.full(count, -1)
     for capture in split_by_code(received, settings.receiver):
         snr, owner = radio.integrated_snr(capture.gain), paths.landmark[capture.path]
-        loud = select_paths(capture, snr > NEGLIGIBLE * sensor.threshold)
+        loud = take_rows(capture, snr > NEGLIGIBLE * sensor.threshold)
         parts = merge(loud, sensor) if settings.receiver.merge else single(loud)
         inside = sensor.in_window(parts.tau)
         chance = sensor.detection_probability(radio.integrated_snr(parts.gain)) * inside

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers, join_rows
 from rislam_rt.design.beam_sweep import search_code
 from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.design.design_result import Design, DesignConfig
@@ -89,7 +89,7 @@ def problem_from_belief(
     position = np.concatenate([belief.position[None], belief.samples[: max(samples - 1, 0)]])
     tx, rx = (end[:, None, :] for end in belief.body.ends(position, np.array(belief.heading, dtype=np.float64)))
     panel, static = _predicted_paths(belief.map, held)
-    both = _PredictedPaths(*(np.concatenate(pair) for pair in zip(panel, static, strict=True)))
+    both = join_rows([panel, static])
     points = belief.map.position
     unit_snr = float(radio.integrated_snr(np.ones(())))
     return DesignProblem(

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, join_rows, take_rows
 from rislam_rt.measurement import components
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detection_threshold import build_sensor, draw_false_alarms
@@ -44,9 +44,8 @@ def measure_bound(
     rate = replace(sensor, false_alarms=sensor.false_alarms / len(captures))
     parts = [_capture(*one, rate, config, rng=rng) for one in zip(captures, draws, strict=True)]
     parts = [part._replace(capture=np.full(len(part.path), number)) for number, part in enumerate(parts)]
-    found = components.ReportedComponents._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
-    order = np.argsort(found.points[:, 0])
-    found = components.ReportedComponents._make(field[order] for field in found)
+    found = join_rows(parts)
+    found = take_rows(found, np.argsort(found.points[:, 0]))
     told = panel_probability(found, radio, config) if config.alternation else ()
     measurement = Measurement(
         found.points[:, 0], components.clip_to_unit_disc(components.blind_axes(found.points[:, 1:], radio)),
@@ -61,7 +60,7 @@ def _capture(
 ) -> components.ReportedComponents:
     """Draw the detected components of one capture by the bound, and its false alarms."""
     radio, window = sensor.radio, sensor.window
-    received = components.select_paths(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
+    received = take_rows(received, radio.integrated_snr(received.gain) > NEGLIGIBLE * sensor.threshold)
     if config.resolution == "joint":
         parts, errors = joint_errors(received, radio, config, draws)
     else:
@@ -75,8 +74,5 @@ def _capture(
     # Deviations go as one over the amplitude: this is the bound at the measured one.
     deviation = errors.deviation * (np.abs(parts.gain) / np.maximum(np.abs(gain), 1e-300))[:, None]
     none = np.zeros_like(parts.path)
-    fields = (parts.path, points, deviation, gain, errors.gain_std, none)
-    true = components.ReportedComponents._make(field[seen] for field in fields)
-    return components.ReportedComponents._make(
-        np.concatenate(fields) for fields in zip(true, draw_false_alarms(sensor, rng=rng), strict=True)
-    )
+    true = components.ReportedComponents(parts.path, points, deviation, gain, errors.gain_std, none)
+    return join_rows([take_rows(true, seen), draw_false_alarms(sensor, rng=rng)])

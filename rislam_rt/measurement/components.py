@@ -105,11 +105,6 @@ def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -
     return ComponentErrors(deviation * draws[:, 2:], deviation, gain_std)
 
 
-def select_paths(received: Received, keep: Booleans) -> Received:
-    """Select the received paths that are marked (N,), from which components are made."""
-    return Received._make(field[keep] for field in received)
-
-
 def in_resolution_cells(received: Received, radio: RadioConfig) -> Floats:
     """Delays and direction cosines (N, 3) of received paths in resolution cells, by which they merge to components."""
     array = radio.array

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers, take_rows
 from rislam_rt.measurement.components import ReportedComponents
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.slot_motion import code_signs, slot_mean
@@ -48,7 +48,8 @@ def panel_probability(
         for other in range(config.num_captures):
             if other != own:
                 factors = leak_factors(radio, config, own, other)
-                leak = _leak_odds(_pick(found, here), _pick(found, found.capture == other), factors, radio)
+                sources = take_rows(found, found.capture == other)
+                leak = _leak_odds(take_rows(found, here), sources, factors, radio)
                 odds[:, other] = np.minimum(leak, 1e300)  # a sum of them stays finite
         total = odds.sum(axis=1)
         certain = 1.0 / (1.0 + total)
@@ -91,8 +92,3 @@ def _leak_odds(
     leak = np.mean(np.exp(-miss / spread) / (np.pi * spread), axis=-1)
     own = DENSITY / (2.0 * np.pi * DYNAMIC_RANGE * np.abs(found.gain) ** 2)
     return np.bincount(row, place[row, source] * leak, minlength=len(place)) / own
-
-
-def _pick(found: ReportedComponents, rows: Booleans) -> ReportedComponents:
-    """Select by row the multipath components whose panel probability is asked."""
-    return ReportedComponents._make(field[rows] for field in found)

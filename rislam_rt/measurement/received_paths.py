@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats, Integers
+from rislam_rt.arrays import Complexes, Floats, Integers, join_rows
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.measurement.config import ReceiverConfig
@@ -77,8 +77,7 @@ class Clutter(NamedTuple):
     ) -> Received:
         """Received paths of a cycle with the clutter's appended, whose columns count on from `num_paths`."""
         more = receive(self.paths, cycle, heading, radio, config, self.doppler[cycle])
-        more = more._replace(path=more.path + num_paths)
-        return Received._make(np.concatenate(pair) for pair in zip(received, more, strict=True))
+        return join_rows([received, more._replace(path=more.path + num_paths)])
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, join_rows, take_rows
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement.components import ReportedComponents, capped_cosine_std, clip_to_unit_disc
 from rislam_rt.measurement.config import ReceiverConfig
@@ -109,9 +109,8 @@ def find_components(
 ) -> DetectedComponents:
     """Estimate the multipath components in a cycle's captures, starting from those of the previous cycle, if given."""
     parts = [_find(one, radio, config, _known(one, radio, previous)) for one in captures]
-    joined = [np.concatenate(fields) for fields in zip(*parts, strict=True)]
-    order = np.argsort(joined[0])
-    return DetectedComponents._make(field[order] for field in joined)
+    joined = join_rows(parts)
+    return take_rows(joined, np.argsort(joined[0]))
 
 
 def measure_waveform(

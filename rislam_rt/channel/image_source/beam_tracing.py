@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, row_blocks
+from rislam_rt.arrays import Booleans, Floats, Integers, row_blocks, take_rows
 from rislam_rt.channel.image_source.wall_facets import WallFacets
 from rislam_rt.channel.image_source.wall_rectangles import Rectangles
 from rislam_rt.constants import SURFACE_TOLERANCE
@@ -122,10 +122,6 @@ class Beams(NamedTuple):
     offset: Floats
     """(N, P) [m] offsets of the half-spaces."""
 
-    def only(self, keep: Booleans | Integers | slice) -> "Beams":
-        """Select beams by row."""
-        return Beams(self.ball[keep], self.walls[keep], self.image[keep], self.normal[keep], self.offset[keep])
-
 
 class FoundSequences(NamedTuple):
     """Wall sequences (N, d) that beam tracing leaves possible, with device's and far end's bounding ball (N,)."""
@@ -169,11 +165,11 @@ def _followed(
     if more == 0:
         return
     for rows in row_blocks(len(beams.ball), len(clusters.rectangles.center), _BLOCK, 256):
-        block = beams.only(rows)
+        block = take_rows(beams, rows)
         row, wall = clusters.reached(block.normal, block.offset)
         row, wall = _facing(clusters.rectangles, block, row, wall, far.radius)
         for some in row_blocks(len(row), 4 * (block.normal.shape[1] + 5), _BLOCK, 256):
-            grown = _through(clusters.rectangles, block.only(row[some]), wall[some], far.radius)
+            grown = _through(clusters.rectangles, take_rows(block, row[some]), wall[some], far.radius)
             yield from _followed(clusters, grown, device, far, pairs, more - 1)
 
 

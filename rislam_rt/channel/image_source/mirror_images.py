@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, join_rows, take_rows
 from rislam_rt.channel.image_source.antennas import LegEnds
 from rislam_rt.channel.image_source.fresnel import Coatings
 from rislam_rt.channel.image_source.leg_candidates import SequenceSearch, candidate_rows
@@ -22,10 +22,6 @@ class ImageRays(NamedTuple):
     walls: Integers
     bounces: Floats
     image: Floats
-
-    def only(self, keep: Booleans) -> "ImageRays":
-        """Select the legs by mirror images where `keep` (N,) holds."""
-        return ImageRays(self.cycle[keep], self.walls[keep], self.bounces[keep], self.image[keep])
 
 
 def find_legs(
@@ -53,7 +49,7 @@ def find_legs(
         rays = _reflected_rays(facets, cycle, walls, device, far)
         found.setdefault(walls.shape[1], []).append(rays)
     blockers = facets.possible_blockers(np.concatenate([device, far]))
-    joined = (ImageRays._make(np.concatenate(part) for part in zip(*parts, strict=True)) for parts in found.values())
+    joined = map(join_rows, found.values())
     visible = [_visible(facets, rays, device, far, blockers, host, front, landmark) for rays in joined]
     return _legs(facets, coatings, [rays for rays in visible if len(rays.cycle)], device, depth, terminals)
 
@@ -106,7 +102,7 @@ def _visible(
         rows = np.flatnonzero(keep)
         own = landmark if segment == bounces else -1
         keep[rows] = ~facets.occluders.hides(points[rows, segment], points[rows, segment + 1], own)
-    return rays.only(keep)
+    return take_rows(rays, keep)
 
 
 def _legs(

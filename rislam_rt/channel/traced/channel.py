@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rislam_rt.arrays import join_rows
 from rislam_rt.channel.occluders import ALONE
 from rislam_rt.channel.path_composition import compose_paths
 from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.float32_limits import room_center
-from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch, join_found
+from rislam_rt.channel.traced.leg_query import FoundLegs, LegQuery, QueryBatch, build_batch
 from rislam_rt.channel.traced.path_geometry import refined_geometry, traced_geometry
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.traced.wall_sequences import CandidateIndices, in_blocks, wall_sides
@@ -98,7 +99,7 @@ class TracedChannel:
             batch = build_batch([queries[number] for number in chosen], self.tracer_scene, self._sides, depth)
             complete &= batch.complete
             blocks = in_blocks(batch.candidates(self.tracer_scene), BLOCK_ROWS)
-            found = join_found([self._solve(batch, rows, spared) for rows in blocks])
+            found = join_rows(self._solve(batch, rows, spared) for rows in blocks)
             legs |= dict(zip(chosen, batch.legs(found), strict=True))
         return [legs[number] for number in range(len(queries))], complete
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
+from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, take_rows
 from rislam_rt.channel.specular_legs import SpecularLegs
 from rislam_rt.channel.traced.float32_limits import LIFT
 from rislam_rt.channel.traced.path_geometry import PathGeometry
-from rislam_rt.channel.traced.wall_sequences import CandidateIndices, join_indices, point_sides, possible_sequences
+from rislam_rt.channel.traced.wall_sequences import CandidateIndices, point_sides, possible_sequences
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 
@@ -67,12 +67,6 @@ class FoundLegs(NamedTuple):
     coefficient: Complexes
     """(N,) field without spreading loss and carrier phase: reflections and antenna patterns."""
 
-    def only(self, keep: Integers) -> "FoundLegs":
-        """Select legs by row."""
-        return FoundLegs(
-            self.rows.only(keep), PathGeometry(*(part[keep] for part in self.geometry)), self.coefficient[keep]
-        )
-
 
 class QueryBatch(NamedTuple):
     """Several queries for legs in one set of tables, so that one solve of the tracer serves them all."""
@@ -121,7 +115,7 @@ class QueryBatch(NamedTuple):
         first_device = first_sequence = 0
         for query, sequences in zip(self.queries, self.sequences, strict=True):
             here = found.rows.sequence - first_sequence
-            answer = found.only(np.flatnonzero((here >= 0) & (here < len(sequences))))
+            answer = take_rows(found, np.flatnonzero((here >= 0) & (here < len(sequences))))
             rows = answer.rows
             result.append(
                 _as_legs(query, sequences, rows.device - first_device, rows.sequence - first_sequence, answer)
@@ -145,16 +139,6 @@ def build_batch(queries: Sequence[LegQuery], tracer_scene: "TracerScene", sides:
     device = np.concatenate([query.device for query in queries])
     far = np.concatenate([_lifted(query, walls) for query in queries])
     return QueryBatch(queries, sequences, device, far, complete)
-
-
-def join_found(parts: list[FoundLegs]) -> FoundLegs:
-    """Join the answers to leg queries: the legs found in several parts."""
-    geometries = zip(*(part.geometry for part in parts), strict=True)
-    return FoundLegs(
-        join_indices([part.rows for part in parts]),
-        PathGeometry(*(np.concatenate(column) for column in geometries)),
-        np.concatenate([part.coefficient for part in parts]),
-    )
 
 
 def _lifted(query: LegQuery, walls: Walls) -> Floats:

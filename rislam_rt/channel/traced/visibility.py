@@ -19,7 +19,7 @@ from sionna.rt.path_solvers.image_method import ImageMethod
 from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.utils import spawn_ray_to
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, take_rows
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_mask, as_points
 from rislam_rt.channel.traced.wall_sequences import NO_WALL, CandidateIndices, turned_round
@@ -67,11 +67,11 @@ def visible_rows(
     traced.schedule()  # one pass through the scene for all that is read below
     dr.eval()
     keep = _confirmed(tracer_scene, candidates, traced)
-    rows, vertices = rows.only(keep), read_vertices(tracer_scene, traced, keep, candidates[keep])
+    rows, vertices = take_rows(rows, keep), read_vertices(tracer_scene, traced, keep, candidates[keep])
     if spared == NO_OCCLUDER:
         return rows, vertices
     clear = _clear_of_occluder(tracer_scene, spared, candidates[keep], device[rows.device], vertices)
-    return rows.only(clear), vertices[clear]
+    return take_rows(rows, clear), vertices[clear]
 
 
 def _clear_of_occluder(

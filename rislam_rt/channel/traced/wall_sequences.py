@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, join_rows, take_rows
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import ConfigError
@@ -155,10 +155,6 @@ class CandidateIndices(NamedTuple):
     device: Integers
     sequence: Integers
 
-    def only(self, keep: Integers | slice) -> "CandidateIndices":
-        """Select candidates for legs (indices of devices, far ends, wall sequences) by row."""
-        return CandidateIndices(self.far[keep], self.device[keep], self.sequence[keep])
-
 
 def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[CandidateIndices]:
     """Yield candidates for legs (indices of wall sequences) in blocks of `size` rows, the last one shorter."""
@@ -166,13 +162,8 @@ def in_blocks(parts: Iterable[CandidateIndices], size: int) -> Iterator[Candidat
     for part in parts:
         waiting.append(part)
         while (count := sum(len(rows.far) for rows in waiting)) >= size:
-            together = join_indices(waiting)
-            yield together.only(slice(0, size))
-            waiting = [together.only(slice(size, count))]
+            together = join_rows(waiting)
+            yield take_rows(together, slice(0, size))
+            waiting = [take_rows(together, slice(size, count))]
     if waiting:
-        yield join_indices(waiting)
-
-
-def join_indices(parts: list[CandidateIndices]) -> CandidateIndices:
-    """Concatenate candidates for legs (indices of wall sequences) of several parts."""
-    return CandidateIndices(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        yield join_rows(waiting)

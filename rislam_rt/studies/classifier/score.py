@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, take_rows
 from rislam_rt.model import PathKind
 from rislam_rt.slam.classify import FEATURES, Network, blend, classify_geometric, log_odds
 from rislam_rt.studies.classifier.training_examples import Examples
@@ -96,7 +96,7 @@ def mean_over_rooms(rooms: list[Examples], rule: Rule, coverage: float, *, rng: 
 
 def importance(examples: Examples, network: Network, *, rng: np.random.Generator) -> dict[str, Floats]:
     """Importance of each feature of the classifier: loss of F1 (S,) when it is shuffled among the examples, S times."""
-    known = examples.pick(examples.labelled & ~examples.near)
+    known = take_rows(examples, examples.labelled & ~examples.near)
     full = f1(known.keep, odds_over_life(known, network) > 0.0)
     lost: dict[str, Floats] = {}
     for column, name in enumerate(FEATURES):

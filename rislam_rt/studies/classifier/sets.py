@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rislam_rt.arrays import join_rows
 from rislam_rt.errors import SceneError
 from rislam_rt.measurement import with_reference_snr
 from rislam_rt.model import RadioConfig, Scene, Trajectory
@@ -17,7 +18,7 @@ from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.scene.random_rooms.box_rooms import random_room
 from rislam_rt.studies.classifier.spec import LEARNT_FIRST, ClassifierSpec
-from rislam_rt.studies.classifier.training_examples import Examples, gather_walk, join
+from rislam_rt.studies.classifier.training_examples import Examples, gather_walk
 from rislam_rt.studies.classifier.walks import AIMED, POLICIES, random_walk, set_codes
 
 DEPTH = 2
@@ -40,12 +41,12 @@ class Sets(NamedTuple):
     @property
     def tested(self) -> Examples:
         """Test examples of all named rooms together."""
-        return join(list(self.test.values()))
+        return join_rows(self.test.values())
 
     @property
     def all_drawn(self) -> Examples:
         """Test examples of all drawn rooms together."""
-        return join(list(self.drawn.values()))
+        return join_rows(self.drawn.values())
 
 
 def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Sets:
@@ -71,7 +72,7 @@ def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell
     for seed in range(spec.drawn_first, spec.drawn_first + spec.drawn):
         drawn[f"random_{seed}"] = gather_drawn(seed, spec)
         progress("rooms to test on", len(test) + len(drawn), len(scenes) + spec.drawn)
-    return Sets(join(rooms[: spec.train]), join(rooms[spec.train :]), test, drawn)
+    return Sets(join_rows(rooms[: spec.train]), join_rows(rooms[spec.train :]), test, drawn)
 
 
 def gather_random(number: int, spec: ClassifierSpec) -> Examples:
@@ -116,7 +117,7 @@ def gather_room(scene: Scene, depth: int, spec: ClassifierSpec) -> Examples:
         rng = np.random.default_rng([spec.seed, name, 0, walk])
         motion, number = random_walk(scene, spec.cycles, rng=rng), 1000 * (name % 1_000_000) + walk
         parts.append(gather_motion(scene, motion, depth, radio, spec, number, range(len(POLICIES)), rng=rng))
-    return join(parts)
+    return join_rows(parts)
 
 
 def gather_motion(
@@ -131,4 +132,4 @@ def gather_motion(
     for policy in policies if panel is not None else [-1]:
         lit = set_codes(paths, panel, POLICIES[policy], rng=rng)
         parts.append(gather_walk(lit, motion, radio, receiver, (walk, policy), spec.stride, rng=rng))
-    return join(parts)
+    return join_rows(parts)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.arrays import Booleans, Floats, take_rows
 from rislam_rt.slam.classify import Network
 from rislam_rt.studies.classifier.score import (
     ClassifierScore,
@@ -125,7 +125,7 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
 
 def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
     """Train one network of the classifier from one random start."""
-    known, section = examples.pick(examples.labelled & ~examples.near), spec.network
+    known, section = take_rows(examples, examples.labelled & ~examples.near), spec.network
     return train_network(
         known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
     )
@@ -148,5 +148,5 @@ def balance(examples: Examples) -> Floats:
 
 def _f1_of(examples: Examples, network: Network) -> float:
     """F1 of a network on the examples that are paths."""
-    known = examples.pick(examples.labelled)
+    known = take_rows(examples, examples.labelled)
     return f1(known.keep, rules(network)["network"](known))

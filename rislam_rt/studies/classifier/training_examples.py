@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, join_rows
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
@@ -55,15 +55,6 @@ class Examples(NamedTuple):
         """Whether each example (N,) is a path, not clutter."""
         return self.kind != CLUTTER
 
-    def pick(self, rows: Booleans | Integers) -> "Examples":
-        """Training examples of these rows."""
-        return Examples._make(field[rows] for field in self)
-
-
-def join(parts: list[Examples]) -> Examples:
-    """Join several sets of the classifier's training examples."""
-    return Examples._make(np.concatenate(fields) for fields in zip(*parts, strict=True))
-
 
 def gather_walk(
     paths: Paths, motion: Trajectory, radio: RadioConfig, receiver: ReceiverConfig, name: tuple[int, int], stride: int,
@@ -99,7 +90,7 @@ def gather_walk(
             kind, legs = _classes(paths, truth.path)
             ratio = measurement.amplitude * spread  # a false component may have no length
             found.append(Examples(features, kind, legs, age, ratio, walk, policy, info.label, ~far))
-    return join(found)
+    return join_rows(found)
 
 
 def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, join_rows
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.gaussian_features import POINT, WALL, WANDERER, Ends, GaussianFeatures
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory
@@ -118,7 +118,7 @@ def born(
 ) -> GaussianFeatures:  # fmt: skip
     """New features of BP-SLAM with angles as Gaussian sums, one feature for each set of birth hypotheses."""
     owner = np.repeat(np.arange(len(found)), [len(each.kind) for each in found])
-    parts = BirthHypotheses._make(np.concatenate(column) for column in zip(*found, strict=True))
+    parts = join_rows(found)
     place, by_agent, by_polar = _placed(parts.kind, parts.polar, course.mean[:3], ends)
     root = by_polar * parts.std[:, None]
     covariance = root @ root.swapaxes(1, 2) + LEAST_VARIANCE * np.eye(3)

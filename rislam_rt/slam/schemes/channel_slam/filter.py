@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, take_rows
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.input_checks import check_step
 from rislam_rt.slam.schemes.channel_slam import tracker
@@ -91,7 +91,7 @@ def estimate(state: ChannelSlamState, config: ChannelSlamConfig) -> SlamEstimate
     """Estimate of Channel-SLAM: moments and samples of the pose, and virtual transmitters whose place is known."""
     found = known_points(state.sums, 0.5)
     clear = np.trace(found.covariance, axis1=1, axis2=2) < config.shown_std**2
-    return reported(state.agent, found.keep(clear), config.num_samples)
+    return reported(state.agent, take_rows(found, clear), config.num_samples)
 
 
 def _move(state: ChannelSlamState, dt: float, config: ChannelSlamConfig) -> ChannelSlamState:
@@ -111,7 +111,7 @@ def _label(
     speed = float(np.linalg.norm(state.agent.pose[1]))
     tracks, label = follow(tracks, found, scan.length, scan.std, 2.0 * speed + 0.02, state.next_label)
     patience = np.where(tracks.hits >= config.confirm_hits, config.max_misses, 1)
-    tracks = tracks.keep(tracks.misses <= patience)
+    tracks = take_rows(tracks, tracks.misses <= patience)
     first = max(state.next_label, int(label.max(initial=-1)) + 1)
     state = state._replace(tracks=tracks, next_label=first)
     return _keep(state, np.isin(state.sums.ident, tracks.label), config), label

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers, join_rows
 
 UNLABELLED = -1
 """Label of a range that continues no track."""
@@ -28,10 +28,6 @@ class RangeTracks(NamedTuple):
     """Number (T,) of ranges so far."""
     misses: Integers
     """Number (T,) of cycles since the last range."""
-
-    def keep(self, rows: Booleans) -> "RangeTracks":
-        """Some of the tracks of ranges, by a mask (T,)."""
-        return RangeTracks._make(column[rows] for column in self)
 
 
 def no_tracks() -> RangeTracks:
@@ -83,4 +79,4 @@ def follow(
     )  # fmt: skip
     label = np.empty(len(length), dtype=np.int64)
     label[hit], label[spare] = tracks.label[rows], fresh
-    return RangeTracks._make(np.concatenate(pair) for pair in zip(old, new, strict=True)), label
+    return join_rows([old, new]), label

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, join_rows
 from rislam_rt.slam.schemes.shared.agent_trajectory import AgentTrajectory, Step
 from rislam_rt.slam.schemes.shared.ranges import Bistatic, length_of
 
@@ -211,8 +211,7 @@ def born(
 
 def join(one: Features, other: Features) -> Features:
     """Two sets of features with their Gaussians, concatenated."""
-    moved = other._replace(owner=other.owner + len(one.ident))
-    return type(one)._make(np.concatenate(pair) for pair in zip(one, moved, strict=True))
+    return join_rows([one, other._replace(owner=other.owner + len(one.ident))])
 
 
 def prune(features: Features, least_existence: float, least_share: float, most: int) -> Features:

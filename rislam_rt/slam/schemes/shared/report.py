@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import SlamEstimate
 from rislam_rt.slam.schemes.shared.gaussian_sums import POINT, Sums, unit_of
 from rislam_rt.slam.step_info import StepOutcome
@@ -34,10 +34,6 @@ class Points(NamedTuple):
     """Mean positions (V, 3) [m]."""
     covariance: Floats
     """Covariances (V, 3, 3) [m^2] of the positions."""
-
-    def keep(self, rows: Booleans) -> "Points":
-        """Some of the points to report, by a mask (V,)."""
-        return Points._make(column[rows] for column in self)
 
 
 def lift(known: Floats, height: Floats) -> Floats:
