@@ -71,9 +71,7 @@ def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
     paths = aimed_paths(paths, scene.ris.spec, settings.radio)
     margin = np.full((len(scene.panels), count), np.nan)
     for path in np.flatnonzero(paths.kind == PathKind.RIS):
-        heard = paths.valid[:, path]
-        if settings.radio.array.pattern == "upper":
-            heard = heard & (paths.arrival[:, path, 2] >= -HORIZON_MARGIN)
+        heard = paths.valid[:, path] & settings.radio.array.receives(paths.arrival[:, path, 2], HORIZON_MARGIN)
         snr = settings.radio.integrated_snr(paths.gain[:, path]) / settings.sensor.threshold
         margin[paths.panel[path], heard] = np.maximum(10.0 * np.log10(np.maximum(snr[heard], 1e-40)), NOTHING_DB)
     return margin

@@ -46,9 +46,7 @@ def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
     assert paths.ris is not None
     index = np.zeros((paths.num_cycles, spec.num_elements), dtype=np.int64)
     best = np.zeros((len(spec.panels), paths.num_cycles))
-    heard = paths.valid
-    if radio.array.pattern == "upper":
-        heard = heard & (paths.arrival[..., 2] >= -HORIZON_MARGIN)
+    heard = paths.valid & radio.array.receives(paths.arrival[..., 2], HORIZON_MARGIN)
     for path in np.flatnonzero(paths.ris.tx_leg >= 0):
         panel = int(paths.panel[path])
         own = spec.span(panel)
@@ -61,9 +59,4 @@ def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:
 
 def aimed_paths(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Paths:
     """Propagation paths of a room with their gains under RIS codes aimed at the agent."""
-    return paths_under_codes(paths, spec, aimed_codes(paths, spec, radio))
-
-
-def paths_under_codes(paths: Paths, spec: DataSheet, index: Integers) -> Paths:
-    """Propagation paths of a room with their gains under RIS codes of phase levels (K, N, M), for the forecast."""
-    return rephase(paths, RisCode(index, spec.levels))
+    return rephase(paths, RisCode(aimed_codes(paths, spec, radio), spec.levels))

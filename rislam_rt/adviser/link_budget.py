@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.forecast_codes import codes_of, paths_under_codes
+from rislam_rt.adviser.forecast_codes import codes_of
 from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers, take_rows
 from rislam_rt.channel.image_source import ImageSourceChannel
@@ -13,8 +13,9 @@ from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound_receiver import NEGLIGIBLE
 from rislam_rt.measurement.components import NoiselessComponents, merge, single
 from rislam_rt.measurement.slot_motion import split_by_code
-from rislam_rt.model import Paths, Scene, SensorModel
+from rislam_rt.model import Paths, RisCode, Scene, SensorModel
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
+from rislam_rt.ris import rephase
 
 
 class DetectionForecast(NamedTuple):
@@ -132,8 +133,9 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
     if scene.ris is None:
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[LandmarkLink] = []
-    for codes in codes_of(paths, scene.ris.spec, settings.radio, rng=rng):
-        heard = [_all_places(paths_under_codes(paths, scene.ris.spec, levels), looked) for levels in codes.levels]
+    spec = scene.ris.spec
+    for codes in codes_of(paths, spec, settings.radio, rng=rng):
+        heard = [_all_places(rephase(paths, RisCode(levels, spec.levels)), looked) for levels in codes.levels]
         if codes.name == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
         links += [

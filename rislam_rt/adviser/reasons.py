@@ -42,8 +42,8 @@ class Reasons(NamedTuple):
         own = (self.paths.landmark == number) & self.paths.valid[place]
         if blocker and weak:
             return f"shaded by '{blocker}'"
-        upper = self.settings.radio.array.pattern == "upper"
-        if own.any() and upper and (self.paths.arrival[place, own, 2] < -HORIZON_MARGIN).all():
+        array = self.settings.radio.array
+        if own.any() and not array.receives(self.paths.arrival[place, own, 2], HORIZON_MARGIN).any():
             return "below the array, which hears from above only"
         if not weak and covered >= 0:
             return f"not to be told from {self.paths.label(covered)}"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers, cross
-from rislam_rt.geometry.triangles import triangle_planes
+from rislam_rt.geometry.triangles import edge_ends, triangle_edges, triangle_planes
 from rislam_rt.model import Scene
 
 ALONE = -2
@@ -109,9 +109,8 @@ def _outline(triangles: Floats, direction: Floats) -> Floats:
     """Silhouette edges (E, 2, 3) [m] of an occluder's triangles (T, 3, 3) along a direction, and its open edges."""
     normal, _ = triangle_planes(triangles)
     ahead = np.repeat(normal @ direction > 0.0, 3)
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-    _, corner = np.unique(np.round(edges.reshape(-1, 3), 9), axis=0, return_inverse=True)
-    ends = np.sort(corner.reshape(-1, 2), axis=1)
+    edges = triangle_edges(triangles)
+    ends = edge_ends(edges)
     _, first, which, count = np.unique(ends, axis=0, return_index=True, return_inverse=True, return_counts=True)
     turned = np.bincount(which.ravel(), weights=ahead)
     return edges[first[(count == 1) | ((turned > 0) & (turned < count))]]

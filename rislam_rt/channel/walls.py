@@ -5,12 +5,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, cross
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import stack_walls, tracer_gap
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.planes import signed_distance
+from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Material, Reflector, RisPanel, Scene
 
 
@@ -49,8 +50,7 @@ class Walls:
     def largest_triangles(self) -> tuple[Integers, Floats]:
         """Number (W,) of the largest triangle of each wall of a scene, and its altitude (W,) [m] on its longest
         side."""
-        edges = self.triangles[:, 1:] - self.triangles[:, :1]
-        area = np.linalg.norm(cross(edges[:, 0], edges[:, 1]), axis=-1)
+        area = np.linalg.norm(triangle_cross(self.triangles), axis=-1)
         order = np.lexsort((-area, self.wall_of_triangle))
         largest = order[np.unique(self.wall_of_triangle[order], return_index=True)[1]]
         sides = np.roll(self.triangles[largest], -1, axis=1) - self.triangles[largest]
@@ -59,8 +59,7 @@ class Walls:
     def surface(self, wall: int) -> tuple[Floats, Floats]:
         """Centroid (3,) [m] of one of the scene's walls, and the share (t,) of each of its triangles in its area."""
         triangles = self.triangles[self.wall_of_triangle == wall]
-        edges = triangles[:, 1:] - triangles[:, :1]
-        area = np.linalg.norm(cross(edges[:, 0], edges[:, 1]), axis=-1)
+        area = np.linalg.norm(triangle_cross(triangles), axis=-1)
         weight = area / area.sum()
         return weight @ triangles.mean(axis=1), weight
 

@@ -41,16 +41,26 @@ def edge_planes(triangles: Floats) -> tuple[Floats, Floats]:
     return inward, np.where(solid, np.einsum("tei,tei->te", inward, triangles), np.inf)
 
 
-def outline_edges(triangles: Floats, wall: Integers | None = None) -> Floats:
-    """Outline edges (E, 2, 3) [m] of a mesh: those of one triangle (T, 3, 3) alone, or of one alone of its wall
-    (T,).
+def triangle_edges(triangles: Floats) -> Floats:
+    """Edges (3T, 2, 3) [m] of triangles (T, 3, 3), those of a triangle in turn."""
+    return np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+
+
+def edge_ends(edges: Floats) -> Integers:
+    """Numbers (E, 2) of the corners at which the edges (E, 2, 3) [m] of triangles end, the lower first.
 
     Corners count as the same when they agree to a nanometre.
     """
-    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
     _, corner = np.unique(np.round(edges.reshape(-1, 3), 9), axis=0, return_inverse=True)
+    return np.sort(corner.reshape(-1, 2), axis=1)
+
+
+def outline_edges(triangles: Floats, wall: Integers | None = None) -> Floats:
+    """Outline edges (E, 2, 3) [m] of a mesh: those of one triangle (T, 3, 3) alone, or of one alone of its wall
+    (T,)."""
+    edges = triangle_edges(triangles)
     owner = np.zeros(len(edges), dtype=np.int64) if wall is None else np.repeat(wall, 3)
-    key = np.column_stack([owner, np.sort(corner.reshape(-1, 2), axis=1)])
+    key = np.column_stack([owner, edge_ends(edges)])
     _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
     return edges[index[count == 1]]
 
@@ -69,11 +79,11 @@ def distance_to_triangles(points: Floats, triangles: Floats) -> Floats:
     """Distance (N,) [m] of points (N, 3) from the nearest of the triangles (T, 3, 3)."""
     normal, offset = triangle_planes(triangles)
     edge_normal, edge_offset = edge_planes(triangles)
+    edges = triangle_edges(triangles)
     nearest = np.full(len(points), np.inf)
     for rows in np.array_split(np.arange(len(points)), max(1, len(points) * len(triangles) // 200_000)):
         height = np.abs(points[rows] @ normal.T - offset)
         above = (np.einsum("ni,tei->nte", points[rows], edge_normal) >= edge_offset).all(axis=-1)
-        edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2, 3)
         plane = np.where(above, height, np.inf).min(axis=1, initial=np.inf)
         nearest[rows] = np.minimum(plane, distance_to_edges(points[rows], edges))
     return nearest

@@ -19,9 +19,7 @@ def heard_paths(paths: Paths, sensor: SensorModel, *, use_vt: bool) -> Paths:
     snr = sensor.radio.integrated_snr(paths.gain)
     detected = _detected(snr, sensor.threshold)
     heard = paths.valid & (snr * detected >= SILENT * sensor.threshold)
-    heard &= sensor.in_window(paths.tau)
-    if sensor.radio.array.pattern == "upper":
-        heard &= paths.arrival[..., 2] >= 0.0
+    heard &= sensor.in_window(paths.tau) & sensor.radio.array.receives(paths.arrival[..., 2])
     wanted = paths.landmark >= 0
     if use_vt:
         wanted |= paths.kind == PathKind.VT

@@ -48,9 +48,7 @@ def receive(
     """
     arrival = paths.arrival[cycle] @ rotation_z(np.array(heading))
     heard = paths.valid[cycle] & (paths.gain[cycle] != 0.0)
-    if radio.array.pattern == "upper":
-        heard &= arrival[:, 2] >= -HORIZON_MARGIN
-    path = np.flatnonzero(heard)
+    path = np.flatnonzero(heard & radio.array.receives(arrival[:, 2], HORIZON_MARGIN))
     kind = paths.kind[path]
     leakage = 10.0 ** (-config.leakage_cancellation_db / 20.0)
     gain = paths.gain[cycle, path] * np.where(kind == PathKind.LOS, leakage, 1.0)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rislam_rt.arrays import Complexes, Floats
+from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 
@@ -88,6 +88,11 @@ class RxArray:
     def num_antennas(self) -> int:
         """Number L of antennas of the radio's receive array."""
         return self.rows * self.cols
+
+    def receives(self, height: Floats, margin: float = 0.0) -> Booleans:
+        """Whether the radio's array receives rays from cosines `height` (...,) to its boresight, to `margin` below its
+        plane."""
+        return np.asarray((height >= -margin) | (self.pattern != "upper"))
 
     def positions(self, wavelength: float) -> Floats:
         """Element positions (L, 3) [m] of the radio's receive array in the body frame, about its centre."""

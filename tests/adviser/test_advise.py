@@ -9,16 +9,17 @@ import pytest
 
 from rislam_rt.adviser.advice import advise
 from rislam_rt.adviser.coverage import panel_coverage
-from rislam_rt.adviser.forecast_codes import aimed_paths, paths_under_codes
+from rislam_rt.adviser.forecast_codes import aimed_paths
 from rislam_rt.adviser.link_budget import LandmarkLink, Survey, forecast_detection, link_budget, survey
 from rislam_rt.adviser.remedies import HEARD, detection_label, enough_elements, lack_db, remedies, weak_places
 from rislam_rt.adviser.tracing_cost import COUNTED, cost_words, trace_cost
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import measure
-from rislam_rt.model import Occluder, PathKind, RisPanel, Scene
+from rislam_rt.model import Occluder, PathKind, RisCode, RisPanel, Scene
 from rislam_rt.model.ris import join_panels
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.specification.pipeline_spec import Settings, build_settings
+from rislam_rt.ris import rephase
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +71,7 @@ def test_no_random_code_beats_the_aimed_one(paper: Scene) -> None:
     rng = np.random.default_rng(2)
     for _ in range(20):
         other = rng.integers(paper.ris.spec.levels, size=(looked.paths.num_cycles, 6, 6))
-        gain = np.abs(paths_under_codes(looked.paths, paper.ris.spec, other).gain[:, panel])
+        gain = np.abs(rephase(looked.paths, RisCode(other, paper.ris.spec.levels)).gain[:, panel])
         assert (gain.max(axis=1) < best.max(axis=1)).all()
 
 

@@ -17,9 +17,7 @@ def audible_paths(paths: Paths, settings: Settings, *, use_vt: bool) -> Booleans
     """
     sensor = settings.sensor
     heard = paths.valid & (settings.radio.integrated_snr(paths.gain) >= sensor.threshold)
-    heard &= sensor.in_window(paths.tau)
-    if settings.radio.array.pattern == "upper":
-        heard &= paths.arrival[..., 2] >= 0.0
+    heard &= sensor.in_window(paths.tau) & settings.radio.array.receives(paths.arrival[..., 2])
     counted = paths.landmark >= 0
     if use_vt:
         counted |= paths.kind == PathKind.VT

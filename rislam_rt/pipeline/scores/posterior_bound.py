@@ -125,9 +125,8 @@ def over_distortion(paths: Paths, settings: Settings) -> Complexes:
         return paths.gain
     leakage = 10.0 ** (-receiver.leakage_cancellation_db / 20.0)
     direct = paths.kind == PathKind.LOS
-    heard = np.where(direct, leakage, 1.0) * np.abs(paths.gain) * paths.valid
-    if radio.array.pattern == "upper":
-        heard = heard * (paths.arrival[..., 2] >= -HORIZON_MARGIN)
+    there = paths.valid & radio.array.receives(paths.arrival[..., 2], HORIZON_MARGIN)
+    heard = np.where(direct, leakage, 1.0) * np.abs(paths.gain) * there
     power = np.sum(heard**2, axis=1)
     extra = expected_distortion(hardware, radio, receiver, power, np.sum(np.abs(paths.gain[:, direct]) ** 2, axis=1))
     return np.asarray(paths.gain * np.sqrt(radio.noise_psd / (radio.noise_psd + extra))[:, None])
