@@ -45,6 +45,13 @@ def test_two_fixed_points_give_every_landmark_path_its_length_and_direction(room
         np.testing.assert_allclose(direction[here], paths.arrival[here, path], atol=1e-9)
 
 
+def only(paths, kept):
+    """The paths of some columns (P,)."""
+    per_path = {n: getattr(paths, n)[kept] for n in ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices")}
+    names = ("valid", "tau", "departure", "arrival", "vertices", "gain")
+    return replace(paths, **per_path, **{n: getattr(paths, n)[:, kept] for n in names}, ris=None)
+
+
 def tilted(normal, first, second):
     turned = normal + first + second
     return turned / np.linalg.norm(turned)
@@ -212,11 +219,7 @@ def test_errors_of_walls_are_those_of_planes_drawn_from_the_covariance(room):
 def test_wall_returns_alone_do_not_tell_where_the_agent_is(room):
     """Their walls are unknown: the whole may be shifted, so that the start's own error stays."""
     paths, motion, *_ = room
-    kept = paths.kind == PathKind.VT
-    per_path = {n: getattr(paths, n)[kept] for n in ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices")}
-    names = ("valid", "tau", "departure", "arrival", "vertices", "gain")
-    returns = replace(paths, **per_path, **{n: getattr(paths, n)[:, kept] for n in names}, ris=None)
-    model = build((returns, *room[1:]), "planes")
+    model = build((only(paths, paths.kind == PathKind.VT), *room[1:]), "planes")
     faint = replace(model, radio=RadioConfig(noise_psd=1e-11))
     prior = MotionPrior(0.0, 0.1, 0.0)
     found = posterior_bound(faint.rows(0.0, use_vt=True), motion.time, prior, model.prior_std())
@@ -231,10 +234,7 @@ def test_a_wall_known_by_one_image_is_as_sharp_as_that_image_seen_from_its_point
     single = (paths.kind == PathKind.VS) & (paths.rx_walls[:, 0] >= 0) & (paths.rx_walls[:, 1:] < 0).all(axis=1)
     single &= (paths.tx_walls < 0).all(axis=1)
     column = np.flatnonzero(single)[0]
-    kept = np.arange(paths.num_paths) == column
-    per_path = {n: getattr(paths, n)[kept] for n in ("kind", "landmark", "tx_walls", "rx_walls", "num_vertices")}
-    names = ("valid", "tau", "departure", "arrival", "vertices", "gain")
-    one = replace(paths, **per_path, **{n: getattr(paths, n)[:, kept] for n in names}, ris=None)
+    one = only(paths, [column])
     wall, point = int(paths.rx_walls[column, 0]), landmark[paths.landmark[column]]
     still = MotionPrior(0.0, 0.0, 0.0)
     bounds = {}

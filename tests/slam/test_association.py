@@ -32,6 +32,14 @@ def draw_candidates(count: int, *, rng: np.random.Generator) -> Candidates:
     )
 
 
+def one(std: float = 0.05, side: int = UNTOLD, fades: bool = False) -> Candidates:
+    """A candidate at nought, whose log amplitude has such a deviation."""
+    return Candidates(
+        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, std), np.zeros(1), np.full(1, side),
+        np.full(1, fades),
+    )  # fmt: skip
+
+
 def associate(candidates: Candidates, observations: Observations, clutter: float = CLUTTER) -> Integers:
     """Measurement (C,) of each candidate, -1 for none."""
     chosen = np.full(len(candidates.seen), -1)
@@ -88,10 +96,7 @@ def test_cost_is_the_likelihood_ratio_against_clutter(rng: np.random.Generator) 
 @pytest.mark.parametrize("axis", range(4))
 def test_beyond_the_gate_nothing_is_paired(axis: int) -> None:
     """Just inside the squared distance in delay, either cosine or log amplitude, and just outside."""
-    found = Candidates(
-        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, UNTOLD),
-        np.zeros(1, dtype=np.bool_),
-    )  # fmt: skip
+    found = one()
     for factor, paired in ((0.99, True), (1.01, False)):
         seen, fade = np.zeros((1, 3)), np.zeros(1)
         if axis < 3:
@@ -123,10 +128,7 @@ def test_squared_distances(rng: np.random.Generator) -> None:
     ("mine", "other", "paired"), [(PANEL, OTHER, False), (PANEL, PANEL, True), (UNTOLD, OTHER, True)]
 )
 def test_what_runs_over_the_panel_is_not_paired_with_what_does_not(mine: int, other: int, paired: bool) -> None:
-    found = Candidates(
-        np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, 0.05), np.zeros(1), np.full(1, mine),
-        np.zeros(1, dtype=np.bool_),
-    )  # fmt: skip
+    found = one(side=mine)
     seen = observed(np.zeros((1, 3)), np.zeros(1))._replace(side=np.full(1, other))
     assert (associate(found, seen, 1e-9)[0] == 0) == paired
 
@@ -137,8 +139,5 @@ def test_a_panel_under_unknown_phases_is_a_rayleigh_variable_and_never_far_loude
     moments = [density.sum(), (density * surplus).sum(), (density * surplus**2).sum()]
     np.testing.assert_allclose(moments, [1.0, 0.0, PANEL_STD**2], atol=1e-5)
     for fades, louder, paired in ((True, 0.5, True), (True, 2.0, False), (False, 2.0, True)):
-        found = Candidates(
-            np.zeros((1, 3)), 1e-4 * np.eye(3)[None], np.zeros(1), np.full(1, PANEL_STD), np.zeros(1),
-            np.full(1, UNTOLD), np.full(1, fades),
-        )  # fmt: skip
+        found = one(PANEL_STD, fades=fades)
         assert (associate(found, observed(np.zeros((1, 3)), np.full(1, louder)))[0] == 0) == paired
