@@ -9,7 +9,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.slam.input_checks import check_step
-from rislam_rt.slam.observations import free_space, is_los, observations_of
+from rislam_rt.slam.observations import free_space, is_los, observations_of, stranger_density
 from rislam_rt.slam.schemes.bp_slam_aoa import gaussian_features
 from rislam_rt.slam.schemes.bp_slam_aoa.config import BpSlamAoaConfig
 from rislam_rt.slam.schemes.bp_slam_aoa.feature_association import View, claims, expect_scan, likelihoods, spread_of
@@ -143,9 +143,7 @@ def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConf
     aside = is_los(observed, state.body) | is_strong(observed.ratio, None if config.use_vt else config.specular_ratio)
     rows = np.flatnonzero(~aside)
     observed = observed.take(rows)
-    snr = sensor.radio.integrated_snr(np.exp(observed.log_amplitude))
-    false = sensor.false_alarm_density(observed.seen[:, 0] / SPEED_OF_LIGHT, observed.seen[:, 1:]) / SPEED_OF_LIGHT
-    false = np.maximum(false * 2.0 * snr * sensor.false_alarm_snr_density(snr), LEAST_FALSE)
+    false = np.maximum(stranger_density(observed, sensor, 0.0), LEAST_FALSE)
     return ComponentScan(observed.seen, observed.std, observed.log_amplitude, observed.log_amplitude_std, false), rows
 
 
