@@ -178,7 +178,7 @@ class AgentSection(SceneSection):
     velocity: Vector | None = None
     trajectory: str | None = None
     columns: dict[str, str] | None = None
-    """Names of a CSV file's columns, where not as `recorded_poses.COLUMNS`."""
+    """Names of a CSV file's columns, where not as `recorded_columns.COLUMNS`."""
     waypoints: Annotated[list[Vector], Field(min_length=2, max_length=10_000)] | None = None
     random_walk: WalkSection | None = None
     speed_m_s: Length | None = None
