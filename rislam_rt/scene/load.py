@@ -12,7 +12,7 @@ from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
 from rislam_rt.scene.check import faint_slabs, find_errors, find_warnings, material_errors
-from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
+from rislam_rt.scene.check.units import SPEED_FIELD, recording_unit_warnings, unit_warnings
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
@@ -63,7 +63,10 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
         return _check_read(scene, scene.name, radio)
     draft = read_draft(scene)
     findings = draft.findings if draft.scene is None else _check_read(draft.scene, draft.file, radio)
-    units = list(unit_warnings(draft.file, _plain_table(Path(draft.file)), draft.bounds))
+    table = _plain_table(Path(draft.file))
+    units = list(unit_warnings(draft.file, table, draft.bounds))
+    if draft.scene is not None and draft.bounds is not None and "trajectory" in table.get("agent", {}):
+        units += recording_unit_warnings(draft.file, draft.scene.agent, draft.bounds)
     if any(finding.severity == "error" for finding in findings):
         return findings + units
     return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it

@@ -53,11 +53,12 @@ def test_each_quantity_is_named_with_its_place() -> None:
     wall = {"material": {"itu": "concrete", "thickness_m": 200.0}}
     agent = {"cycle_s": 100, "velocity": [0, 70.7, 0]}
     table = {"reflector": [{"material": {"reflection": 0.5}}, wall], "agent": agent}
-    lines = said(table)
+    lines = said(table | {"scatterer": [{"radius": 0.05}, {"radius": 5}]})
+    assert any("scatterer[1].radius: 5 m; in millimetres it would be 0.005 m" in line for line in lines)
     assert any("reflector[1].material.thickness_m: 200 m; in millimetres it would be 0.2 m" in line for line in lines)
     assert any("agent.cycle_s: 100 s; in milliseconds it would be 0.1 s" in line for line in lines)
     assert any("agent.velocity: 70.7 m/s" in line for line in lines)
-    assert len(lines) == 3
+    assert len(lines) == 4
 
 
 def test_usual_numbers_wrong_types_and_points_lost_for_other_reasons_are_left_alone() -> None:
@@ -65,6 +66,23 @@ def test_usual_numbers_wrong_types_and_points_lost_for_other_reasons_are_left_al
     assert not said({"agent": {"start": "500", "cycle_s": True, "velocity": [None]}, "ris": [3], "reflector": 7})
     assert not said({"agent": {"start": [9e4, 9e4, 9e4]}})
     assert not said({"agent": {"start": [500.0, 700.0, 500.0]}}, None)
+
+
+def test_a_recording_in_millimetres_or_milliseconds_is_named(damaged: Damage) -> None:
+    damaged("start = [0.5, 0.7, 0.5]\n", "")
+    damaged("cycles = 600\ncycle_s = 0.1\n", "")
+    room = damaged("velocity = [0.0707, 0.0707, 0.0]", 'trajectory = "w.csv"')
+
+    def found(time: int, place: int) -> list[str]:
+        rows = "".join(f"{time * k},{(1 + 0.01 * k) * place},{place},{place}\n" for k in range(4))
+        (room / "w.csv").write_text(f"time,x,y,z\n{rows}")
+        return [one.line for one in check_scene(room) if one.field == "agent.trajectory"]
+
+    assert not found(1, 1)
+    assert (
+        "[1000.0, 1000.0, 1000.0] is far outside the room; in millimetres it would be [1.0, 1.0," in found(1, 1000)[0]
+    )
+    assert "100 s between poses; in milliseconds it would be 0.1 s; give seconds, or end" in found(100, 1)[0]
 
 
 def test_a_toy_and_a_city_are_named() -> None:

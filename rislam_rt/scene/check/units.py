@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.model import Trajectory
 from rislam_rt.scene.findings import Finding
 from rislam_rt.scene.mesh_placement import UNITS
 
@@ -21,12 +22,15 @@ USUAL_ROOM = (2.0, 100.0)
 """Range [m] of the longest side of rooms, to tell which unit was meant."""
 FAR = 3.0
 """Distance of a point from the room, in sizes of the room, above which it was given in another unit."""
+LONGEST_CYCLE = 10.0
+"""Longest cycle [s] taken for meant."""
 LIMITS = (
     (("ris", "spacing_m"), 0.5, "m", "millimetres", 1e-3),
     (("reflector", "material", "thickness_m"), 3.0, "m", "millimetres", 1e-3),
-    (("agent", "cycle_s"), 10.0, "s", "milliseconds", 1e-3),
+    (("agent", "cycle_s"), LONGEST_CYCLE, "s", "milliseconds", 1e-3),
     (("agent", "velocity"), 10.0, "m/s", "millimetres a second", 1e-3),
     (("agent", "speed_m_s"), 10.0, "m/s", "millimetres a second", 1e-3),
+    (("scatterer", "radius"), 2.0, "m", "millimetres", 1e-3),
     (("agent", "tx_offset_m"), 2.0, "m", "millimetres", 1e-3),
     (("agent", "rx_offset_m"), 2.0, "m", "millimetres", 1e-3),
 )
@@ -62,6 +66,17 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
             yield from _far_point(file, field, point, bounds)
 
 
+def recording_unit_warnings(file: str, agent: Trajectory, bounds: Floats) -> Iterator[Finding]:
+    """Scene check: warnings of a recording whose times or places look as if they were in another unit; `bounds`
+    (2, 3) [m] are those of the meshes."""
+    field, step = "agent.trajectory", np.diff(agent.time)
+    usual = float(np.median(step)) if len(step) else 0.0
+    if usual > LONGEST_CYCLE:
+        message = f"{usual:.3g} s between poses; in milliseconds it would be {usual * 1e-3:.3g} s"
+        yield Finding("warning", file, field, message, "give seconds, or end the name of a CSV column in _ms")
+    yield from _far_point(file, field, agent.position[0], bounds)
+
+
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
     """Message that the room's size looks as if in a wrong unit, and how to mend it; None if it does not."""
     size = bounds[1] - bounds[0]
@@ -75,7 +90,7 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
                 return f"the room is {words} m; in {unit} it would be {meant} m", mend
         return f"the room is {words} m", "give metres"
     if longest < SMALLEST_ROOM:
-        return f"the room is {words} m", "give metres; a drawing in kilometres or to a scale has to be enlarged"
+        return f"the room is {words} m", "give its units in the table [meshes]; a drawing to a scale has to be enlarged"
     return None
 
 
