@@ -211,7 +211,7 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
 
 def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     """Warnings of a run, one line each: a RIS panel so large that the band resolves its elements' delays, an agent
-    faster than the receiver reckons with as it tells the panel's paths from others, or one that no floor lets manoeuvre so.
+    faster than the receiver reckons with as it tells the panel's paths from others, or manoeuvring as on no floor.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.

@@ -7,6 +7,7 @@ import re
 import unicodedata
 from pathlib import Path, PurePosixPath
 
+from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.scene.findings import Fault, one_line
 
 
@@ -27,7 +28,9 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
             raise Fault(f"'{name[:80]}' leads out of the scene's folder by a link", "copy the file into the folder")
         if not path.is_file():
             kind = "is not a file" if path.exists() else "does not exist"
-            raise Fault(f"'{name[:80]}' {kind}", "put the file there or mend the path")
+            beside = {str(relative.parent / one.name) for one in path.parent.glob("*")} - {str(relative)}
+            hint = did_you_mean(nearest(str(relative), sorted(beside)))
+            raise Fault(f"'{name[:80]}' {kind}", f"{hint} put the file there or mend the path".lstrip())
         with path.open("rb") as file:
             content = file.read(limit + 1)
     except (OSError, ValueError, RuntimeError) as error:

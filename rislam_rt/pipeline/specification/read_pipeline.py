@@ -141,14 +141,27 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such pipeline file; {_near_pipeline(path)}") from None
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}); give a pipeline file in TOML") from None
+        mend = _instead_of_folder(path) or "give a pipeline file in TOML"
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); {mend}") from None
     if len(content) > MAX_BYTES:
         raise ConfigError(f"{path}: more than {MAX_BYTES} bytes; give a pipeline file in TOML")
     try:
-        return parse_toml(content.decode("utf-8"))
+        table = parse_toml(content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: not text in UTF-8 (byte {error.start}); save it as UTF-8") from None
     except ValueError as error:
         cause = " ".join(str(error).split())[:120]
         raise ConfigError(f"{path}: not valid TOML ({cause}); mend that place") from None
+    if "reflector" in table:
+        raise ConfigError(f"{path}: is a scene file, not a pipeline; give trace_then_slam --scene {path.parent}")
+    return table
+
+
+def _instead_of_folder(path: Path) -> str:
+    """What to give instead of a folder in a pipeline file's place: the scene as one, or a run's own pipeline."""
+    if (path / "scene.toml").is_file():
+        return f"give a pipeline, and the scene with it: trace_then_slam --scene {path}"
+    return f"give {path / 'config.toml'}" if (path / "config.toml").is_file() else ""
 
 
 def _near_pipeline(path: Path) -> str:

@@ -147,6 +147,27 @@ def test_missing_file_and_folder(tmp_path):
         load_spec(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(b"\xff\xfen\x00", "not text in UTF-8 (byte 0); save it as UTF-8"),
+     (b'name = "a"\n[[reflector]]\nname = "b"\n', "is a scene file, not a pipeline; give trace_then_slam --scene ")],
+)  # fmt: skip
+def test_a_file_that_is_no_pipeline_is_said_to_be_what_it_is(tmp_path, content, says):
+    (tmp_path / "mine.toml").write_bytes(content)
+    with pytest.raises(ConfigError) as caught:
+        load_spec(tmp_path / "mine.toml")
+    assert says in str(caught.value)
+    assert len(caught.value.lines) == 1
+
+
+def test_a_scene_or_a_run_in_a_pipelines_place_is_said_what_to_give(tmp_path):
+    for file, says in (("config.toml", f"give {tmp_path / 'config.toml'}"), ("scene.toml", f"--scene {tmp_path}")):
+        (tmp_path / file).write_text("")
+        with pytest.raises(ConfigError, match=r"cannot be read \(Is a directory\)") as caught:
+            load_spec(tmp_path)
+        assert str(caught.value).endswith(says)
+
+
 def test_specification_survives_its_own_dump(write):
     spec = load_spec(write(MINIMAL + "[control]\ndelay_cycles = 2\n"))
     assert PipelineSpec.model_validate(spec.model_dump(mode="json")) == spec
