@@ -229,3 +229,9 @@ def test_a_scene_file_of_another_editor_is_read_or_told_to_be_saved_as_utf8(room
     assert load_scene(room).name == "paper_room"
     (room / "scene.toml").write_bytes(content.decode().encode("utf-16"))
     assert "not text in UTF-8 (byte 0); save it as UTF-8" in refusal(room)
+
+
+def test_an_obj_file_with_a_byte_order_mark_has_all_its_corners() -> None:
+    content = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    expected = MeshReader().parse(content, "a.obj")
+    assert np.array_equal(MeshReader().parse(b"\xef\xbb\xbf" + content, "a.obj").triangles, expected.triangles)

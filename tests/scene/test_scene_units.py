@@ -68,6 +68,26 @@ def test_usual_numbers_wrong_types_and_points_lost_for_other_reasons_are_left_al
     assert not said({"agent": {"start": [500.0, 700.0, 500.0]}}, None)
 
 
+def test_a_mesh_in_another_unit_than_the_others_is_named(tmp_path: Path) -> None:
+    scene = load_scene(ROOM)
+    walls = [
+        replace(wall, vertices=(1000.0 if n == 2 else 1.0) * wall.vertices) for n, wall in enumerate(scene.reflectors)
+    ]
+    found = check_scene(write_scene(replace(scene, reflectors=tuple(walls)), tmp_path / "mixed"))
+    (line,) = [one.line for one in found if ".units" in one.field]
+    assert f"reflector[2].units ({walls[2].name}): it reaches 6e+03 m from the room's zero, most others 6 m" in line
+    assert 'in millimetres it would be 6 m; say units = "mm" beside it, or mend its origin' in line
+
+
+def test_the_size_of_a_room_in_millimetres_is_said_once(tmp_path: Path) -> None:
+    scene = load_scene(ROOM.parent / "empty_box")
+    walls = tuple(replace(wall, vertices=1000.0 * wall.vertices) for wall in scene.reflectors)
+    agent = replace(scene.agent, position=1000.0 * scene.agent.position, velocity=1000.0 * scene.agent.velocity)
+    found = check_scene(write_scene(replace(scene, reflectors=walls, agent=agent), tmp_path / "large"))
+    assert not [one for one in found if one.severity == "error"]
+    assert len([one for one in found if one.field == "meshes.units"]) == 1
+
+
 def test_a_recording_in_millimetres_or_milliseconds_is_named(damaged: Damage) -> None:
     damaged("start = [0.5, 0.7, 0.5]\n", "")
     damaged("cycles = 600\ncycle_s = 0.1\n", "")

@@ -48,6 +48,10 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     yield from _odd_steps(room)
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
+        away = np.linalg.norm(np.stack([motion.tx, motion.rx]) - scatterer.position, axis=-1).min(axis=0)
+        if away.min() < max(scatterer.radius or 0.0, MIN_CLEARANCE):
+            message = f"the agent comes within {away.min():.2g} m of its centre at cycle {int(np.argmin(away))}"
+            yield room.warning(field, message, "lead the agent around it")
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
             message = "it lies below the array, which hears from above only"
             yield room.warning(field, message, "raise it above the agent")
