@@ -187,7 +187,8 @@ def _override(table: dict[str, Any], setting: str, folder: Path = Path()) -> str
 def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:
     """Origin of a pipeline's setting at fault, for messages: `--set` if the command line gave it or a key in it, else
     the file."""
-    set_there = any(f"{place}.".startswith((f"{key}.", f"{key}[")) for key in changed)
+    places = place.split(", ")  # one complaint may be of several
+    set_there = any(f"{one}.".startswith((f"{key}.", f"{key}[")) for key in changed for one in places)
     return "--set" if set_there or (unknown and any(key.startswith(f"{place}.") for key in changed)) else str(path)
 
 

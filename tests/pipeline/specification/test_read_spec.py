@@ -126,7 +126,9 @@ def test_a_list_that_is_none_is_told_as_the_file_needs_it(write):
         load_spec(write(MINIMAL + 'schemes = "exact"\n'))
 
 
-@pytest.mark.parametrize("setting", ["", "seed", "=3", "a b=1", "name.x=1", "seed=seven", "radio.x=1"])
+@pytest.mark.parametrize(
+    "setting", ["", "seed", "=3", "a b=1", "name.x=1", "seed=seven", "radio.x=1", "design.iterations=0"]
+)
 def test_bad_override_is_laid_to_the_command_line(write, setting):
     with pytest.raises(ConfigError, match="--set"):
         load_spec(write(MINIMAL), [setting])
