@@ -11,6 +11,10 @@ from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.scene.findings import Fault, one_line
 
 
+BELOW = "give a relative path below it, with / between folders"
+"""How to mend the path of a scene's file; a backslash in quotes is no separator, and often another character."""
+
+
 def read_inside(folder: Path, name: str, limit: int) -> bytes:
     """Read a file that a scene names, which must lie inside the scene's folder, links followed.
 
@@ -21,7 +25,7 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
     """
     relative = PurePosixPath(name)
     if not name or relative.is_absolute() or ".." in relative.parts or "\\" in name or not name.isprintable():
-        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", "give a relative path below it")
+        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", BELOW)
     path = folder / relative
     try:
         if not path.resolve().is_relative_to(folder.resolve()):

@@ -179,5 +179,6 @@ def _heading(q: Floats) -> Floats:
     x, y, z, w = (q / length[:, None]).T
     tilt = 2.0 * np.hypot(x, y)
     if (tilt > MAX_TILT).any():
-        raise Fault(f"pose {int(np.argmax(tilt > MAX_TILT))} is tilted", "give rotations about z only (qx = qy = 0)")
+        pose, mend = int(np.argmax(tilt > MAX_TILT)), "give rotations about z only (qx = qy = 0), qw last"
+        raise Fault(f"pose {pose} is tilted", mend)
     return np.asarray(2.0 * np.arctan2(z, w))
