@@ -10,7 +10,6 @@ from pathlib import Path, PurePosixPath
 from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.scene.findings import Fault, one_line
 
-
 BELOW = "give a relative path below it, with / between folders"
 """How to mend the path of a scene's file; a backslash in quotes is no separator, and often another character."""
 
