@@ -333,7 +333,8 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
-        return Fault(f"{place}: {item['msg'].removeprefix('Value error, ')}", "mend this field")
+        what, _, mend = item["msg"].removeprefix("Value error, ").partition("; ")
+        return Fault(f"{place}: {what}", mend or "mend this field")
     received = f"{place}: {_short(repr(item['input']), 60)} received"
     return (
         Fault(received, message)

@@ -192,3 +192,8 @@ def test_a_bad_motion_is_one_line(moved: Callable[..., Scene], motion: str, says
     with pytest.raises(SceneError) as caught:
         moved(motion, way_tum="0 1 1 1 0 0 0 1\n")
     assert says in str(caught.value)
+
+
+def test_what_to_do_about_a_bad_motion_is_said_once(moved: Callable[..., Scene]) -> None:
+    with pytest.raises(SceneError, match=r"means nothing with 'trajectory'; leave it out$"):
+        moved('trajectory = "a.tum"\nspeed_m_s = 1.0')

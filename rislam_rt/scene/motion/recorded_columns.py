@@ -81,7 +81,7 @@ def _find(what: str, header: Sequence[str], named: Mapping[str, str]) -> PoseCol
     if places:
         return PoseColumn(places[0], UNITS.get(what, {}).get(_words(header[places[0]])[-1], 1.0))
     if what in ("time", "x", "y", "z"):
-        mend = f"{_named_in_scene(what)}; the file has {few_names(header)}"
+        mend = f"{_named_in_scene(what, _likeliest(what, header))}; the file has {few_names(header)}"
         raise Fault(f"no column '{what}' in the trajectory", mend)
     return None
 
@@ -89,6 +89,13 @@ def _find(what: str, header: Sequence[str], named: Mapping[str, str]) -> PoseCol
 def _named_in_scene(what: str, name: str = "...") -> str:
     """How the scene names a recording's column, for an error message."""
     return f'name it in agent.columns, e.g. columns = {{ {what} = "{name[:20]}" }}'
+
+
+def _likeliest(what: str, header: Sequence[str]) -> str:
+    """Name of a recording's column that may hold the time or a coordinate: `px`, `pos_x`, `x_map`; dots without one."""
+    marks = ("time", "stamp") if what == "time" else (what,)
+    ends = ((name, word) for name in header if name not in COLUMNS for word in _words(name))
+    return next((name for name, word in ends if word.startswith(marks) or word.endswith(marks)), "...")
 
 
 def _words(name: str) -> list[str]:

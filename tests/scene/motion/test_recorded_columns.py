@@ -37,6 +37,15 @@ def test_a_heading_under_another_name_is_not_passed_over(name: str, meant: str) 
     assert f'columns = {{ {meant} = "{name}" }}' in line
 
 
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [("stamp,pos_x,pos_y,pos_z", '{ time = "stamp" }'), ("t,qx,px,py,pz", '{ x = "px" }'),
+     ("t,x,y,z_map", '{ z = "z_map" }'), ("t,x,y,height", '{ z = "..." }; the file has \'t\', \'x\'')],
+)  # fmt: skip
+def test_a_missing_column_is_told_with_the_likeliest(header: str, says: str) -> None:
+    assert f"name it in agent.columns, e.g. columns = {says}" in refused(header.split(","))
+
+
 def test_what_is_told_about_a_heading_and_all_other_columns_are_left_alone() -> None:
     others = ["yaw_rate", "heading_std_deg", "x_std", "vx", "time_offset", "note"]
     assert set(find_columns([*others, *PLACE], {})) == set(PLACE)
