@@ -49,7 +49,7 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
         if near:
             return did_you_mean(near)
     if item["type"] in ("too_short", "too_long"):
-        most, number, given = re.findall("at (least|most) ([0-9]+).* not ([0-9]+)", message)[0]
+        most, number, given = re.findall("at (least|most) ([0-9]+).* not ([a-z0-9]+)", message)[0]
         return f"give at {most} {counted(int(number), 'item')}, not {given}"
     kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
     if kind is not None:

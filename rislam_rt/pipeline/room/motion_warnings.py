@@ -27,7 +27,7 @@ def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:
     cycle = int(np.argmax(speed))
     if speed[cycle] > (1.0 + 1e-6) * top_speed:
         message = (
-            f"{top_speed:g} m/s, and the agent moves at up to {speed[cycle]:.2g} m/s (cycle {cycle}): paths over walls "
+            f"{top_speed:g} m/s, and the agent moves at up to {speed[cycle]:.3g} m/s (cycle {cycle}): paths over walls "
             "and scatterers may pass for the panel's"
         )
         mend = f"give receiver.top_speed = {np.ceil(10.0 * speed[cycle]) / 10.0:g}"
@@ -41,7 +41,7 @@ def _manoeuvring_agent(scene: Scene, file: str) -> Iterator[Finding]:
         cycle = int(np.argmax(change))
         message = (
             f"it speeds up or slows down by {change[cycle]:.3g} m/s^2 after cycle {cycle}, more than any floor gives; "
-            f"the filter's liveliest motion has {CONSTANTS.liveliest:g} m/s^2 in the mean square"
+            f"the filter's liveliest motion has a deviation of {CONSTANTS.liveliest:g} m/s^2"
         )
         mend = "mend what jumps there, or smooth the recording"
         yield Finding("warning", file, "agent", message, mend)

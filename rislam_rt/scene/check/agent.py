@@ -49,8 +49,10 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
         away = np.linalg.norm(np.stack([motion.tx, motion.rx]) - scatterer.position, axis=-1).min(axis=0)
-        if away.min() < max(scatterer.radius or 0.0, MIN_CLEARANCE):
-            message = f"the agent comes within {away.min():.2g} m of its centre at cycle {int(np.argmin(away))}"
+        radius = max(scatterer.radius or 0.0, MIN_CLEARANCE)
+        if away.min() < radius:
+            at = f"at cycle {int(np.argmin(away))}"
+            message = f"the agent comes within {away.min():.2g} m of its centre {at}, and its radius is {radius:g} m"
             yield room.warning(field, message, "lead the agent around it")
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
             message = "it lies below the array, which hears from above only"

@@ -35,7 +35,7 @@ def test_an_acceleration_that_no_floor_gives_is_said_with_the_filters_liveliest(
     jump = room.agent.velocity[7] + [0.0, 10.0 * step, 0.0]  # a little above 9.81 m/s^2 for one step, and back
     (line,) = said(faster(room, 7, jump), top_speed=2.0)
     assert "scene.toml: agent: it speeds up or slows down by 10 m/s^2 after cycle" in line
-    assert "the filter's liveliest motion has 1 m/s^2" in line
+    assert "the filter's liveliest motion has a deviation of 1 m/s^2" in line
     assert not said(faster(room, 7, room.agent.velocity[7] + [0.0, 9.0 * step, 0.0]), top_speed=2.0)
 
 
