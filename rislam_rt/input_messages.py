@@ -2,6 +2,7 @@
 suggestions for an unknown word.
 """
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -41,6 +42,15 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
         words = str(item["input"]).strip("[]()").replace('"', "").replace("'", "").split(",")
         values = f"[{', '.join(_entry(word.strip()) for word in words)}]"[:100]
         return f"give a list, in quotes: '{name}={values}'" if typed else f"give a list, {name} = {values}"
+    if item["type"] in ("model_type", "dict_type"):
+        return f"give a table, {name} = {{ key = value }}, or one alone: [{name}]"
+    if item["type"] == "literal_error":
+        near = nearest(str(item["input"]).lower(), re.findall("'([^']*)'", message))
+        if near:
+            return did_you_mean(near)
+    if item["type"] in ("too_short", "too_long"):
+        most, number, given = re.findall("at (least|most) ([0-9]+).* not ([a-z0-9]+)", message)[0]
+        return f"give at {most} {counted(int(number), 'item')}, not {given}"
     kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
     if kind is not None:
         return f"give {kind}"

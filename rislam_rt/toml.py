@@ -22,13 +22,15 @@ _LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+)""" + f"{{{M
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Parse a TOML text into a table; numbers beyond 64 bits and keys of very many parts are refused.
+    """Parse a TOML text into a table, after a byte order mark if there is one; numbers beyond 64 bits and keys of very
+    many parts are refused.
 
     Raises
     ------
     ValueError
         It is not TOML, or is nested too deeply; the message says where.
     """
+    text = text.removeprefix("\ufeff")
     if _LONG_NUMBER.search(text) is not None:
         raise ValueError(f"a number of more than {MAX_DIGITS} digits; TOML has whole numbers of 64 bits")
     long_key = _LONG_KEY.search(text)

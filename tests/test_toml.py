@@ -23,3 +23,7 @@ def test_quotes_newlines_and_what_is_no_number():
     table = {"description": 'the "demo"\nof 3\' \\ "" and """ \x7f\x00', "x": math.inf, "y": 1e-300, "n": 7}
     assert parse_toml(toml_bytes(table).decode()) == table
     assert math.isnan(parse_toml(toml_bytes({"x": math.nan}).decode())["x"])
+
+
+def test_a_byte_order_mark_does_no_harm():
+    assert parse_toml("\ufeffname = 'a'") == {"name": "a"}

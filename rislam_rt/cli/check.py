@@ -10,7 +10,11 @@ from rislam_rt.cli.output_files import OUTPUT, write_json
 from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rislam_rt.model import Scene
     from rislam_rt.pipeline.specification.pipeline_spec import Settings as Records
+    from rislam_rt.scene.findings import Finding
 
 SEED = 0
 """Seed of the random phase codes under which the advice computes a panel's detectability."""
@@ -42,7 +46,9 @@ def command(
     """
     from dataclasses import asdict
 
+    from rislam_rt.pipeline.room.motion_warnings import motion_warnings
     from rislam_rt.scene import check_scene
+    from rislam_rt.scene.load import scene_file
 
     changed = list(set_ or ())
     if carrier_ghz is not None:
@@ -53,6 +59,9 @@ def command(
 
         picture_kind(picture)  # before anything is worked out
     findings = check_scene(Path(scene), settings.radio)
+    checked = _checked_scene(Path(scene), findings)
+    if checked is not None:
+        findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
@@ -61,15 +70,22 @@ def command(
         "errors": errors,
         "findings": [asdict(finding) for finding in findings],
     }
-    if not errors:
-        content["advice"] = _advise(Path(scene), settings, picture)
+    if checked is not None:
+        content["advice"] = _advise(checked, settings, picture)
     write_json(json, content)
     typer.echo(f"{scene}: {counted(errors, 'error')}, {counted(warnings, 'warning')}")
     if errors:
         raise typer.Exit(2)
 
 
-def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str, object]:
+def _checked_scene(folder: Path, findings: "Sequence[Finding]") -> "Scene | None":
+    """Scene that `rislam-rt check` found no error in; None if it found one."""
+    from rislam_rt.scene.load import read_draft
+
+    return None if any(finding.severity == "error" for finding in findings) else read_draft(folder).scene
+
+
+def _advise(scene: "Scene", settings: "Records", picture: Path | None) -> dict[str, object]:
     """Part of `rislam-rt check`: print which landmarks will be detected, draw the coverage if asked, return the
     advice."""
     import numpy as np
@@ -77,10 +93,7 @@ def _advise(folder: Path, settings: "Records", picture: Path | None) -> dict[str
     from rislam_rt.adviser.advice import advise
     from rislam_rt.adviser.coverage import panel_coverage
     from rislam_rt.report.advice import draw_coverage, print_advice
-    from rislam_rt.scene.load import read_draft
 
-    scene = read_draft(folder).scene
-    assert scene is not None  # it has been checked
     advice = advise(scene, settings, rng=np.random.default_rng(SEED))
     print_advice(advice)
     if picture is not None:

@@ -59,10 +59,22 @@ def _run(heard: list[int]) -> int:
                 return _say("interrupted", EXIT_CODE)
             raise
         command = getattr(getattr(error, "ctx", None), "command_path", "rislam-rt")
-        return _say(f"error: {error.format_message().rstrip('.')}; see {command} --help", 2)
+        return _say(f"error: {_plain(error.format_message().rstrip('.'))}; see {command} --help", 2)
     if code == EXIT_CODE:  # an interrupt that no command has answered
         return _say("interrupted", EXIT_CODE)
     return code if isinstance(code, int) else 0
+
+
+def _plain(message: str) -> str:
+    """The command line parser's message on wrong usage in plain words: `give at least 1`."""
+    import re
+
+    from rislam_rt.input_messages import BOUNDS
+
+    message = re.sub(", unable to parse .*", "", message.replace("Value error, ", ""))
+    for long, plain in BOUNDS.items():
+        message = message.replace(f"Input should be {long}", f"give {plain}")
+    return message.replace("Input should be ", "give ")
 
 
 def _tell(error: "RislamError") -> int:

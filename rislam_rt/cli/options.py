@@ -86,6 +86,20 @@ class StudyOptions(NamedTuple):
     """Whether to draw the figures and the page."""
 
 
+def check_one_scene(scene: Path | None, changed: Sequence[str] | None) -> None:
+    """Check that a command is not given two scenes, one by its option `--scene` and one by `--set`.
+
+    Raises
+    ------
+    ConfigError
+        It is.
+    """
+    from rislam_rt.errors import ConfigError
+
+    if scene is not None and any(setting.partition("=")[0].strip() == "scene" for setting in changed or ()):
+        raise ConfigError(f"--set scene: --scene {scene} is given too; leave one of them out")
+
+
 def parse_point(option: str, text: str) -> "Floats":
     """Point or vector (3,) from the text `x,y,z` of a command line option.
 

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions
+from rislam_rt.cli.options import (
+    MAIN_JOB,
+    JsonFile,
+    PipelineFile,
+    SceneOption,
+    Settings,
+    StudyOptions,
+    check_one_scene,
+)
 from rislam_rt.cli.output_files import write_json
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.input_messages import counted
@@ -46,6 +54,7 @@ def command(
     from rislam_rt.pipeline import PipelineSpec
     from rislam_rt.studies import load_any
 
+    check_one_scene(scene, set_)
     spec = load_any(pipeline, set_ or ())
     given = StudyOptions(pipeline, scene, out, jobs, json, page)
     if isinstance(spec, PipelineSpec):

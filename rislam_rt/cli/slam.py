@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from rislam_rt.studies.unseen import Answers
 
 
+MAX_SPEED, LONGEST_ARM = 10.0, 2.0
+"""Speed [m/s] of an agent indoors, and distance [m] of Tx and Rx from its position, above which a unit is wrong."""
+
+
 def command(
     measurements: Annotated[
         Path, typer.Argument(metavar="MEASUREMENTS", help="CSV or NetCDF file of components.", show_default=False)
@@ -37,7 +41,7 @@ def command(
     ] = None,
     rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
     truth: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="True poses (TUM), one a cycle, for scoring alone.")
+        Path | None, typer.Option(metavar="FILE", help="True poses (TUM, CSV), one a cycle, for scoring alone.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="New folder for the estimate; <file>-slam by default.")
@@ -87,12 +91,16 @@ def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "Star
     from rislam_rt.slam import StartPrior
 
     first, speed = parse_point("--start", start), parse_point("--velocity", velocity)
+    if np.linalg.norm(speed) > MAX_SPEED:
+        warn(f"--velocity: {np.linalg.norm(speed):.3g} m/s; give metres a second")
     heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
     return StartPrior(first, speed, heading, *stds)
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
     """Offsets of Tx and Rx for `rislam-rt slam` from the options `--tx` and `--rx`; None without them."""
+    import numpy as np
+
     from rislam_rt.errors import ConfigError
     from rislam_rt.model import Body
 
@@ -100,19 +108,24 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
         return None
     if tx is None or rx is None:
         raise ConfigError("--tx, --rx: one alone received; give both")
-    return Body(parse_point("--tx", tx), parse_point("--rx", rx))
+    ends = parse_point("--tx", tx), parse_point("--rx", rx)
+    for option, end in zip(("--tx", "--rx"), ends, strict=True):
+        if np.linalg.norm(end) > LONGEST_ARM:
+            warn(f"{option}: {np.linalg.norm(end):.3g} m from the agent's position; give metres")
+    return Body(*ends)
 
 
 def _true_positions(file: Path, cycles: int) -> "Floats":
-    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM file of `--truth`, one a cycle."""
+    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM or CSV file of `--truth`, one a cycle."""
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.motion.recorded_poses import parse_tum
+    from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
 
     try:
-        _, position, _ = parse_tum(file.read_bytes())
+        content = file.read_bytes()
+        position = parse_csv(content, {}).position if file.suffix.lower() == ".csv" else parse_tum(content)[1]
     except OSError as error:
-        raise ConfigError(f"--truth {file}: cannot be read ({error.strerror}); give a TUM file") from None
+        raise ConfigError(f"--truth {file}: cannot be read ({error.strerror}); give a TUM or CSV file") from None
     except Fault as fault:
         raise ConfigError(fault.at(f"--truth {file}", "").line) from None
     if len(position) != cycles:

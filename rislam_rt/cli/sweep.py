@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, check_one_scene
 from rislam_rt.cli.output_files import write_json
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def command(
     from rislam_rt.studies.pipeline_sweep import default_folder, load_section, score_rows, slam_sweep
     from rislam_rt.sweeps import SweepOptions
 
+    check_one_scene(scene, set_)
     sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
     limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
     effort = SweepOptions(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)

@@ -1,7 +1,7 @@
 """A run of the pipeline: find all paths along the trajectory once, then simulate every scheme with the same noise."""
 
 import platform
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
@@ -18,12 +18,13 @@ from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
+from rislam_rt.pipeline.room.motion_warnings import motion_warnings
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.room.true_motion import draw_looks, draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_receiver
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
@@ -209,26 +210,15 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
 
 
 def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings of a run, one line each, where a RIS panel is so large that the band resolves its elements' delays, or
-    the agent faster than the receiver reckons with as it tells the panel's paths from others.
+    """Warnings of a run, one line each: a RIS panel so large that the band resolves its elements' delays, an agent
+    faster than the receiver reckons with as it tells the panel's paths from others, or manoeuvring as on no floor.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.
     """
-    if not any(SCHEMES[name].panel for name in spec.schemes):
-        return ()
-    return (*_large_panels(scene, spec), *_fast_agent(scene, spec))
-
-
-def _fast_agent(scene: Scene, spec: PipelineSpec) -> Iterator[str]:
-    """Warning of a run whose agent is faster than its receiver assumes, but for rounding."""
-    fastest, receiver = float(np.linalg.norm(scene.agent.velocity, axis=1).max()), spec.receiver
-    if receiver.alternation and fastest > (1.0 + 1e-6) * receiver.top_speed:
-        yield (
-            f"receiver.top_speed: {receiver.top_speed:g} m/s, and the agent of scene '{scene.name}' moves at up to "
-            f"{fastest:.2g}: paths over walls and scatterers may pass for the panel's; give receiver.top_speed = "
-            f"{np.ceil(10.0 * fastest) / 10.0:g}"
-        )
+    panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
+    moving = motion_warnings(scene, build_receiver(spec.receiver, panels), f"scene '{scene.name}'")
+    return (*(_large_panels(scene, spec) if panels else ()), *(finding.line for finding in moving))
 
 
 def _large_panels(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:

@@ -12,7 +12,13 @@ from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
 from rislam_rt.scene.check import faint_slabs, find_errors, find_warnings, material_errors
-from rislam_rt.scene.check.units import SPEED_FIELD, unit_warnings
+from rislam_rt.scene.check.units import (
+    ROOM_FIELD,
+    SPEED_FIELD,
+    lone_mesh_warnings,
+    recording_unit_warnings,
+    unit_warnings,
+)
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
@@ -63,10 +69,22 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
         return _check_read(scene, scene.name, radio)
     draft = read_draft(scene)
     findings = draft.findings if draft.scene is None else _check_read(draft.scene, draft.file, radio)
-    units = list(unit_warnings(draft.file, _plain_table(Path(draft.file)), draft.bounds))
+    units = _unit_findings(draft)
     if any(finding.severity == "error" for finding in findings):
         return findings + units
+    if any(".units" in finding.field for finding in units):
+        findings = [finding for finding in findings if finding.field != ROOM_FIELD]  # they know the unit
     return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it
+
+
+def _unit_findings(draft: SceneDraft) -> list[Finding]:
+    """Warnings of a loaded scene folder about units: of its file, its recording, and each of its meshes."""
+    table, scene, bounds = _plain_table(Path(draft.file)), draft.scene, draft.bounds
+    lone = [] if scene is None else list(lone_mesh_warnings(draft.file, scene.reflectors))
+    found = [*lone, *unit_warnings(draft.file, table, None if lone else bounds)]
+    if scene is not None and bounds is not None and "trajectory" in table.get("agent", {}):
+        found += recording_unit_warnings(draft.file, scene.agent, bounds)
+    return found
 
 
 def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:

@@ -6,6 +6,7 @@ import logging
 import re
 import struct
 import warnings
+from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -88,7 +89,8 @@ class MeshReader:
         if suffix == ".ply":
             content = without_comments(content)
         elif suffix == ".obj":
-            content = content.decode("latin-1").encode()  # keywords and numbers are ASCII, comments are anything
+            # keywords and numbers are ASCII, comments are anything
+            content = content.removeprefix(BOM_UTF8).decode("latin-1").encode()
         elif suffix == ".glb":
             check_glb(content, max_faces, max_nodes)
         mesh = _own_ply(content) if suffix == ".ply" else None

@@ -7,7 +7,11 @@ import re
 import unicodedata
 from pathlib import Path, PurePosixPath
 
+from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.scene.findings import Fault, one_line
+
+BELOW = "give a relative path below it, with / between folders"
+"""How to mend the path of a scene's file; a backslash in quotes is no separator, and often another character."""
 
 
 def read_inside(folder: Path, name: str, limit: int) -> bytes:
@@ -20,14 +24,16 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
     """
     relative = PurePosixPath(name)
     if not name or relative.is_absolute() or ".." in relative.parts or "\\" in name or not name.isprintable():
-        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", "give a relative path below it")
+        raise Fault(f"'{one_line(name)[:80]}' does not stay inside the scene's folder", BELOW)
     path = folder / relative
     try:
         if not path.resolve().is_relative_to(folder.resolve()):
             raise Fault(f"'{name[:80]}' leads out of the scene's folder by a link", "copy the file into the folder")
         if not path.is_file():
             kind = "is not a file" if path.exists() else "does not exist"
-            raise Fault(f"'{name[:80]}' {kind}", "put the file there or mend the path")
+            beside = {str(relative.parent / one.name) for one in path.parent.glob("*")} - {str(relative)}
+            hint = did_you_mean(nearest(str(relative), sorted(beside)))
+            raise Fault(f"'{name[:80]}' {kind}", f"{hint} put the file there or mend the path".lstrip())
         with path.open("rb") as file:
             content = file.read(limit + 1)
     except (OSError, ValueError, RuntimeError) as error:

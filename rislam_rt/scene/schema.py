@@ -178,7 +178,7 @@ class AgentSection(SceneSection):
     velocity: Vector | None = None
     trajectory: str | None = None
     columns: dict[str, str] | None = None
-    """Names of a CSV file's columns, where not as `recorded_poses.COLUMNS`."""
+    """Names of a CSV file's columns, where not as `recorded_columns.COLUMNS`."""
     waypoints: Annotated[list[Vector], Field(min_length=2, max_length=10_000)] | None = None
     random_walk: WalkSection | None = None
     speed_m_s: Length | None = None
@@ -271,9 +271,11 @@ def parse_spec(content: bytes) -> SceneSpec:
     try:
         table = parse_toml(content.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise Fault(f"not text in UTF-8 (byte {error.start})", "give a TOML file") from None
+        raise Fault(f"not text in UTF-8 (byte {error.start})", "save it as UTF-8") from None
     except ValueError as error:
         raise Fault(f"not valid TOML: {_short(str(error), 120)}", "mend that place") from None
+    if "scene" in table and "reflector" not in table:
+        raise Fault("is a pipeline, not a scene", "give the scene folder that it names")
     return validate_spec(table)
 
 
@@ -302,7 +304,8 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
         The file cannot be read or its content is not a scene.
     """
     if not path.is_file():
-        hint = did_you_mean(nearest(path.parent.name, shipped_rooms()))
+        known = {*shipped_rooms(), *(one.name for one in path.parent.parent.glob("*"))} - {path.parent.name}
+        hint = did_you_mean(nearest(path.parent.name, sorted(known)))
         wanted = f"{hint} give a scene folder, its scene.toml, or the name of a built-in room".lstrip()
         raise Fault("no such scene file", wanted)
     try:
@@ -323,22 +326,37 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
     if item["type"] == "missing":
         return Fault(f"{place}: missing", "add it")
     if item["type"] == "extra_forbidden":
-        hint = did_you_mean(nearest(str(item["loc"][-1]), _known_keys()))
-        return Fault(f"{place}: unknown key", hint or "remove it or mend its name")
+        return Fault(f"{place}: unknown key", _near_key(str(where[-1])) or "remove it or mend its name")
+    if item["type"] == "list_type" and isinstance(item["input"], dict) and len(where) == 1:
+        return Fault(f"{place}: one table received", f"there may be several: write [[{place}]], with two brackets")
     message = expected_input(item)
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
-        return Fault(f"{place}: {item['msg'].removeprefix('Value error, ')}", "mend this field")
+        what, _, mend = item["msg"].removeprefix("Value error, ").partition("; ")
+        return Fault(f"{place}: {what}", mend or "mend this field")
     received = f"{place}: {_short(repr(item['input']), 60)} received"
-    return Fault(received, message) if message.startswith("give ") else Fault(f"{received}, {message}", "mend it")
+    return (
+        Fault(received, message)
+        if message.startswith(("give ", "did "))
+        else Fault(f"{received}, {message}", "mend it")
+    )
 
 
-def _known_keys() -> list[str]:
-    """All keys of the scene file's tables, to suggest one for a key that is not known."""
-    sections = (SceneSpec, ReflectorSection, MaterialSection, ScattererSection, OccluderSection, MeshesSection,
-                RisSection, AgentSection, WalkSection, LimitsSection)  # fmt: skip
-    return [key for section in sections for key in section.model_fields]
+SECTIONS: dict[str, type[SceneSection]] = {
+    "the top of the file": SceneSpec, "[[reflector]]": ReflectorSection, "material": MaterialSection,
+    "[[scatterer]]": ScattererSection, "[[shade]]": OccluderSection, "[meshes]": MeshesSection, "[ris]": RisSection,
+    "[agent]": AgentSection, "random_walk": WalkSection, "[limits]": LimitsSection,
+}  # fmt: skip
+"""Tables of the scene file, as messages name them."""
+
+
+def _near_key(key: str) -> str:
+    """Suggestion for an unknown key of the scene file: the tables that know it, or a key that is spelled like it."""
+    tables = [name for name, section in SECTIONS.items() if key in section.model_fields]
+    if tables:
+        return f"it belongs to {' or '.join(tables)}"
+    return did_you_mean(nearest(key, (known for section in SECTIONS.values() for known in section.model_fields)))
 
 
 def _short(text: str, length: int) -> str:

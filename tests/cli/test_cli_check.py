@@ -44,3 +44,13 @@ def test_a_scene_without_a_panel_has_no_map(check, tmp_path):
     assert code == 0
     assert "picture: none: the scene has no panel" in out
     assert not (tmp_path / "map.png").exists()
+
+
+def test_an_agent_faster_than_the_receiver_is_told_so_before_it_runs(check, tmp_path):
+    assert check("paper_room", "--set", "receiver.top_speed=0.1", "--json", "c.json")[1].count("warning: ") == 1
+    code, out, _ = check("paper_room", "--set", "receiver.top_speed=0.09", "--json", "c.json")
+    assert code == 0
+    line = next(line for line in out.splitlines() if "top_speed" in line)
+    assert "scene.toml: receiver.top_speed: 0.09 m/s, and the agent moves at up to 0.1 m/s (cycle 0)" in line
+    assert out.endswith("paper_room: 0 errors, 2 warnings\n")
+    assert "receiver.top_speed" in [one["field"] for one in json.loads((tmp_path / "c.json").read_text())["findings"]]

@@ -116,3 +116,21 @@ def test_as_a_module(tmp_path):
         [sys.executable, "-m", "rislam_rt", "--version"], capture_output=True, text=True, cwd=tmp_path, check=True
     )
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("compare", "paper_room", "--poses", "0"), "'--poses': give at least 1; see rislam-rt compare --help"),
+        (("compare", "paper_room", "--poses", "ten"), "'--poses': give a valid integer; see"),
+        (
+            ("new", "x", "--from", "a.ply", "--units", "ell"),
+            "'--units': 'ell' is not one of 'mm', 'cm', 'm', 'in'; see",
+        ),
+    ],
+)
+def test_wrong_usage_is_said_in_plain_words(run, arguments, says):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert says in err
+    assert len(err.splitlines()) == 1

@@ -214,3 +214,24 @@ def _samples() -> dict[str, bytes]:
 
 
 _SAMPLES: dict[str, bytes] = {}
+
+
+def test_what_lies_beside_a_missing_scene_is_proposed_and_a_pipeline_is_none(room: Path, tmp_path: Path) -> None:
+    assert check_scene(tmp_path / "roomm")[0].mend.startswith("did you mean 'room'? give a scene folder")
+    assert check_scene(room / "meshes")[0].mend.startswith("give a scene folder")
+    (tmp_path / "mine.toml").write_text('name = "mine"\nscene = "room"\ncycles = 5\n')
+    assert [f.message for f in check_scene(tmp_path / "mine.toml")] == ["is a pipeline, not a scene"]
+
+
+def test_a_scene_file_of_another_editor_is_read_or_told_to_be_saved_as_utf8(room: Path) -> None:
+    content = (room / "scene.toml").read_bytes()
+    (room / "scene.toml").write_bytes(b"\xef\xbb\xbf" + content.replace(b"\n", b"\r\n"))
+    assert load_scene(room).name == "paper_room"
+    (room / "scene.toml").write_bytes(content.decode().encode("utf-16"))
+    assert "not text in UTF-8 (byte 0); save it as UTF-8" in refusal(room)
+
+
+def test_an_obj_file_with_a_byte_order_mark_has_all_its_corners() -> None:
+    content = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    expected = MeshReader().parse(content, "a.obj")
+    assert np.array_equal(MeshReader().parse(b"\xef\xbb\xbf" + content, "a.obj").triangles, expected.triangles)

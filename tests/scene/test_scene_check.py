@@ -174,10 +174,19 @@ CASES: dict[str, tuple[Change, str, str]] = {
         "the panel of 7.5 m x 4.5 m reaches 0.75 m beyond the room",
     ),
     "open room": (lambda s: without(s, "wall_x6"), "warning reflector", "rays from the start leave the room"),
-    "millimetres": (lambda s: scaled(s, 1000.0), "warning reflector", "is it in millimetres?"),
-    "too small": (lambda s: scaled(moved(s, [3, 3, 1], [0, 0, 0], TINY), 0.01), "warning reflector", "9 m across"),
-    "too fast": (lambda s: replace(s, agent=_fast(s.agent)), "warning agent", "moves at up to 14.1 m/s"),
+    "millimetres": (lambda s: scaled(s, 1000.0), "warning meshes.units", "is it in millimetres?"),
+    "too small": (lambda s: scaled(moved(s, [3, 3, 1], [0, 0, 0], TINY), 0.01), "warning meshes.units", "9 m across"),
+    "too fast": (lambda s: replace(s, agent=_fast(s.agent)), "warning agent", "14.1 m/s (after cycle 0)"),
+    "through a scatterer": (lambda s: moved(s, [1.8, 1, 1], [0.005, 0, 0]), "warning scatterer[0].position (sphere)",
+                            "the agent comes within 0.024 m of its centre at cycle"),
+    "gap": (lambda s: gap(s, 6.0), "warning agent.trajectory", "6 s without a pose after cycle 9"),
 }  # fmt: skip
+
+
+def gap(scene: Scene, seconds: float) -> Scene:
+    """The scene with an agent that nobody saw for a while after its cycle 9."""
+    later = scene.agent.time + np.where(np.arange(len(scene.agent)) > 9, seconds - 0.1, 0.0)
+    return replace(scene, agent=replace(scene.agent, time=later))
 
 
 def _fast(agent: Trajectory) -> Trajectory:
@@ -196,6 +205,8 @@ def test_remark(paper: Scene, case: str) -> None:
     "change",
     [
         lambda s: s,
+        lambda s: gap(s, 4.9),
+        lambda s: moved(s, [1.8, 1.08, 0.9], [0.005, 0, 0]),
         lambda s: moved(s, [0.06, 3, 0.9], [0, 0, 0]),
         lambda s: moved(furnished(s, "table", TABLE), [3, 3, 0.7], [0, 0, 0]),
         lambda s: moved(furnished(s, "crate", CRATE), [0.7, 1.3, 0.9], [0, 0, 0]),

@@ -18,6 +18,12 @@ from rislam_rt.scene.check import material_errors
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
+def test_the_page_on_scenes_lists_every_material_with_its_carriers():
+    page = (SCENES.parent / "docs" / "scenes.md").read_text(encoding="utf-8")
+    for name, rows in ITU_MATERIALS.items():
+        assert f"| `{name}` {', '.join(f'{low:g} to {high:g}' for low, high, *_ in rows)} |" in page
+
+
 def radio(ghz):
     return RadioConfig(carrier=1e9 * ghz)
 

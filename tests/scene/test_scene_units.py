@@ -53,11 +53,12 @@ def test_each_quantity_is_named_with_its_place() -> None:
     wall = {"material": {"itu": "concrete", "thickness_m": 200.0}}
     agent = {"cycle_s": 100, "velocity": [0, 70.7, 0]}
     table = {"reflector": [{"material": {"reflection": 0.5}}, wall], "agent": agent}
-    lines = said(table)
+    lines = said(table | {"scatterer": [{"radius": 0.05}, {"radius": 5}]})
+    assert any("scatterer[1].radius: 5 m; in millimetres it would be 0.005 m" in line for line in lines)
     assert any("reflector[1].material.thickness_m: 200 m; in millimetres it would be 0.2 m" in line for line in lines)
     assert any("agent.cycle_s: 100 s; in milliseconds it would be 0.1 s" in line for line in lines)
     assert any("agent.velocity: 70.7 m/s" in line for line in lines)
-    assert len(lines) == 3
+    assert len(lines) == 4
 
 
 def test_usual_numbers_wrong_types_and_points_lost_for_other_reasons_are_left_alone() -> None:
@@ -65,6 +66,43 @@ def test_usual_numbers_wrong_types_and_points_lost_for_other_reasons_are_left_al
     assert not said({"agent": {"start": "500", "cycle_s": True, "velocity": [None]}, "ris": [3], "reflector": 7})
     assert not said({"agent": {"start": [9e4, 9e4, 9e4]}})
     assert not said({"agent": {"start": [500.0, 700.0, 500.0]}}, None)
+
+
+def test_a_mesh_in_another_unit_than_the_others_is_named(tmp_path: Path) -> None:
+    scene = load_scene(ROOM)
+    walls = [
+        replace(wall, vertices=(1000.0 if n == 2 else 1.0) * wall.vertices) for n, wall in enumerate(scene.reflectors)
+    ]
+    found = check_scene(write_scene(replace(scene, reflectors=tuple(walls)), tmp_path / "mixed"))
+    (line,) = [one.line for one in found if ".units" in one.field]
+    assert f"reflector[2].units ({walls[2].name}): it reaches 6e+03 m from the room's zero, most others 6 m" in line
+    assert 'in millimetres it would be 6 m; say units = "mm" beside it, or mend its origin' in line
+
+
+def test_the_size_of_a_room_in_millimetres_is_said_once(tmp_path: Path) -> None:
+    scene = load_scene(ROOM.parent / "empty_box")
+    walls = tuple(replace(wall, vertices=1000.0 * wall.vertices) for wall in scene.reflectors)
+    agent = replace(scene.agent, position=1000.0 * scene.agent.position, velocity=1000.0 * scene.agent.velocity)
+    found = check_scene(write_scene(replace(scene, reflectors=walls, agent=agent), tmp_path / "large"))
+    assert not [one for one in found if one.severity == "error"]
+    assert [one.field for one in found if one.message.startswith("the room ")] == ["meshes.units"]
+
+
+def test_a_recording_in_millimetres_or_milliseconds_is_named(damaged: Damage) -> None:
+    damaged("start = [0.5, 0.7, 0.5]\n", "")
+    damaged("cycles = 600\ncycle_s = 0.1\n", "")
+    room = damaged("velocity = [0.0707, 0.0707, 0.0]", 'trajectory = "w.csv"')
+
+    def found(time: int, place: int) -> list[str]:
+        rows = "".join(f"{time * k},{(1 + 0.01 * k) * place},{place},{place}\n" for k in range(4))
+        (room / "w.csv").write_text(f"time,x,y,z\n{rows}")
+        return [one.line for one in check_scene(room) if one.field == "agent.trajectory"]
+
+    assert not found(1, 1)
+    assert (
+        "[1000.0, 1000.0, 1000.0] is far outside the room; in millimetres it would be [1.0, 1.0," in found(1, 1000)[0]
+    )
+    assert "100 s between poses; in milliseconds it would be 0.1 s; give seconds, or end" in found(100, 1)[0]
 
 
 def test_a_toy_and_a_city_are_named() -> None:

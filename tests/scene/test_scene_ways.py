@@ -69,7 +69,15 @@ def test_usual_names_need_no_naming_and_a_heading_follows_the_way() -> None:
         ("t,x,y,z\n0,1,2\n", {}, "line 2 of the trajectory is not 4 finite numbers"),
         ("t,x,y,z\n0,1,2,3\n0,1,2,3\n", {}, "time does not grow at pose 1"),
         ("t,x,y,z\n", {}, "holds no pose"),
-        ("", {}, "no column 'time'"),
+        ("", {}, "does not begin with column names; give 'time,x,y,z'"),
+        ("\ntime,x,y,z\n0,1,2,3\n", {}, "does not begin with column names"),
+        ("time;x;y;z\n0,1;1;2;3\n", {}, "semicolons between the columns of the trajectory; separate columns by commas"),
+        ("time\tx\ty\tz\n0\t1\t2\t3\n", {}, "tabs between the columns"),
+        ("# my walk\ntime,x,y,z\n0,1,2,3\n", {}, "no column 'time' in the trajectory"),
+        ("t,x,y,z\n0,0,0,5,1,0,0,7\n", {}, "line 2 of the trajectory has 8 entries for 4 columns; separate columns by"),
+        ("t,x,y,z\n0,1,2,2024-01-01\n", {}, "not 4 finite numbers (0, 1, 2, 2024-01-01)"),
+        ("t,x,y,z\n0,1,2,3\0\n", {}, "is not text in UTF-8; save it as CSV in UTF-8"),
+        ('t,x,y,z\n0,1,2,"' + "3" * 200_000, {}, "is no CSV file (field larger than field limit"),
     ],
 )
 def test_a_bad_csv_file_is_one_line(content: str, named: dict[str, str], says: str) -> None:
@@ -184,3 +192,8 @@ def test_a_bad_motion_is_one_line(moved: Callable[..., Scene], motion: str, says
     with pytest.raises(SceneError) as caught:
         moved(motion, way_tum="0 1 1 1 0 0 0 1\n")
     assert says in str(caught.value)
+
+
+def test_what_to_do_about_a_bad_motion_is_said_once(moved: Callable[..., Scene]) -> None:
+    with pytest.raises(SceneError, match=r"means nothing with 'trajectory'; leave it out$"):
+        moved('trajectory = "a.tum"\nspeed_m_s = 1.0')

@@ -11,6 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.errors import ConfigError, RislamError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
+from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
@@ -275,7 +276,8 @@ def _check_names(columns: Mapping[str, Floats], place: str) -> None:
     """Raise an error for columns of a user's measurements that are unknown, missing, redundant or of unequal length."""
     for name in columns:
         if name not in COLUMNS:
-            raise ConfigError(f"{place}: {name}: unknown column; the known ones are {', '.join(COLUMNS)}")
+            hint = did_you_mean(nearest(name, COLUMNS)) or "mend its name:"
+            raise ConfigError(f"{place}: {name}: unknown column; {hint} the known ones are {', '.join(COLUMNS)}")
     pairs = ("cos_x", "theta_r_rad"), ("cos_y", "phi_r_rad"), ("amplitude", "snr_db")
     for needed in (("time_s",), ("delay_s",), *pairs):
         if not any(name in columns for name in needed):

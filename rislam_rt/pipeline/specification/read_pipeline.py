@@ -141,14 +141,27 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such pipeline file; {_near_pipeline(path)}") from None
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror}); give a pipeline file in TOML") from None
+        mend = _instead_of_folder(path) or "give a pipeline file in TOML"
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); {mend}") from None
     if len(content) > MAX_BYTES:
         raise ConfigError(f"{path}: more than {MAX_BYTES} bytes; give a pipeline file in TOML")
     try:
-        return parse_toml(content.decode("utf-8"))
+        table = parse_toml(content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: not text in UTF-8 (byte {error.start}); save it as UTF-8") from None
     except ValueError as error:
         cause = " ".join(str(error).split())[:120]
         raise ConfigError(f"{path}: not valid TOML ({cause}); mend that place") from None
+    if "reflector" in table:
+        raise ConfigError(f"{path}: is a scene file, not a pipeline; give trace_then_slam --scene {path.parent}")
+    return table
+
+
+def _instead_of_folder(path: Path) -> str:
+    """What to give instead of a folder in a pipeline file's place: the scene as one, or a run's own pipeline."""
+    if (path / "scene.toml").is_file():
+        return f"give a pipeline, and the scene with it: trace_then_slam --scene {path}"
+    return f"give {path / 'config.toml'}" if (path / "config.toml").is_file() else ""
 
 
 def _near_pipeline(path: Path) -> str:
@@ -174,7 +187,8 @@ def _override(table: dict[str, Any], setting: str, folder: Path = Path()) -> str
 def _source(path: Path, place: str, changed: Sequence[str], unknown: bool = False) -> str:
     """Origin of a pipeline's setting at fault, for messages: `--set` if the command line gave it or a key in it, else
     the file."""
-    set_there = any(f"{place}.".startswith((f"{key}.", f"{key}[")) for key in changed)
+    places = place.split(", ")  # one complaint may be of several
+    set_there = any(f"{one}.".startswith((f"{key}.", f"{key}[")) for key in changed for one in places)
     return "--set" if set_there or (unknown and any(key.startswith(f"{place}.") for key in changed)) else str(path)
 
 

@@ -17,6 +17,9 @@ NUM_PROBES = 400
 MAX_SPEED = 10.0
 """Largest speed [m/s] of an agent indoors; more is a wrong unit."""
 
+LONGEST_GAP, MANY_STEPS = 5.0, 10.0
+"""Gap in a recording [s], and its ratio to the usual step, up to which it is taken for meant."""
+
 
 def agent_errors(room: TriangleArray) -> Iterator[Finding]:
     """Scene check: errors of an agent out of bounds, on a surface, inside an object, or through a wall."""
@@ -42,18 +45,39 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
         mean = np.round(directions[lost].mean(axis=0), 2) + 0.0
         message = f"{lost.mean():.1%} of rays from the start leave the room, towards {mean.tolist()} in the mean"
         yield room.warning("reflector", message, "close the room, if it is not meant to be open")
-    speed = float(np.linalg.norm(np.diff(motion.position, axis=0), axis=-1).max(initial=0.0))
-    step = float(np.diff(motion.time).min(initial=np.inf))
-    if speed > MAX_SPEED * step:
-        yield room.warning("agent", f"it moves at up to {speed / step:.3g} m/s", "give metres and seconds")
+    yield from _odd_steps(room)
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
+        away = np.linalg.norm(np.stack([motion.tx, motion.rx]) - scatterer.position, axis=-1).min(axis=0)
+        radius = max(scatterer.radius or 0.0, MIN_CLEARANCE)
+        if away.min() < radius:
+            at = f"at cycle {int(np.argmin(away))}"
+            message = f"the agent comes within {away.min():.2g} m of its centre {at}, and its radius is {radius:g} m"
+            yield room.warning(field, message, "lead the agent around it")
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
             message = "it lies below the array, which hears from above only"
             yield room.warning(field, message, "raise it above the agent")
         name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
             yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
+
+
+def _odd_steps(room: TriangleArray) -> Iterator[Finding]:
+    """Scene check: warnings of a wrong unit of speed, and of a gap in a recording."""
+    motion = room.scene.agent
+    step = np.diff(motion.time)
+    if not len(step):
+        return
+    speed = np.linalg.norm(np.diff(motion.position, axis=0), axis=-1) / step
+    fast, gap, usual = int(np.argmax(speed)), int(np.argmax(step)), float(np.median(step))
+    if speed[fast] > MAX_SPEED:
+        message = f"it moves at up to {speed[fast]:.3g} m/s (after cycle {fast})"
+        yield room.warning("agent", message, "give metres and seconds, and mend what jumps there")
+    if step[gap] > max(LONGEST_GAP, MANY_STEPS * usual):
+        message = (
+            f"{step[gap]:.3g} s without a pose after cycle {gap}, where else there are {usual:.3g} s between poses"
+        )
+        yield room.warning("agent.trajectory", message, "cut the file there, unless it is meant")
 
 
 def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from rislam_rt.model.itu import ITU_MATERIALS, itu_parameters
 from rislam_rt.model.slab import normal_reflection
 from rislam_rt.scene.check.mesh_queries import touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
+from rislam_rt.scene.check.units import ROOM_FIELD
 from rislam_rt.scene.findings import Finding
 
 FAINT = 10.0 ** (-10.0 / 20.0)
@@ -55,7 +56,7 @@ def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
     diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
         mend = f"metres wanted: is it in {'millimetres' if diagonal > 200.0 else 'kilometres'}?"
-        yield room.warning("reflector", f"the room measures {diagonal:.3g} m across", mend)
+        yield room.warning(ROOM_FIELD, f"the room measures {diagonal:.3g} m across", mend)
     corners = np.round(room.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)

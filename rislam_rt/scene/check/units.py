@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.model import Reflector, Trajectory
 from rislam_rt.scene.findings import Finding
 from rislam_rt.scene.mesh_placement import UNITS
 
@@ -17,16 +18,22 @@ NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
 """Units other than metres that rooms are drawn in, and their names in a scene file."""
 LARGEST_ROOM, SMALLEST_ROOM = 300.0, 1.0
 """Longest side [m] of the largest hall, and of the smallest box that an agent could move in, taken for meant."""
+MANY = 20.0
+"""Ratio of how far meshes of one room reach, above which they are in different units."""
 USUAL_ROOM = (2.0, 100.0)
 """Range [m] of the longest side of rooms, to tell which unit was meant."""
 FAR = 3.0
 """Distance of a point from the room, in sizes of the room, above which it was given in another unit."""
+LONGEST_CYCLE = 10.0
+"""Longest cycle [s] taken for meant."""
 LIMITS = (
     (("ris", "spacing_m"), 0.5, "m", "millimetres", 1e-3),
     (("reflector", "material", "thickness_m"), 3.0, "m", "millimetres", 1e-3),
-    (("agent", "cycle_s"), 10.0, "s", "milliseconds", 1e-3),
+    (("agent", "cycle_s"), LONGEST_CYCLE, "s", "milliseconds", 1e-3),
     (("agent", "velocity"), 10.0, "m/s", "millimetres a second", 1e-3),
     (("agent", "speed_m_s"), 10.0, "m/s", "millimetres a second", 1e-3),
+    (("scatterer", "radius"), 2.0, "m", "millimetres", 1e-3),
+    (("scatterer", "height_m"), 10.0, "m", "millimetres", 1e-3),
     (("agent", "tx_offset_m"), 2.0, "m", "millimetres", 1e-3),
     (("agent", "rx_offset_m"), 2.0, "m", "millimetres", 1e-3),
 )
@@ -34,6 +41,8 @@ LIMITS = (
 
 SPEED_FIELD = "agent.velocity"
 """Key of the scene file that the check of the motion itself looks at too, in a scene that has no errors."""
+ROOM_FIELD = "meshes.units"
+"""Key of the scene file that findings on the size of the whole room name."""
 
 
 def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) -> Iterator[Finding]:
@@ -55,11 +64,35 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
         return
     room = _room_unit(bounds)
     if room is not None:
-        yield Finding("warning", file, "meshes.units", *room)
+        yield Finding("warning", file, ROOM_FIELD, *room)
         return  # points in metres lie outside a room in millimetres, or in its corner
     for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position"), ("agent", "waypoints")):
         for field, point in _points(table, path):
             yield from _far_point(file, field, point, bounds)
+
+
+def recording_unit_warnings(file: str, agent: Trajectory, bounds: Floats) -> Iterator[Finding]:
+    """Scene check: warnings of a recording whose times or places look as if they were in another unit; `bounds`
+    (2, 3) [m] are those of the meshes."""
+    field, step = "agent.trajectory", np.diff(agent.time)
+    usual = float(np.median(step)) if len(step) else 0.0
+    if usual > LONGEST_CYCLE:
+        message = f"{usual:.3g} s between poses; in milliseconds it would be {usual * 1e-3:.3g} s"
+        yield Finding("warning", file, field, message, "give seconds, or end the name of a CSV column in _ms")
+    yield from _far_point(file, field, agent.position[0], bounds)
+
+
+def lone_mesh_warnings(file: str, reflectors: Sequence[Reflector]) -> Iterator[Finding]:
+    """Scene check: warnings of meshes that reach so much farther than most that they are in another unit."""
+    reach = np.array([np.abs(one.vertices).max() for one in reflectors])
+    usual = float(np.median(reach))
+    for number, (one, far) in enumerate(zip(reflectors, reach, strict=True)):
+        unit = next((unit for unit, name in NAMES.items() if far > MANY * usual >= far * UNITS[name]), None)
+        if unit is not None:
+            meant = f"in {unit} it would be {far * UNITS[NAMES[unit]]:.3g} m"
+            message = f"it reaches {far:.3g} m from the room's zero, most others {usual:.3g} m; {meant}"
+            mend = f'say units = "{NAMES[unit]}" beside it, or mend its origin'
+            yield Finding("warning", file, f"reflector[{number}].units ({one.name})", message, mend)
 
 
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
@@ -75,7 +108,7 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
                 return f"the room is {words} m; in {unit} it would be {meant} m", mend
         return f"the room is {words} m", "give metres"
     if longest < SMALLEST_ROOM:
-        return f"the room is {words} m", "give metres; a drawing in kilometres or to a scale has to be enlarged"
+        return f"the room is {words} m", "give its units in the table [meshes]; a drawing to a scale has to be enlarged"
     return None
 
 

@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from typing import Any, get_args
 
 from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.schema import ItuMaterial
 
@@ -55,7 +56,8 @@ def parse_material(text: str) -> dict[str, Any]:
     except ValueError:
         pass
     if kind == "itu" and name not in known:
-        raise ConfigError(f"--material: '{name[:40]}' is no ITU material; give one of {', '.join(known)}")
+        mend = did_you_mean(nearest(name.lower(), known)) or f"give one of {', '.join(known)}"
+        raise ConfigError(f"--material: '{name[:40]}' is no ITU material; {mend}")
     wanted = "give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
     raise ConfigError(f"--material: '{text[:60]}' received; {wanted}")
 

@@ -2,14 +2,15 @@
 
 import csv
 import io
-import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.input_messages import counted
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.motion.recorded_columns import QUATERNION, few_names, find_columns
 from rislam_rt.scene.schema import SMALLEST
 
 MAX_TIME = 1e11
@@ -18,17 +19,12 @@ MAX_STEP = 1e6
 """Longest step [s] within a recording, twelve days: longer gaps lie between recordings."""
 MAX_TILT = 1e-3
 """Largest angle [rad] of a recorded pose's z axis from the room's: the body turns about z only."""
-QUATERNION = ("qx", "qy", "qz", "qw")
-COLUMNS = ("time", "x", "y", "z", "heading", *QUATERNION)
-"""Quantities of each pose that a CSV file may hold."""
-ALIASES = {"time": ("time", "timestamp", "t"), "heading": ("heading", "yaw")}
-"""Names of CSV columns that are looked for where the scene file names no column."""
-UNITS = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "heading": {"rad": 1.0, "deg": float(np.pi / 180.0)},
-    **{axis: {"m": 1.0, "cm": 1e-2, "mm": 1e-3} for axis in "xyz"},
-}
-"""Units of CSV columns by the endings of their names, after `_`; seconds, radians and metres without one."""
+MAX_HEADING = 6.0 * np.pi
+"""Largest recorded heading [rad], three turns one way: more is taken for degrees."""
+SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "blanks"}
+"""What other separators of CSV files than commas are called."""
+COMMAS = "separate columns by commas, write decimals with a point"
+"""How to mend a CSV file of another country."""
 
 
 class RecordedPoses(NamedTuple):
@@ -51,10 +47,11 @@ def parse_tum(content: bytes) -> tuple[Floats, Floats, Floats]:
         A line is not eight finite numbers, time does not grow, or a pose is tilted.
     """
     rows = []
-    for number, line in enumerate(content.decode("utf-8", errors="replace").splitlines(), start=1):
+    wanted = "give 'timestamp x y z qx qy qz qw' without commas; a file with column names ends in .csv"
+    for number, line in enumerate(content.decode("utf-8-sig", errors="replace").splitlines(), start=1):
         words = line.split("#")[0].split()
         if words:
-            rows.append(_numbers(words, 8, number, "give 'timestamp x y z qx qy qz qw'"))
+            rows.append(_numbers(words, 8, number, wanted))
     if not rows:
         raise Fault("the trajectory file holds no pose", "give lines 'timestamp x y z qx qy qz qw'")
     table = np.array(rows)
@@ -66,17 +63,19 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     """Parse recorded poses from a CSV file with one line of column names; `named` says which columns hold what, where
     they are not called `time`, `x`, `y`, `z`, `heading`, `qx` to `qw` anyway.
 
-    A name's ending tells its unit: `stamp_ns`, `x_mm`, `yaw_deg`. Other columns are left alone.
+    A name's last word tells its unit: `stamp_ns`, `x_mm`, `yaw_deg`. Other columns are left alone.
 
     Raises
     ------
     Fault
-        A column is missing, a line is not as long as the header, a number is none, or time does not grow.
+        The file is no CSV, a column is missing, a line is longer than the header, a number is none, or time does not
+        grow.
     """
-    lines = list(csv.reader(io.StringIO(content.decode("utf-8-sig", errors="replace"))))
-    header = [name.strip() for name in lines[0]] if lines else []
-    place = {what: at for what in COLUMNS if (at := _column(what, header, named)) is not None}
-    wanted = f"give a number in each column that is read, of {_few(header)}"
+    lines = _csv_lines(content)
+    header = [name.strip() for name in lines[0]]
+    place = find_columns(header, named)
+    _check_lengths(lines)
+    wanted = f"give a number in each column that is read, of {few_names(header)}"
     rows = [
         _numbers([line[at] if at < len(line) else "" for at, _ in place.values()], len(place), number, wanted)
         for number, line in enumerate(lines[1:], start=2)
@@ -87,34 +86,52 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     table = {what: column * scale for (what, (_, scale)), column in zip(place.items(), np.array(rows).T, strict=True)}
     time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
     if "heading" in table:
-        return RecordedPoses(time, position, table["heading"])
+        return RecordedPoses(time, position, _in_radians(table["heading"]))
     turned = all(part in table for part in QUATERNION)
     return RecordedPoses(time, position, _heading(np.column_stack([table[q] for q in QUATERNION])) if turned else None)
 
 
-def _column(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
-    """Index and unit in SI of the CSV column that holds a quantity; None for one that may be left out."""
-    if what in named:
-        if named[what] not in header:
-            raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {_few(header)}")
-        return header.index(named[what]), _unit(what, named[what])
-    for at, name in enumerate(header):
-        if re.sub("_[a-z]+$", "", name.lower()) in ALIASES.get(what, (what,)):
-            return at, _unit(what, name)
-    if what in ("time", "x", "y", "z"):
-        mend = f'name it in agent.columns, e.g. columns = {{ {what} = "..." }}; the file has {_few(header)}'
-        raise Fault(f"no column '{what}' in the trajectory", mend)
-    return None
+def _csv_lines(content: bytes) -> list[list[str]]:
+    """Lines of a CSV file of recorded poses, each a list of entries; of the first one, the names, at least one.
+
+    Raises
+    ------
+    Fault
+        It is empty, or no CSV file in UTF-8 with commas.
+    """
+    if b"\0" in content:
+        raise Fault("the trajectory file is not text in UTF-8", "save it as CSV in UTF-8")
+    try:
+        lines = list(csv.reader(io.StringIO(content.decode("utf-8-sig", errors="replace"), newline=None)))
+    except csv.Error as error:
+        raise Fault(
+            f"the trajectory is no CSV file ({error})", "give a line of column names, then one a pose"
+        ) from None
+    if not lines or not any(lines[0]):
+        raise Fault("the trajectory file does not begin with column names", "give 'time,x,y,z', then one line a pose")
+    alone = lines[0][0].strip() if len(lines[0]) == 1 else "#"
+    used = next((words for mark, words in SEPARATORS.items() if mark in alone and not alone.startswith("#")), "")
+    if used:
+        raise Fault(f"{used} between the columns of the trajectory", COMMAS)
+    return lines
 
 
-def _unit(what: str, name: str) -> float:
-    """Unit of a recording's CSV column in SI, by the ending of its name."""
-    return UNITS.get(what, {}).get(name.lower().rpartition("_")[2], 1.0)
+def _check_lengths(lines: Sequence[Sequence[str]]) -> None:
+    """Check that no line of a CSV file of recorded poses has more entries than the first has names."""
+    count = len(lines[0])
+    for number, line in enumerate(lines, start=1):
+        if any(word.strip() for word in line[count:]):
+            what = f"line {number} of the trajectory has {len(line)} entries for {counted(count, 'column')}"
+            raise Fault(what, COMMAS)
 
 
-def _few(header: Sequence[str]) -> str:
-    """Column names of a CSV file of recorded poses for an error message, a dozen at most."""
-    return ", ".join(f"'{name[:20]}'" for name in header[:12]) or "no columns"
+def _in_radians(heading: Floats) -> Floats:
+    """Recorded headings (K,) [rad] as they are, unless they can only be degrees."""
+    largest = float(heading[np.argmax(np.abs(heading))])
+    if abs(largest) > MAX_HEADING:
+        mend = "call the column 'heading_deg' if these are degrees, or bring them to -pi to pi"
+        raise Fault(f"a heading of {largest:.4g} rad in the trajectory", mend)
+    return heading
 
 
 def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[float]:
@@ -125,14 +142,18 @@ def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[f
         row = []
     if len(row) != count or not np.isfinite(row).all():
         amount = {8: "eight"}.get(count, str(count))
-        raise Fault(f"line {number} of the trajectory is not {amount} finite numbers", mend)
+        given = ", ".join(word.strip()[:20] for word in words[:9])
+        raise Fault(f"line {number} of the trajectory is not {amount} finite numbers ({given})", mend)
     return row
 
 
 def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
     """Check that times and positions can be those of recorded poses, and return them as they are."""
     if np.abs(time).max() > MAX_TIME:
-        raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", "give seconds")
+        raise Fault(
+            f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory",
+            "give seconds, or end the name of a CSV column in its unit: time_ns",
+        )
     step = np.diff(time)
     if (step <= 0.0).any():
         pose = int(np.argmax(step <= 0.0)) + 1
@@ -158,5 +179,6 @@ def _heading(q: Floats) -> Floats:
     x, y, z, w = (q / length[:, None]).T
     tilt = 2.0 * np.hypot(x, y)
     if (tilt > MAX_TILT).any():
-        raise Fault(f"pose {int(np.argmax(tilt > MAX_TILT))} is tilted", "give rotations about z only (qx = qy = 0)")
+        pose, mend = int(np.argmax(tilt > MAX_TILT)), "give rotations about z only (qx = qy = 0), qw last"
+        raise Fault(f"pose {pose} is tilted", mend)
     return np.asarray(2.0 * np.arctan2(z, w))

@@ -10,7 +10,7 @@ import pytest
 
 import rislam_rt
 from rislam_rt.cli.options import parse_point
-from rislam_rt.cli.slam import _new_folder, command
+from rislam_rt.cli.slam import _body, _new_folder, _prior, _true_positions, command
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import ReceiverConfig, build_sensor
 from rislam_rt.model import SensorModel
@@ -257,3 +257,20 @@ def test_the_pages_example_in_python_runs(capsys: pytest.CaptureFixture[str]) ->
     (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(block, {})
     assert capsys.readouterr().out.startswith("SlamEstimate: at (0.50")
+
+
+def test_true_poses_may_be_a_csv_file(tmp_path: Path) -> None:
+    (tmp_path / "poses.csv").write_text("time,x_mm,y_mm,z_mm\n0,1000,2000,500\n0.1,1010,2000,500\n")
+    assert _true_positions(tmp_path / "poses.csv", 2).tolist() == [[1.0, 2.0, 0.5], [1.01, 2.0, 0.5]]
+
+
+def test_a_start_or_a_body_in_millimetres_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    stds = (0.01, 0.01, 0.0)
+    _prior("1,1,0.5", "0.3,0.4,0", stds)
+    _body("0.05,0,0", "-0.05,0,0")
+    assert not capsys.readouterr().err
+    _prior("1,1,0.5", "300,400,0", stds)
+    _body("50,0,0", "-0.05,0,0")
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "warning: --velocity: 500 m/s; give metres a second"
+    assert said[1] == "warning: --tx: 50 m from the agent's position; give metres"

@@ -126,7 +126,9 @@ def test_a_list_that_is_none_is_told_as_the_file_needs_it(write):
         load_spec(write(MINIMAL + 'schemes = "exact"\n'))
 
 
-@pytest.mark.parametrize("setting", ["", "seed", "=3", "a b=1", "name.x=1", "seed=seven", "radio.x=1"])
+@pytest.mark.parametrize(
+    "setting", ["", "seed", "=3", "a b=1", "name.x=1", "seed=seven", "radio.x=1", "design.iterations=0"]
+)
 def test_bad_override_is_laid_to_the_command_line(write, setting):
     with pytest.raises(ConfigError, match="--set"):
         load_spec(write(MINIMAL), [setting])
@@ -145,6 +147,27 @@ def test_missing_file_and_folder(tmp_path):
         load_spec(tmp_path / "none.toml")
     with pytest.raises(ConfigError, match="cannot be read"):
         load_spec(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(b"\xff\xfen\x00", "not text in UTF-8 (byte 0); save it as UTF-8"),
+     (b'name = "a"\n[[reflector]]\nname = "b"\n', "is a scene file, not a pipeline; give trace_then_slam --scene ")],
+)  # fmt: skip
+def test_a_file_that_is_no_pipeline_is_said_to_be_what_it_is(tmp_path, content, says):
+    (tmp_path / "mine.toml").write_bytes(content)
+    with pytest.raises(ConfigError) as caught:
+        load_spec(tmp_path / "mine.toml")
+    assert says in str(caught.value)
+    assert len(caught.value.lines) == 1
+
+
+def test_a_scene_or_a_run_in_a_pipelines_place_is_said_what_to_give(tmp_path):
+    for file, says in (("config.toml", f"give {tmp_path / 'config.toml'}"), ("scene.toml", f"--scene {tmp_path}")):
+        (tmp_path / file).write_text("")
+        with pytest.raises(ConfigError, match=r"cannot be read \(Is a directory\)") as caught:
+            load_spec(tmp_path)
+        assert str(caught.value).endswith(says)
 
 
 def test_specification_survives_its_own_dump(write):

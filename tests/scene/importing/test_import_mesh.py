@@ -154,6 +154,8 @@ def test_names_speak_of_materials() -> None:
     assert {name: itu_by_word(name) for name in names} == names
     assert set(THICKNESS) == set(get_args(ItuMaterial))
     assert parse_material("itu:glass") == {"itu": "glass", "thickness_m": 0.006}
+    with pytest.raises(RislamError, match=r"is no ITU material; did you mean .concrete.\?"):
+        parse_material("itu:Concreet")
     for wrong in ("itu:cheese", "reflection:1.5", "concrete", "itu:wood:-1", "reflection:nan"):
         with pytest.raises(RislamError, match="--material"):
             parse_material(wrong)

@@ -1,0 +1,47 @@
+"""Warnings of a motion of the agent that receiver or filter does not reckon with: too fast, or manoeuvring too hard."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.model import Scene
+from rislam_rt.scene.findings import Finding
+from rislam_rt.slam.model_constants import CONSTANTS
+
+GRAVITY = 9.81
+"""Acceleration [m/s^2] that nothing which rolls or walks on a floor exceeds: friction carries about its weight."""
+
+
+def motion_warnings(scene: Scene, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
+    """Warnings of an agent that is faster than its receiver assumes, but for rounding, or that speeds up as nothing on
+    a floor does; `file` is what they name as their place."""
+    if receiver.alternation and scene.ris is not None:
+        yield from _fast_agent(scene, receiver.top_speed, file)
+    yield from _manoeuvring_agent(scene, file)
+
+
+def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:
+    """Motion warning of a speed above the receiver's `top_speed` [m/s]."""
+    speed = np.linalg.norm(scene.agent.velocity, axis=1)
+    cycle = int(np.argmax(speed))
+    if speed[cycle] > (1.0 + 1e-6) * top_speed:
+        message = (
+            f"{top_speed:g} m/s, and the agent moves at up to {speed[cycle]:.3g} m/s (cycle {cycle}): paths over walls "
+            "and scatterers may pass for the panel's"
+        )
+        mend = f"give receiver.top_speed = {np.ceil(10.0 * speed[cycle]) / 10.0:g}"
+        yield Finding("warning", file, "receiver.top_speed", message, mend)
+
+
+def _manoeuvring_agent(scene: Scene, file: str) -> Iterator[Finding]:
+    """Motion warning of an acceleration that no floor gives."""
+    change = np.linalg.norm(np.diff(scene.agent.velocity, axis=0), axis=1) / np.diff(scene.agent.time)
+    if change.max(initial=0.0) > GRAVITY:
+        cycle = int(np.argmax(change))
+        message = (
+            f"it speeds up or slows down by {change[cycle]:.3g} m/s^2 after cycle {cycle}, more than any floor gives; "
+            f"the filter's liveliest motion has a deviation of {CONSTANTS.liveliest:g} m/s^2"
+        )
+        mend = "mend what jumps there, or smooth the recording"
+        yield Finding("warning", file, "agent", message, mend)

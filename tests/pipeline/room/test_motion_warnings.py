@@ -1,0 +1,43 @@
+"""A motion that receiver or filter does not reckon with is said, with its cycle."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.pipeline.room.motion_warnings import motion_warnings
+from rislam_rt.scene import load_scene
+from rislam_rt.shipped import find_room, shipped_rooms
+
+
+def said(scene, **receiver):
+    return [finding.line for finding in motion_warnings(scene, ReceiverConfig(**receiver), "scene.toml")]
+
+
+def faster(room, cycle, velocity):
+    """The room's agent with another velocity in one cycle."""
+    changed = room.agent.velocity.copy()
+    changed[cycle] = velocity
+    return replace(room, agent=replace(room.agent, velocity=changed))
+
+
+def test_a_speed_above_the_receivers_is_said_with_its_cycle(room):
+    (line,) = said(faster(room, 7, [0.6, 0.0, 0.0]))
+    assert line.startswith("scene.toml: receiver.top_speed: 0.5 m/s, and the agent moves at up to 0.6 m/s (cycle 7)")
+    assert line.endswith("give receiver.top_speed = 0.6")
+    assert not said(faster(room, 7, [0.6, 0.0, 0.0]), top_speed=0.6)
+    assert not said(faster(room, 7, [0.6, 0.0, 0.0]), alternation=False)
+    assert not said(replace(faster(room, 7, [0.6, 0.0, 0.0]), ris=None))
+
+
+def test_an_acceleration_that_no_floor_gives_is_said_with_the_filters_liveliest(room):
+    step = np.diff(room.agent.time)[6]
+    jump = room.agent.velocity[7] + [0.0, 10.0 * step, 0.0]  # a little above 9.81 m/s^2 for one step, and back
+    (line,) = said(faster(room, 7, jump), top_speed=2.0)
+    assert "scene.toml: agent: it speeds up or slows down by 10 m/s^2 after cycle" in line
+    assert "the filter's liveliest motion has a deviation of 1 m/s^2" in line
+    assert not said(faster(room, 7, room.agent.velocity[7] + [0.0, 9.0 * step, 0.0]), top_speed=2.0)
+
+
+def test_the_rooms_that_come_with_the_package_move_as_is_reckoned_with():
+    assert not [line for name in shipped_rooms() for line in said(load_scene(find_room(name)))]

@@ -1,0 +1,78 @@
+"""Columns of a recording: what their names say, and that none is passed over which was meant."""
+
+import numpy as np
+import pytest
+
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.motion.recorded_columns import find_columns
+from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
+
+PLACE = ["time", "x", "y", "z"]
+
+
+def refused(header: list[str], named: dict[str, str] | None = None) -> str:
+    with pytest.raises(Fault, match=r".") as caught:
+        find_columns(header, named or {})
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("heading", 1.0), ("yaw_deg", np.pi / 180), ("Yaw (deg)", np.pi / 180), ("yaw[degrees]", np.pi / 180),
+     ("heading_rad", 1.0), (" Heading ", 1.0)],
+)  # fmt: skip
+def test_a_heading_is_read_under_its_usual_names_and_units(name: str, unit: float) -> None:
+    assert find_columns([*PLACE, "note", name], {})["heading"] == (5, pytest.approx(unit))
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("bearing", "heading"), ("headng", "heading"), ("theta_deg", "heading"), ("heading_true", "heading"),
+     ("yawDeg", "heading"), ("quat_x", "qx"), ("orientation_w", "qw")],
+)  # fmt: skip
+def test_a_heading_under_another_name_is_not_passed_over(name: str, meant: str) -> None:
+    line = refused([*PLACE, "note", name])
+    assert f"column '{name}' of the trajectory seems to be a heading" in line
+    assert f"did you mean '{meant}'?" in line
+    assert f'columns = {{ {meant} = "{name}" }}' in line
+
+
+@pytest.mark.parametrize(
+    ("header", "says"),
+    [("stamp,pos_x,pos_y,pos_z", '{ time = "stamp" }'), ("t,qx,px,py,pz", '{ x = "px" }'),
+     ("t,x,y,z_map", '{ z = "z_map" }'), ("t,x,y,height", '{ z = "..." }; the file has \'t\', \'x\'')],
+)  # fmt: skip
+def test_a_missing_column_is_told_with_the_likeliest(header: str, says: str) -> None:
+    assert f"name it in agent.columns, e.g. columns = {says}" in refused(header.split(","))
+
+
+def test_what_is_told_about_a_heading_and_all_other_columns_are_left_alone() -> None:
+    others = ["yaw_rate", "heading_std_deg", "x_std", "vx", "time_offset", "note"]
+    assert set(find_columns([*others, *PLACE], {})) == set(PLACE)
+    assert find_columns([*others, *PLACE], {})["x"].column == len(others) + 1
+    assert "heading" in find_columns([*PLACE, "yaw", "bearing"], {})
+    assert find_columns([*PLACE, "bearing"], {"heading": "bearing"})["heading"] == (4, 1.0)
+
+
+def test_half_a_quaternion_and_two_columns_for_one_quantity_are_refused() -> None:
+    assert "a quaternion without 'qw'" in refused([*PLACE, "qx", "qy", "qz"])
+    assert "columns 'x' and 'x_mm' of the trajectory may both be 'x'; name it" in refused([*PLACE, "x_mm"])
+    assert find_columns([*PLACE, "x_mm"], {"x": "x_mm"})["x"] == (4, 1e-3)
+
+
+def test_headings_that_can_only_be_degrees_are_refused() -> None:
+    rows = "".join(f"{k},0,0,1,{10 * k}\n" for k in range(9))
+    with pytest.raises(Fault, match=r"a heading of 80 rad .*; call the column 'heading_deg'"):
+        parse_csv(f"t,x,y,z,yaw\n{rows}".encode(), {})
+    found = parse_csv(f"t,x,y,z,yaw_deg\n{rows}".encode(), {}).heading
+    assert found is not None
+    np.testing.assert_allclose(found, np.radians(10.0 * np.arange(9)))
+
+
+def test_a_byte_order_mark_and_old_line_ends_do_no_harm() -> None:
+    expected = parse_csv(b"t,x,y,z\n0,1,2,3\n1,2,2,3\n", {})
+    for content in (b"\xef\xbb\xbft,x,y,z\r\n0,1,2,3\r\n1,2,2,3\r\n", b"t,x,y,z\r0,1,2,3\r1,2,2,3\r"):
+        assert np.array_equal(parse_csv(content, {}).position, expected.position)
+    assert parse_tum(b"\xef\xbb\xbf0 1 2 3 0 0 0 1\n")[1].tolist() == [[1.0, 2.0, 3.0]]
+    with pytest.raises(Fault, match=r"\(0,1,2,3\); give .* a file with column names ends in .csv"):
+        parse_tum(b"0,1,2,3\n")
