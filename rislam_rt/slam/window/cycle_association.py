@@ -11,7 +11,7 @@ from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs, within_r
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
-from rislam_rt.slam.window.horizon_detection import expected_above, prior_tilts, weigh_tilts
+from rislam_rt.slam.window.landmarks.horizon_detection import expected_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, recall_rises, visible
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
@@ -196,8 +196,8 @@ def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) ->
     """Covariance of the present with the height's variance widened by what the motion model may be off by, where wall
     returns are used.
 
-    Across, a livelier motion is looked at beside the one that is held (`filter._associate_over_motions`); upwards none
-    is. Without wall returns next to nothing measures the height: a gate as wide as it may be off holds anything.
+    A livelier motion is looked at beside the one that is held (`filter._associate_over_motions`), but a slow climb is
+    none. Without wall returns next to nothing measures the height: a gate as wide as it may be off holds anything.
     """
     if not scene.use_vt:
         return covariance

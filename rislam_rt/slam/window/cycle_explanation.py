@@ -17,13 +17,13 @@ from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
-from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
-from rislam_rt.slam.window.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
+from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
+from rislam_rt.slam.window.landmarks.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, Residuals, append, unique_forms
+from rislam_rt.slam.window.measurement_log import Log, Residuals, append, scatter_variance
 from rislam_rt.slam.window.motion_learning import log_manoeuvre
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
@@ -156,41 +156,6 @@ def _explain(
     return log.explain(at, idents(landmarks, forms), np.where(both[:, 0], share, 0.0), shared, scatter)
 
 
-def scatter_variance(scatter: Floats, std: Floats) -> Floats:
-    """Extra variance (A, 3) beyond the reported one of components on paths whose residuals have the mean square
-    `scatter` (A,), in reported deviations."""
-    return np.asarray(CONSTANTS.memory * (np.maximum(scatter, 1.0) - 1.0)[:, None] * std**2)
-
-
-def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int) -> Log:
-    """Re-estimate the extra variance of all wall returns in the log from the residuals of the same path in earlier and
-    later cycles.
-
-    Points keep theirs, as their panel identity was weighed with it. The prior (`crowd`) counts as one measurement.
-    """
-    left = left.take(log.form[left.row, 0, 0] == TX)
-    if not len(left.row):
-        return log
-    std = log.std[left.row]
-    raw = left.square
-    _, which = unique_forms(log.form[left.row, 0])
-    total, count = np.zeros((2, num_poses, which.max() + 1))
-    np.add.at(total, (left.slot, which), np.minimum(raw, _loudest(log, left.row)))
-    np.add.at(count, (left.slot, which), 1.0)
-    slots = np.arange(num_poses)
-    fade = (1.0 - CONSTANTS.memory / CONSTANTS.window) ** np.abs(slots[:, None] - slots)
-    scatter = ((CONSTANTS.crowd + fade @ total) / (1.0 + fade @ count))[left.slot, which]
-    extra = log.extra.copy()
-    extra[left.row] = log.shared[left.row] + scatter_variance(scatter, std)
-    return log._replace(extra=extra)
-
-
-def _loudest(log: Log, rows: Integers) -> Floats:
-    """Largest mean squares (A,) that unresolved neighbours give to errors of the log's components `rows` (A,), in
-    reported deviations: those of a neighbour as loud as the component, which its own SNR is worth."""
-    return np.asarray(1.0 + 0.5 / np.maximum(log.log_amplitude_std[rows], 1e-6) ** 2)
-
-
 def _squares(left: Residuals, log: Log, rows: Integers) -> Floats:
     """Mean squared residuals (A,) of explained components, as rows of the log, in reported standard deviations."""
     if not len(rows):
@@ -270,7 +235,8 @@ def _follow(
     left[free], left[picks] = True, False
     spare = left.nonzero()[0]
     reach = np.maximum(observed.seen[spare, 0], 0.5)
-    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * (speed + 0.05)
+    # tracks are witnesses of the motion: none is presumed to know the one that is believed in
+    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * np.hypot(speed, CONSTANTS.walk)
     if len(state.level) > 2:  # what turns without a compass turns all that it sees
         rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
     found, fresh = tracks.start(found, observed, spare, rate, state.cycle)

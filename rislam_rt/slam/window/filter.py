@@ -23,7 +23,6 @@ from rislam_rt.slam.window.cycle_explanation import (
     log_associations,
     outcome_of,
     remove_or_add_features,
-    reweigh_wall_returns,
     unexplained,
 )
 from rislam_rt.slam.window.divergence import divergence_monitor, recovery
@@ -31,7 +30,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.manoeuvres import with_manoeuvre
-from rislam_rt.slam.window.measurement_log import Residuals, empty_log, squares
+from rislam_rt.slam.window.measurement_log import Residuals, empty_log, reweigh_wall_returns, squares
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
@@ -90,9 +89,9 @@ def step(
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))
     bend = np.sqrt(float(motion.expected_variance(state.level[0] @ motion.transition(CONSTANTS.stay))))
     beside = beside_panels(state, observed, dt, turn, bend)
-    state, view = _associate_over_motions(state, heading, code, observed, strangers, beside)
+    state, view, lively = _associate_over_motions(state, heading, code, observed, strangers, beside)
     state, used = log_associations(state, observed, view)
-    state, view, left, nis, uncertain = _solve(state, view, used)
+    state, view, left, nis, uncertain = _solve(state, view, used, lively)
     heard = heard._replace(observed=levelled_observations(observed, state.log, uncertain))
     jumped, before = state.lost_log_odds == 0.0, state.lost_log_odds
     state, landmark = learn_cycle(state, heard, view, used, left, dt, turn, bend, code)
@@ -152,9 +151,10 @@ def smoothed(state: WindowState) -> Floats:
 def _associate_over_motions(
     state: WindowState, heading: float, code: RisCode | None, observed: Observations, strangers: Floats,
     beside: tracks.Continuations | None,
-) -> tuple[WindowState, CycleAssociation]:  # fmt: skip
-    """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, a turn of the body
-    that no compass tells, or a jump in position, and return the state and association of the likeliest.
+) -> tuple[WindowState, CycleAssociation, tuple[float, float]]:  # fmt: skip
+    """Associate a cycle's components under the motion as believed, a manoeuvre in the last steps, across and then
+    upwards, a turn of the body that no compass tells, or a jump in position, and return the state and association of
+    the likeliest, and the log odds of these two manoeuvres, 0 for what is not believed.
 
     A jump has to explain the cycle better than being lost does, which explains nothing.
     """
@@ -165,23 +165,21 @@ def _associate_over_motions(
             state.sway, beside,
         )  # fmt: skip
 
-    calm = best = view_of(state.window)
-    window = state.window
+    lively, window, best = [0.0, 0.0], state.window, view_of(state.window)
     learnt = state.config.motion == "learnt"  # a motion that is told stays told
-    if learnt and len(calm.groups.leader) and len(state.window.step):
-        lively = window_gaussian.now_under(
-            window, motion_learning.livelier(window.solved), (calm.mean, calm.covariance)
-        )
-        score = score_again(calm, *lively, observed, strangers)
-        if score + CONSTANTS.log_rare > calm.score:
-            trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
+    for axis in range(2 if learnt and len(best.groups.leader) and len(window.step) else 0):
+        solved = motion_learning.livelier(window.solved, upwards=axis == 1)
+        now = window_gaussian.now_under(window, solved, (best.mean, best.covariance))
+        prior = CONSTANTS.log_rare - axis * CONSTANTS.log_upright  # upwards, of a floor that is not level besides
+        if score_again(best, *now, observed, strangers) + prior > best.score:
+            trial = motion_learning.solve_livelier(window, upwards=axis == 1)
             view = view_of(trial)
-            if view.score + CONSTANTS.log_rare > calm.score:
-                best, window = view, trial
+            log_odds = view.score + prior - best.score
+            if log_odds > 0.0:
+                lively[axis], window, best = log_odds, trial, view
     if best.surprise > 1.0 and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
-        trial = window_gaussian.solve(window._replace(precision=motion_learning.livelier(window.precision)))
-        trial = divergence_monitor.turned(trial, angle)
+        trial = divergence_monitor.turned(motion_learning.solve_livelier(window), angle)
         view = view_of(trial)
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial
@@ -189,16 +187,17 @@ def _associate_over_motions(
         by = divergence_monitor.jump(best, observed, state.scene.use_vt)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
-            return recovery.after_jump(state, by), view
-    return state._replace(window=window), best
+            return recovery.after_jump(state, by), view, (0.0, 0.0)
+    return state._replace(window=window), best, (lively[0], lively[1])
 
 
 def _solve(
-    state: WindowState, view: CycleAssociation, used: Booleans
+    state: WindowState, view: CycleAssociation, used: Booleans, lively: tuple[float, float]
 ) -> tuple[WindowState, CycleAssociation, Residuals, float, Floats]:  # fmt: skip
     """Update the window with a cycle's associated components by two Gauss-Newton steps, the first on the association's
-    predictions; re-linearises all poses every few cycles, else the last one. Also returns the association with what
-    the attitude makes of it, residuals, squared innovation, and the covariance (A, A) [rad^2] of the attitude."""
+    predictions; re-linearises all poses every few cycles, else the last one. `lively` are the log odds of manoeuvres by
+    which they were associated. Also returns the association with what the attitude makes of it, residuals, squared
+    innovation, and the covariance (A, A) [rad^2] of the attitude."""
     axes = len(state.attitude_variance)
     innovation, jacobian, turned = innovations(view, state.log, used, state.cycle, axes)
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
@@ -223,7 +222,7 @@ def _solve(
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
     spread = prediction_variance(window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread, _excess_variance(window, left)))
-    state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window)))
+    state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window), lively))
     return state, view, left, float(np.sum(innovation**2)), covariance
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 
 
@@ -73,6 +74,12 @@ class Log(NamedTuple):
         `extra`, as its pull keeps its sign for as many cycles."""
         std, extra, shared = self.std[rows], self.extra[rows], self.shared[rows]
         return np.asarray(std**2 + shared + (extra - shared) / CONSTANTS.memory)
+
+    def scatter(self, rows: Integers) -> Floats:
+        """Mean squares (A,) of the residuals of wall returns `rows` (A,), in reported deviations, by which they are
+        weighed: what `extra` holds of scatter."""
+        pulled = self.extra[rows, 0] - self.shared[rows, 0]
+        return np.asarray(1.0 + pulled / (CONSTANTS.memory * self.std[rows, 0] ** 2))
 
     def sharper(self, rows: Integers) -> Floats:
         """Factor (A, 3) by which residuals of the components `rows` (A,) grow where they are measured in deviations of
@@ -186,3 +193,40 @@ def unique_forms(forms: Integers) -> tuple[Integers, Integers]:
     code = (forms + 1) @ base ** np.arange(forms.shape[1])[::-1]
     _, first, place = np.unique(code, return_index=True, return_inverse=True)
     return forms[first], place
+
+
+def scatter_variance(scatter: Floats, std: Floats) -> Floats:
+    """Extra variance (A, 3) beyond the reported one of components on paths whose residuals have the mean square
+    `scatter` (A,), in reported deviations."""
+    return np.asarray(CONSTANTS.memory * (np.maximum(scatter, 1.0) - 1.0)[:, None] * std**2)
+
+
+def reweigh_wall_returns(log: Log, left: Residuals, num_poses: int, until: int | None = None) -> Log:
+    """Re-estimate the extra variance of all wall returns in the log from the residuals of the same path in earlier and
+    later cycles, if they are among the first `until` of the window.
+
+    Points keep theirs, as their panel identity was weighed with it. The prior (`crowd`) counts as one measurement.
+    """
+    left = left.take(log.form[left.row, 0, 0] == TX)
+    if not len(left.row):
+        return log
+    std = log.std[left.row]
+    raw = left.square
+    _, which = unique_forms(log.form[left.row, 0])
+    total, count = np.zeros((2, num_poses, which.max() + 1))
+    np.add.at(total, (left.slot, which), np.minimum(raw, _loudest(log, left.row)))
+    np.add.at(count, (left.slot, which), 1.0)
+    if until is not None:
+        total[until:], count[until:] = 0.0, 0.0
+    slots = np.arange(num_poses)
+    fade = (1.0 - CONSTANTS.memory / CONSTANTS.window) ** np.abs(slots[:, None] - slots)
+    scatter = ((CONSTANTS.crowd + fade @ total) / (1.0 + fade @ count))[left.slot, which]
+    extra = log.extra.copy()
+    extra[left.row] = log.shared[left.row] + scatter_variance(scatter, std)
+    return log._replace(extra=extra)
+
+
+def _loudest(log: Log, rows: Integers) -> Floats:
+    """Largest mean squares (A,) that unresolved neighbours give to errors of the log's components `rows` (A,), in
+    reported deviations: those of a neighbour as loud as the component, which its own SNR is worth."""
+    return np.asarray(1.0 + 0.5 / np.maximum(log.log_amplitude_std[rows], 1e-6) ** 2)

@@ -10,12 +10,14 @@ which the height does not change, by the marginal likelihood of all steps togeth
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.smoother import motion
+from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import form_and_log_det, inverse
+from rislam_rt.slam.window.smoother.manoeuvre_segments import manoeuvring_share
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, step_covariances
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
@@ -38,17 +40,25 @@ class VerticalInformation(NamedTuple):
     """(K,) [s^2/m] ...its product with the accelerations that it tells of."""
 
 
-def learn_motion(state: WindowState) -> WindowState:
+def learn_motion(state: WindowState, lively: tuple[float, float] = (0.0, 0.0)) -> WindowState:
     """Re-estimate every step's motion-mode probabilities by forward-backward smoothing, and the prior precision of its
-    acceleration from them."""
+    acceleration from them; `lively` are the log odds of a manoeuvre in the last step, across and upwards, by which
+    components were associated."""
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state
     told = vertical_information(window)
-    posterior, level = motion.smooth(state.motion_mode, likelihoods(window, len(window.accel), told), CONSTANTS.stay)
-    share, still = manoeuvre_share(told, motion.expected_precision(posterior[UP]), was_level=state.is_level)
+    likely = likelihoods(window, len(window.accel), told)
+    likely[: UP + 1, -1, -1] += lively
+    posterior, level = motion.smooth(state.motion_mode, likely, CONSTANTS.stay)
+    share, still = manoeuvre_share(
+        told, motion.expected_precision(posterior[UP]), was_level=state.is_level, lively=lively[UP]
+    )
     nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
     posterior[UP], level[UP] = nearer[:-1], nearer[-1]
+    joint = manoeuvring_share(window, motion.expected_precision(posterior[0]), state.motion_mode[0], lively[0])
+    posterior[0] = livelier_by(posterior[0], joint)
+    level[0] = livelier_by(level[0], joint[-1:])
     before = window.precision.copy()
     before[:, 2] = window.uneven
     # all steps at once, each as if the others were settled: damped, or they would take turns
@@ -87,7 +97,9 @@ def vertical_information(window: Window) -> VerticalInformation:
     return VerticalInformation(inner - np.diag(window.solved[:, 2]), np.asarray(inner @ window.accel[:, 2]))
 
 
-def manoeuvre_share(told: VerticalInformation, precision: Floats, *, was_level: bool) -> tuple[float, float]:
+def manoeuvre_share(
+    told: VerticalInformation, precision: Floats, *, was_level: bool, lively: float = 0.0
+) -> tuple[float, float]:
     """Expected share, from 0 for an uneven floor to 1 for the vertical chain's prior precisions (K,), of a prior of the
     vertical accelerations between these two, and the probability that the floor is level and the height does not
     change at all, both by the marginal likelihood of all steps together.
@@ -106,11 +118,19 @@ def manoeuvre_share(told: VerticalInformation, precision: Floats, *, was_level: 
     form, log_det = np.array([form_and_log_det(*each) for each in zip(inside, pull, strict=True)]).T
     log_like = 0.5 * (form - log_det)
     log_like[1:-1] += CONSTANTS.log_rare
+    log_like[-2] += lively
     log_like[-1] += CONSTANTS.log_upright if was_level else CONSTANTS.log_rare
     weight = np.exp(log_like - log_like.max())
     weight /= weight.sum()
     moves = weight[:-1].sum()
     return float(weight[:-1] @ share / max(moves, 1e-9)), float(weight[-1])
+
+
+def livelier_by(level: Floats, share: Floats) -> Floats:
+    """Motion-mode probabilities (..., L) of steps that are in the liveliest mode besides by a `share` (...,)."""
+    mixed = (1.0 - share)[..., None] * level
+    mixed[..., -1] += share
+    return mixed
 
 
 def nearer_floor(level: Floats, share: float) -> Floats:
@@ -144,22 +164,30 @@ def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
 
 
 def log_manoeuvre(state: WindowState) -> float:
-    """Log odds that the last step belongs to a manoeuvre of the liveliest motion mode: as rare as one is, or as the
-    chain of modes has it, and by what the map's returns tell of that step's horizontal acceleration."""
-    before = state.level[0] @ motion.transition(CONSTANTS.stay)
-    share = max(float(before[-1]), CONSTANTS.rare)
-    window, free = state.window, state.window.accel.shape[1]
+    """Log odds that the last step belongs to a manoeuvre of the liveliest motion mode: as it is learnt or, if that is
+    likelier, as rare as one is and by what the map's returns tell of that step's horizontal acceleration."""
+    level, window, free = np.maximum(state.level[0], 1e-12), state.window, state.window.accel.shape[1]
+    learnt, rare = float(scipy.special.logit(min(level[-1], 1.0 - 1e-12))), float(scipy.special.logit(CONSTANTS.rare))
     if not len(window.accel):
-        return float(np.log(share / (1.0 - share)))
+        return max(learnt, rare)
     block = window.covariance[-free:, -free:][:2, :2]
     told = motion.log_likelihood(window.accel[-1:, :2], block[None], window.solved[-1:, 0])[0]
-    calm = np.logaddexp.reduce(np.log(np.maximum(before[:-1], 1e-300)) + told[:-1]) - np.log1p(-min(before[-1], 0.999))
-    return float(np.log(share / (1.0 - share)) + told[-1] - calm)
+    calm = np.logaddexp.reduce(np.log(level[:-1] / level[:-1].sum()) + told[:-1])
+    return max(learnt, rare + float(told[-1] - calm))
 
 
-def livelier(precision: Floats, steps: int = LATELY) -> Floats:
+def livelier(precision: Floats, steps: int = LATELY, *, upwards: bool = False) -> Floats:
     """Prior precisions (K - 1, A) of the window's accelerations, those of the last `steps` lowered to the liveliest
-    motion mode, but not vertically."""
-    found, lively = precision.copy(), COLUMNS[: precision.shape[1]] != 1
+    motion mode: all but the vertical ones, or these alone."""
+    found, lively = precision.copy(), (COLUMNS[: precision.shape[1]] == UP) == upwards
     found[-steps:, lively] = np.minimum(found[-steps:, lively], CONSTANTS.liveliest**-2.0)
     return found
+
+
+def solve_livelier(window: Window, steps: int = LATELY, *, upwards: bool = False) -> Window:
+    """Window solved again under `livelier` priors of its last steps."""
+    uneven = window.uneven.copy()
+    if upwards:
+        uneven[-steps:] = np.minimum(uneven[-steps:], CONSTANTS.liveliest**-2.0)
+    precision = livelier(window.precision, steps, upwards=upwards)
+    return window_gaussian.solve(window._replace(precision=precision, uneven=uneven))

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import linearise_each, poses_of
-from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
+from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
 from rislam_rt.slam.window.smoother import attitude

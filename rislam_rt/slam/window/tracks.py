@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.assignment import Candidates, cheapest, pair_costs
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
-from rislam_rt.slam.window.horizon_detection import Elevations, elevations, nothing_heard
+from rislam_rt.slam.window.landmarks.horizon_detection import Elevations, elevations, nothing_heard
 from rislam_rt.slam.window.landmarks.measurement_prediction import PANEL_STD
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.solver_limits import GATE

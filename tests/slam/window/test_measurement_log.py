@@ -9,12 +9,11 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window import init
-from rislam_rt.slam.window.cycle_explanation import scatter_variance
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.measurement_log import append, empty_log, squares
+from rislam_rt.slam.window.measurement_log import append, empty_log, scatter_variance, squares
 from rislam_rt.slam.window.motion_learning import assumed_precision
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_features, window_gaussian

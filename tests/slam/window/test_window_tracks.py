@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.horizon_detection import level_above, prior_tilts
+from rislam_rt.slam.window.landmarks.horizon_detection import level_above, prior_tilts
 from rislam_rt.slam.window.smoother import attitude
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE
-from rislam_rt.slam.window.horizon_detection import nothing_heard
+from rislam_rt.slam.window.landmarks.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown

@@ -16,7 +16,7 @@ from rislam_rt.slam.predicted_returns import poses_of, reflect
 from rislam_rt.slam.window.births.hypotheses import Hypotheses
 from rislam_rt.slam.window.births.path_feasibility import over_known
 from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.horizon_detection import above_within, elevations
+from rislam_rt.slam.window.landmarks.horizon_detection import above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import poses

@@ -10,7 +10,7 @@ from rislam_rt.model import RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses
-from rislam_rt.slam.window.horizon_detection import nothing_heard
+from rislam_rt.slam.window.landmarks.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
 from rislam_rt.slam.window.landmarks.measurement_prediction import (
     ExpectedComponents,
@@ -95,6 +95,15 @@ def add_clear_paths(
     return _joined(
         visibility, (pack(forms, landmarks), np.full(count, 0.99), np.full(count, scatter), nothing_heard(count))
     )
+
+
+def with_scatter(visibility: VisibilityObservations, idents: Integers, scatter: Floats) -> VisibilityObservations:
+    """Record of paths' occlusion and scatter with the mean squared residuals `scatter` (N,) of known paths of forms
+    (N, 5) by idents, of which the last of each form counts."""
+    code, found = (idents + 1) @ DIGITS, visibility.scatter.copy()
+    known = np.isin(code, visibility.code)
+    found[np.searchsorted(visibility.code, code[known])] = scatter[known]
+    return visibility._replace(scatter=found)
 
 
 def _joined(

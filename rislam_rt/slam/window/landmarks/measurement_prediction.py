@@ -15,7 +15,7 @@ from rislam_rt.ris import leg_response, panel_gain
 from rislam_rt.ris.path_gain import image_amplitude, point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE, TX, Poses, Returns, bounced, compact, linearise, observe, reflect
-from rislam_rt.slam.window.horizon_detection import Elevations, elevations
+from rislam_rt.slam.window.landmarks.horizon_detection import Elevations, elevations
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.path_forms import enumerate_forms, forms_of, possible_legs
 from rislam_rt.slam.window.smoother.motion_basis import HEAD

@@ -18,7 +18,7 @@ from rislam_rt.slam.window.births.hypotheses import (
     known_features,
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits
-from rislam_rt.slam.window.horizon_detection import nothing_heard
+from rislam_rt.slam.window.landmarks.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, pack
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN

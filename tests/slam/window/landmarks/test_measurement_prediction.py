@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.horizon_detection import elevations
+from rislam_rt.slam.window.landmarks.horizon_detection import elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster, conditioned_share
 from rislam_rt.slam.window.solver_limits import EDGE
 

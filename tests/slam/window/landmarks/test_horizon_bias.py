@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.measurement.components import clip_to_unit_disc
-from rislam_rt.slam.window.horizon_bias import correct_horizon_bias
+from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 
 STD = 0.02
 
