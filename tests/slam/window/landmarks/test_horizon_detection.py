@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window import horizon_detection as horizon
+from rislam_rt.slam.window.landmarks import horizon_detection as horizon
 from rislam_rt.slam.window.smoother import attitude
 
 AROUND = 2.0 * np.pi * (np.arange(12) + 0.5) / 12
