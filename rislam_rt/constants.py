@@ -3,6 +3,9 @@
 SPEED_OF_LIGHT = 299_792_458.0
 """Speed of light in vacuum [m/s] (exact, SI)."""
 
+MAX_SPEED = 10.0
+"""Largest speed [m/s] of an agent indoors; more is a wrong unit."""
+
 SURFACE_TOLERANCE = 1e-6
 """Distance [m] below which a point counts as lying on a facet; coordinates are metres in float64."""
 

@@ -84,6 +84,8 @@ def changed(name: str, value: Any, factor: float) -> Any:
         return odds / (1.0 + odds)
     if name in LOGARITHMS:
         return value + np.log(factor)
+    if isinstance(value, np.ndarray) and value.dtype.kind == "i":
+        return np.unique(np.maximum(np.rint(changed(name, 1.0 * value, factor)), min(1, value[0]))).astype(np.int64)
     if isinstance(value, np.ndarray) and value.ndim == 1 and len(value) > 3:
         place = np.linspace(0.0, len(value) - 1.0, round(factor * (len(value) - 1)) + 1)
         return np.interp(place, np.arange(len(value)), value)

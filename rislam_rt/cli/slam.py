@@ -9,6 +9,7 @@ import typer
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pipeline_file
 from rislam_rt.cli.output_files import write_json
 from rislam_rt.cli.verbosity import warn
+from rislam_rt.constants import MAX_SPEED
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from rislam_rt.studies.unseen import Answers
 
 
-MAX_SPEED, LONGEST_ARM = 10.0, 2.0
-"""Speed [m/s] of an agent indoors, and distance [m] of Tx and Rx from its position, above which a unit is wrong."""
+LONGEST_ARM = 2.0
+"""Distance [m] of Tx and Rx from the agent's position above which a unit is wrong."""
 
 
 def command(

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.constants import MAX_SPEED
 from rislam_rt.geometry.connected_parts import connected_triangles
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions, touching, winding
@@ -13,9 +14,6 @@ from rislam_rt.scene.findings import Finding
 
 NUM_PROBES = 400
 """Rays cast from the agent's start to look for holes of the room: one of 0.03 sr, 30 cm wide at 2 m, is found."""
-
-MAX_SPEED = 10.0
-"""Largest speed [m/s] of an agent indoors; more is a wrong unit."""
 
 LONGEST_GAP, MANY_STEPS = 5.0, 10.0
 """Gap in a recording [s], and its ratio to the usual step, up to which it is taken for meant."""
