@@ -29,13 +29,13 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.manoeuvres import with_manoeuvre
+from rislam_rt.slam.window.manoeuvres import with_climb, with_manoeuvre
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log, reweigh_wall_returns, squares
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import REFRESH
+from rislam_rt.slam.window.solver_limits import LASTED, LATELY, REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
 
@@ -81,7 +81,7 @@ def step(
     else:
         heading += state.turned
     turn, restarted = heading - float(state.heading[-1]), state.lost_log_odds == 0.0
-    state = with_manoeuvre(with_rates(_move(state, dt, heading)))
+    state = with_climb(with_manoeuvre(with_rates(_move(state, dt, heading))))
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
     heard = components_to_explain(measurement, scene)
@@ -168,11 +168,12 @@ def _associate_over_motions(
     lively, window, best = [0.0, 0.0], state.window, view_of(state.window)
     learnt = state.config.motion == "learnt"  # a motion that is told stays told
     for axis in range(2 if learnt and len(best.groups.leader) and len(window.step) else 0):
-        solved = motion_learning.livelier(window.solved, upwards=axis == 1)
+        steps = (LATELY, int(LASTED[-1]))[axis]
+        solved = motion_learning.livelier(window.solved, steps, upwards=axis == 1)
         now = window_gaussian.now_under(window, solved, (best.mean, best.covariance))
         prior = CONSTANTS.log_rare - axis * CONSTANTS.log_upright  # upwards, of a floor that is not level besides
         if score_again(best, *now, observed, strangers) + prior > best.score:
-            trial = motion_learning.solve_livelier(window, upwards=axis == 1)
+            trial = motion_learning.solve_livelier(window, steps, upwards=axis == 1)
             view = view_of(trial)
             log_odds = view.score + prior - best.score
             if log_odds > 0.0:

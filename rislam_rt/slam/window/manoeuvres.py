@@ -12,12 +12,12 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
-from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares
-from rislam_rt.slam.window.motion_learning import solve_livelier
+from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares, unique_forms
+from rislam_rt.slam.window.motion_learning import solve_livelier, vertical_information
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
-from rislam_rt.slam.window.solver_limits import LASTED
+from rislam_rt.slam.window.solver_limits import LASTED, STRIDE
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.track_rates import with_rates
 
@@ -33,19 +33,21 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     if window.rates is None or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
         return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps
-    lively = float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1])
-    best, accel, steps = 0.0, np.zeros(2), 0
+    lively = (state.level[:2] @ motion.transition(CONSTANTS.stay))[:, -1]
+    # a floor is held for level until another is held for true
+    climbs = np.array([0.0, CONSTANTS.log_upright + CONSTANTS.log_born if state.is_level else 0.0])
+    best, accel, steps = 0.0, np.zeros(3), 0
     for each in [each for each in LASTED if each < len(window.step)]:
-        share = max(lively, 1.0 - CONSTANTS.stay**each)
-        log_odds, by = motion_agreement.weigh_manoeuvre(state, each, float(np.log(share / (1.0 - share))))
+        share = np.maximum(lively, 1.0 - CONSTANTS.stay**each)
+        log_odds, by = motion_agreement.weigh_manoeuvre(state, each, np.log(share / (1.0 - share)) - climbs)
         if log_odds > best:
             best, accel, steps = log_odds, by, each
     if not steps:
         return state
     # the newest pose is not measured yet: its step goes on as the ones before
     last = slice(-steps - 1, None)
-    trial = solve_livelier(window, steps + 1)
-    trial.accel[last, :2] = window.accel[last, :2] + accel
+    trial = solve_livelier(window, steps + 1, upwards=bool(accel[2]))
+    trial.accel[last, :3] = window.accel[last, :3] + accel
     for until in (state.window.num_poses - 2 - steps, state.window.num_poses):
         # which tracks follow hangs on the motion, and the motion on them
         state = with_rates(_booked_anew(state._replace(window=trial), until))
@@ -57,10 +59,63 @@ def _booked_anew(state: WindowState, until: int) -> WindowState:
     """State whose wall returns scatter about the motion as it is now estimated by as much as they did in the first
     `until` cycles of the window: what a manoeuvre that was not believed in did to them was held for neighbours' pull,
     whose variance would go on holding the agent back."""
+    state = _reweighed(state, until)
+    log = state.log
+    rows = (log.form[:, 0, 0] == TX).nonzero()[0]
+    visibility = with_scatter(state.visibility, log.form[rows, 0], log.scatter(rows))
+    return relinearise(state._replace(visibility=visibility), 0)[0]
+
+
+def _reweighed(state: WindowState, until: int) -> WindowState:
+    """State whose log weighs wall returns by their residuals in the first `until` cycles of the window."""
     state, left = relinearise(state, 0)
     spread = prediction_variance(state.window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread))
-    log = reweigh_wall_returns(state.log, left, state.window.num_poses, until)
+    return state._replace(log=reweigh_wall_returns(state.log, left, state.window.num_poses, until))
+
+
+def with_climb(state: WindowState) -> WindowState:
+    """State that climbs or descends in its last steps, if that explains what is heard of walls better than a level
+    floor does, by more than it is rarer.
+
+    While the floor is held for level, what a climb does to the returns from above is held for neighbours' pull, whose
+    variance would go on holding the height. So both are weighed: the climb with the scatter from before it began.
+    """
+    window, steps = state.window, int(LASTED[-1])
+    if state.cycle % STRIDE or state.config.motion != "learnt" or len(window.step) <= steps:
+        return state
+    trial = _scattering_as_before(state, steps)
+    if trial is state:
+        return state
+    for _ in range(2):
+        trial = relinearise(trial, 0)[0]
+        trial = trial._replace(window=solve_livelier(trial.window, steps + 1, upwards=True))
+    last, begin = slice(-steps - 1, None), state.cycle - steps
+    inner = vertical_information(trial.window).information[last, last]
+    free = np.linalg.slogdet(np.eye(steps + 1) + CONSTANTS.liveliest**2 * inner)[1]
+    free += float(np.sum(trial.window.accel[last, 2] ** 2)) / CONSTANTS.liveliest**2
+    log_ratio = _log_returns(trial, begin) - _log_returns(state, begin) - 0.5 * free
+    return trial if log_ratio + CONSTANTS.log_rare - CONSTANTS.log_upright > CONSTANTS.log_born else state
+
+
+def _scattering_as_before(state: WindowState, steps: int) -> WindowState:
+    """State whose returns over walls alone scatter no more than they did before the last `steps`; the same state if
+    none has come to scatter by more than still fits (`crowd`)."""
+    log = state.log
+    before = _reweighed(state, state.window.num_poses - 1 - steps).log
     rows = (log.form[:, 0, 0] == TX).nonzero()[0]
-    visibility = with_scatter(state.visibility, log.form[rows, 0], log.scatter(rows))
-    return relinearise(state._replace(log=log, visibility=visibility), 0)[0]
+    fewer = np.minimum(log.scatter(rows), before.scatter(rows))
+    if not (log.scatter(rows) > CONSTANTS.crowd * fewer).any():
+        return state
+    visibility = with_scatter(state.visibility, log.form[rows, 0], fewer)
+    return state._replace(log=log._replace(extra=np.minimum(log.extra, before.extra)), visibility=visibility)
+
+
+def _log_returns(state: WindowState, begin: int) -> float:
+    """Log likelihood, without its constants, of the lengths of returns over walls alone since a cycle, at the estimate;
+    each path scatters by a variance of its own, of which beforehand no more is known than that it fits (`crowd`)."""
+    log, left = state.log, relinearise(state, 0)[1]
+    left = left.take((log.form[left.row, 0, 0] == TX) & (log.cycle[left.row] >= begin))
+    _, which = unique_forms(log.form[left.row, 0])
+    square = left.left[:, 0] ** 2 * (1.0 + log.extra[left.row, 0] / log.std[left.row, 0] ** 2)
+    return float(-0.5 * (np.bincount(which) + 1.0) @ np.log(CONSTANTS.crowd + np.bincount(which, square)))

@@ -98,6 +98,13 @@ class Log(NamedTuple):
         inside = np.hypot(1.0 / spacing - cosine, across) < 1.0 + CONSTANTS.fit * std[:, ::-1]
         return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
 
+    def mostly_mirrored(self, rows: Integers, which: Integers, count: int, spacing: float) -> Booleans:
+        """Whether most of the components `rows` (A,) of each of T = `count` tracks or paths `which` (A,) are `mirrored`
+        along either axis of the array (T, 2)."""
+        excess = np.zeros((count, 2))
+        np.add.at(excess, which, self.mirrored(spacing)[rows] - 0.5)
+        return excess > 0.0
+
     def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "ArrayEnds":
         """Components `rows` (A,) of tracks or paths `which` (A,), with those of which most are `mirrored` once for
         either end, behind all others.
@@ -105,16 +112,15 @@ class Log(NamedTuple):
         The cosine along the other axis tells by how much one at the array's end errs, of whose sign nothing is known.
         """
         cosines, std, count = self.seen[rows, 1:], self.std[rows, 1:], int(which.max(initial=-1)) + 1
-        excess = np.zeros((count, 2))
-        np.add.at(excess, which, self.mirrored(spacing)[rows] - 0.5)
-        both = excess[which] > 0.0
+        twofold = self.mostly_mirrored(rows, which, count, spacing)
+        both = twofold[which]
         if not both.any():
             return ArrayEnds(rows, which, cosines, std, np.arange(count))
         rim, period = np.sqrt(np.maximum(1.0 - cosines[:, ::-1] ** 2, 0.0)), 1.0 / spacing
         end = np.where(both, np.minimum(cosines + period * (cosines < 0.0), rim), cosines)
         other = np.where(both, np.maximum(end - period, -rim), cosines)
         std = np.where(both, np.minimum(std, std[:, ::-1]), std)
-        twice, owner = both.any(axis=1), np.flatnonzero((excess > 0.0).any(axis=1))
+        twice, owner = both.any(axis=1), np.flatnonzero(twofold.any(axis=1))
         again = count + np.searchsorted(owner, which[twice])
         return ArrayEnds(
             np.append(rows, rows[twice]), np.append(which, again), np.concatenate([end, other[twice]]),

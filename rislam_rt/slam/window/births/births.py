@@ -89,14 +89,14 @@ def _log_same_direction(
 
     A wall on the Tx leg alone changes the length and not the direction: the point itself is heard there as well.
     """
-    old = context.tracks.hits >= 3
-    away, reach = bearings(context, old, mean)
+    old = (context.tracks.hits >= 3).nonzero()[0]
+    away, reach, owner = bearings(context, old, mean)
     points, panels = context.landmarks.points, np.array(context.landmarks.panels)
     span = mean[HEAD:].reshape(-1, 3)[points] - mean[:3]
     far = np.linalg.norm(span, axis=1)
     away, reach = np.concatenate([away, span / np.maximum(far, 0.05)[:, None]]), np.append(reach, 2.0 * far)
-    panel = np.append(context.tracks.side[old] >= PANEL, np.isin(points, panels[panels >= 0]))
-    ray, length = bearings(context, rows, mean)
+    panel = np.append(context.tracks.side[old[owner]] >= PANEL, np.isin(points, panels[panels >= 0]))
+    ray, length = (field[: len(rows)] for field in bearings(context, rows, mean)[:2])
     variance = (histories.weight[: len(rows), :, 1:] ** 2).sum(axis=1) ** -1.0 + CONSTANTS.lean**2
     gap = ray[:, None, :2] - away[None, :, :2]
     log_odds = -0.5 * (gap**2 / variance[:, None]).sum(axis=-1) - 0.5 * np.log(variance).sum(axis=1)[:, None]

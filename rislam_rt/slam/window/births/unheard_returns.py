@@ -2,6 +2,7 @@
 heard over a known one, or one of two unknown walls'."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -130,12 +131,11 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard. All of them are
     compared as they are now: near a corner they change fast.
     """
-    every, (ray, length) = context.tracks, bearings(context, rows, mean)
-    shine = every.log_amplitude[rows] + np.log(length)
-    old = every.hits >= 3
-    away, reach = bearings(context, old, mean)
-    bright = (every.log_amplitude[old] + np.log(reach))[None] > shine[:, None] - 0.3
-    walls = context.landmarks.walls
+    every, looked = context.tracks, bearings(context, rows, mean)
+    shine = every.log_amplitude[rows[looked.track]] + np.log(looked.length)
+    old = (every.hits >= 3).nonzero()[0]
+    away, reach, owner = bearings(context, old, mean)
+    shines, walls = every.log_amplitude[old[owner]] + np.log(reach), context.landmarks.walls
     if len(walls):
         place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
         span = place - anchor
@@ -143,15 +143,43 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
         depth = np.vecdot(0.5 * (place + anchor) - mean[:3], normal)
         away = np.concatenate([away, np.sign(depth)[:, None] * normal])
         reach = np.concatenate([reach, 2.0 * np.abs(depth)])
-        bright = np.concatenate([bright, np.ones((len(ray), len(walls)), dtype=np.bool_)], axis=1)
-    along, share = ray @ away.T, reach / length[:, None]
+        shines = np.concatenate([shines, np.full(len(walls), np.inf)])
+        owner = np.concatenate([owner, len(old) + np.arange(len(walls))])
+    along, share = looked.ray @ away.T, reach / looked.length[:, None]
     leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
-    found = (leg & (share < 0.995) & bright).sum(axis=1)
+    leg &= (share < 0.995) & (shines > shine[:, None] - 0.3)
+    found = np.zeros((len(rows), len(old) + len(walls)), dtype=np.bool_)
+    np.logical_or.at(found, (looked.track[:, None], owner), leg)
     missing = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])  # both, one of them, none
-    return missing[np.minimum(found, 2)]
+    return missing[np.minimum(found.sum(axis=1), 2)]
 
 
-def bearings(context: WindowState, rows: Booleans | Integers, mean: Floats) -> tuple[Floats, Floats]:
-    """Directions of arrival (N, 3) in the room's axes and lengths (N,) [m] of some tracks."""
-    seen = context.tracks.mean[rows, :, 0]
-    return rays(seen, float(context.heading[-1] + mean[6])), np.maximum(seen[:, 0], 0.1)
+class Bearings(NamedTuple):
+    """Directions and lengths of some of T tracks: one of each, and a second one, behind all others, of those that the
+    array hears alike from both its ends."""
+
+    ray: Floats
+    """(E, 3) directions of arrival in the room's axes."""
+    length: Floats
+    """(E,) [m]."""
+    track: Integers
+    """(E,) which of the tracks each is of."""
+
+
+def bearings(context: WindowState, rows: Integers, mean: Floats) -> Bearings:
+    """Directions of arrival and lengths of tracks `rows` (T,) as single-bounce returns. What is heard now from one end
+    of the array, now from the other, has no mean direction: it lies on the rim, at either end."""
+    tracks, log = context.tracks, context.log
+    seen, count = tracks.mean[rows, :, 0], len(rows)
+    at = np.isin(log.track, tracks.ident[rows]).nonzero()[0]
+    order = np.argsort(tracks.ident[rows])
+    which = order[np.searchsorted(tracks.ident[rows], log.track[at], sorter=order)]
+    twofold = log.mostly_mirrored(at, which, count, context.scene.radio.array.spacing)
+    owner = twofold.any(axis=1).nonzero()[0]
+    rim = np.sqrt(np.maximum(1.0 - seen[:, :0:-1] ** 2, 0.0))
+    seen[:, 1:] = np.where(twofold, rim, seen[:, 1:])
+    other = seen[owner]
+    other[:, 1:] = np.where(twofold[owner], -rim[owner], other[:, 1:])
+    seen = np.concatenate([seen, other])
+    ray = rays(seen, float(context.heading[-1] + mean[6]))
+    return Bearings(ray, np.maximum(seen[:, 0], 0.1), np.append(np.arange(count), owner))

@@ -280,6 +280,40 @@ def weigh_change(found: Rates, calm: Floats, ways: list[Floats], log_prior: floa
     return float(log_ratio) + log_prior, best.velocity[at]
 
 
+def weigh_climb(found: Rates, calm: float, log_prior: float) -> tuple[float, float]:
+    """Posterior log odds that rates of path lengths change by a vertical acceleration of the liveliest mode rather than
+    of variance `calm`, and the likeliest one; `log_prior` are the odds beforehand."""
+    up, nowhere = found.toward[:, 2], np.zeros((1, 2))
+    steep = np.abs(up) > STEEP
+    starts = np.append(0.0, found.rate[steep] / up[steep])[:, None]
+    level = np.log(_likelihoods(found, nowhere, starts)[0]).sum(axis=1)
+    if level.max() - level[0] + log_prior <= 0.0:
+        return -np.inf, 0.0
+    likeliest = starts[np.argsort(-level, kind="stable")[:MOST]]
+    change, evidence = _find_climb(found, likeliest, CONSTANTS.liveliest**2)
+    at, nothing = int(np.argmax(evidence)), _find_climb(found, starts[:1], calm)[1][0]
+    return float(evidence[at] - nothing) + log_prior, float(change[at, 0])
+
+
+STEEP = 0.5
+"""Vertical part of a direction, times 2, from which on a rate of length proposes a climb."""
+
+
+def _find_climb(found: Rates, climb: Floats, variance: float) -> tuple[Floats, Floats]:
+    """Nearest maxima (S, 1) of a vertical motion's posterior from initial values (S, 1), under a centred prior of a
+    variance, with Laplace's log evidences (S,) there."""
+    nowhere, up = np.zeros((1, 2)), found.toward[:, 2]
+    for last in (False,) * 6 + (True,):
+        either, likely, spread = _likelihoods(found, nowhere, climb)
+        weight = (likely / spread).sum(axis=0) / found.each(either)
+        normal = (weight @ up**2 + 1.0 / variance)[:, None]
+        if last:
+            break
+        climb = (weight @ (up * found.rate))[:, None] / normal
+    log_normal = -0.5 * climb**2 / variance - 0.5 * np.log(variance)
+    return climb, np.log(either).sum(axis=1) + (log_normal - 0.5 * np.log(normal))[:, 0]
+
+
 def agreed_velocity(found: Rates) -> Floats:
     """Horizontal velocity (3,), or displacement, on which most rates of path length agree; near zero if it may be."""
     every = _find_modes(found, _starts(found, np.zeros(3)), np.zeros(3), CONSTANTS.walk**2 * np.eye(2))
@@ -322,9 +356,9 @@ NEAR, MOST = 0.01, 8
 """Difference [m/s] up to which initial velocities are one, and how many of them are refined."""
 
 
-def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, Floats, Floats]:
-    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2), and those (2, S, E) of the
-    two ways to agree, from each direction, with their variances (2, S, E)."""
+def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple[Floats, Floats, Floats]:
+    """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2) and vertical ones (S, 1) or
+    one for all, and those (2, S, E) of the two ways to agree, from each direction, with their variances (2, S, E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     # a direction errs in all of the motion, what the positions have taken out of the lengths included
     speed = velocity if found.believed is None else velocity + found.believed
@@ -338,7 +372,7 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     other = np.full((1, 1), 1.0 / (4.0 * CONSTANTS.walk))
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
-        wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed) + climb**2)[:, None]
+        wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed)[:, None] + climb**2)
         still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
     return close + 0.5 / 4.0 * found.mixed(found.share * (kept + 3.0 * other)), likely, either_way

@@ -15,6 +15,7 @@ from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.solver_limits import STILL
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import CYCLE
 
@@ -66,24 +67,29 @@ def log_agreement(state: WindowState, after: Window) -> float:
     return other - one
 
 
-def weigh_manoeuvre(state: WindowState, steps: int, log_prior: float) -> tuple[float, Floats]:
-    """Posterior log odds of a manoeuvre that has lasted for `steps` until the last measurement, and its horizontal
-    acceleration (2,) [m/s^2], by the rates at which the lengths of tracks and of explained paths changed over the last
-    `PAST` cycles.
+def weigh_manoeuvre(state: WindowState, steps: int, log_prior: Floats) -> tuple[float, Floats]:
+    """Posterior log odds of a manoeuvre that has lasted for `steps` until the last measurement, and its acceleration
+    (3,) [m/s^2], by the rates at which the lengths of tracks and of explained paths changed over the last `PAST`
+    cycles; `log_prior` (2,) are the odds beforehand, of a horizontal one and of a climb.
 
-    It is an acceleration of the liveliest mode, where the agent faces or in any direction.
+    It is an acceleration of the liveliest mode, where the agent faces or in any direction, or upwards.
     """
-    window = state.window
+    window, none = state.window, np.zeros(3)
     passed = window.step[:-1][-PAST:]  # the last pose is not measured yet
     silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
     if silent or len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
-        return -np.inf, np.zeros(2)
+        return -np.inf, none
     found = egomotion.accelerations(_heard(state, slice(-2 - len(passed), -1), float(passed.mean())), steps)
     if found.number < egomotion.FEWEST:
-        return -np.inf, np.zeros(2)
+        return -np.inf, none
     calm, facing = _acceleration_covariance(window, steps), rotation_z(state.heading[-1])[:2, 0]
-    ways = [calm + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
-    return egomotion.weigh_change(found, calm, ways, log_prior)
+    ways = [calm[:2, :2] + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
+    log_odds, across = egomotion.weigh_change(found, calm[:2, :2], ways, log_prior[0])
+    if state.scene.radio.array.pattern == "upper":  # else nobody knows what comes from above
+        climbs, by = egomotion.weigh_climb(found, float(calm[2, 2]) + STILL**2, log_prior[1])
+        if climbs > log_odds:
+            return climbs, np.array([0.0, 0.0, by])
+    return log_odds, np.append(across, 0.0)
 
 
 def _latest_rates(state: WindowState) -> egomotion.Rates | None:
@@ -125,10 +131,10 @@ def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
 
 
 def _acceleration_covariance(window: Window, steps: int) -> Floats:
-    """Covariance (2, 2) [m^2/s^4] of the mean horizontal acceleration over the window's last `steps` but one."""
+    """Covariance (3, 3) [m^2/s^4] of the mean acceleration over the window's last `steps` but one."""
     free, size = window.accel.shape[1], len(window.covariance)
     rows = slice(size - (steps + 1) * free, size - free)
-    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:2, :2])
+    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:3, :3])
 
 
 def _latest(window: Window) -> tuple[int, float]:

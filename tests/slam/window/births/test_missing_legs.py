@@ -5,31 +5,64 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rislam_rt.model import RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.births.unheard_returns import missing_legs
+from rislam_rt.slam.window.births.unheard_returns import bearings, missing_legs
+from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
 CORNER = np.array([1.2, 1.6])
 """[m] from the agent to two upright walls at right angles."""
+LENGTH = 2.0 * np.append(CORNER, np.hypot(*CORNER))
+"""[m] of the two walls' own returns and of the corner's."""
+EVERY = [([0, 1], 0.0), ([0], np.log1p(-CONSTANTS.steady)), ([], CONSTANTS.log_rare)]
+"""Which of the walls' own returns are heard, and what that tells of the corner's."""
 
 
-@pytest.mark.parametrize(
-    ("heard", "expected"),
-    [
-        ([0, 1], 0.0),
-        ([0], np.log1p(-CONSTANTS.steady)),
-        ([], CONSTANTS.log_rare),
-    ],
-)
-def test_a_corner_has_the_single_returns_of_its_walls_beside_it(heard, expected):
-    # lengths and cosines of the two walls' own returns and of the corner's; all as loud as mirrors
-    length = 2.0 * np.append(CORNER, np.hypot(*CORNER))
-    rays = np.array([[1.0, 0.0], [0.0, 1.0], CORNER / np.hypot(*CORNER)])
-    state = np.concatenate([length[:, None], rays], axis=1)
+def _context(heard, rays, spreads):
+    """Three tracks of nine components in directions `rays` (3, 2), or two components of what is not `heard`, and the
+    log of these; `spreads` (3, 2) are the deviations of the cosines: what is of 1 is heard from both ends in turn."""
+    state, spreads = np.concatenate([LENGTH[:, None], rays], axis=1), np.asarray(spreads, dtype=float)
     hits = np.array([9 if row in heard else 2 for row in range(2)] + [9])
+    track = np.repeat(np.arange(3), hits)
+    seen, turn = state[track], (-1.0) ** np.arange(len(track))
+    seen[:, 1:] *= np.where(spreads[track] > 0.5, turn[:, None], 1.0)
+    log = empty_log()._replace(
+        cycle=np.arange(len(track)), seen=seen, std=np.column_stack([np.full(len(track), 1e-3), spreads[track]]),
+        track=track,
+    )  # fmt: skip
+    state[:, 1:] = np.where(spreads > 0.5, 0.1, state[:, 1:])  # the mean of both ends
     tracks = SimpleNamespace(
-        hits=hits, mean=np.stack([state, 0.0 * state], axis=-1), log_amplitude=-np.log(length), side=np.zeros(3)
-    )
+        hits=hits, mean=np.stack([state, 0.0 * state], axis=-1), log_amplitude=-np.log(LENGTH), side=np.zeros(3),
+        ident=np.arange(3),
+    )  # fmt: skip
     landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
-    context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks)
+    scene = SimpleNamespace(radio=RadioConfig())
+    return SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
+
+
+@pytest.mark.parametrize(("heard", "expected"), EVERY)
+def test_a_corner_has_the_single_returns_of_its_walls_beside_it(heard, expected):
+    """All are as loud as mirrors."""
+    rays = np.array([[0.96, 0.28], [-0.28, 0.96], np.array([[0.96, -0.28], [0.28, 0.96]]) @ CORNER / np.hypot(*CORNER)])
+    context = _context(heard, rays, np.full((3, 2), 1e-3))
     assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("heard", "expected"), EVERY)
+def test_walls_on_the_arrays_own_lines_are_heard_beside_their_corner(heard, expected):
+    """An agent that faces a wall hears it at the end of its array, now from ahead, now from behind: the mean of both is
+    no direction. So the corner's return was the first wall of a hall, one that slants."""
+    rays = np.array([[1.0, 0.0], [0.0, 1.0], CORNER / np.hypot(*CORNER)])
+    context = _context(heard, rays, [[1.0, 1e-3], [1e-3, 1.0], [1e-3, 1e-3]])
+    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0] == pytest.approx(expected)
+
+
+def test_what_is_heard_from_both_ends_has_two_bearings():
+    rays = np.array([[1.0, 0.0], [0.0, 1.0], CORNER / np.hypot(*CORNER)])
+    context = _context([0, 1], rays, [[1.0, 1e-3], [1e-3, 1.0], [1e-3, 1e-3]])
+    found = bearings(context, np.array([2, 1, 0]), np.zeros(HEAD))
+    np.testing.assert_array_equal(found.track, [0, 1, 2, 1, 2])
+    np.testing.assert_allclose(found.length, LENGTH[[2, 1, 0, 1, 0]])
+    ends = np.array([[0.6, 0.8], [0.1, 1.0], [1.0, 0.1], [0.1, -1.0], [-1.0, 0.1]])
+    np.testing.assert_allclose(found.ray[:, :2], ends, atol=0.11)

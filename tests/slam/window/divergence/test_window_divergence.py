@@ -137,6 +137,30 @@ def test_an_acceleration_that_the_positions_leave_out_is_told_by_all_lengths(ste
     assert egomotion.weigh_change(still, 1e-6 * np.eye(2), [np.eye(2)], 0.0)[0] < 0.0
 
 
+def test_a_climb_is_told_by_the_rates_of_all_lengths():
+    """Two ways: Laplace's evidence at the likeliest climb, against the integral over all climbs."""
+    rng = np.random.default_rng(5)
+    for climb in (0.4, -0.9):
+        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(2))
+        log_odds, told = egomotion.weigh_climb(found, 1e-8, 0.0)
+        assert told == pytest.approx(climb, abs=4.0 * 0.01 / np.sqrt(np.sum(found.toward[4:, 2] ** 2)))
+        every = np.linspace(-3.0, 3.0, 60001)[:, None]
+        log_like = np.log(egomotion._likelihoods(found, np.zeros((1, 2)), every)[0]).sum(axis=1)
+        prior = np.exp(-0.5 * every[:, 0] ** 2 / CONSTANTS.liveliest**2) / np.sqrt(2.0 * np.pi) / CONSTANTS.liveliest
+        whole = np.log(np.sum(np.exp(log_like - log_like.max()) * prior) * 1e-4) + log_like.max()
+        level = np.log(egomotion._likelihoods(found, np.zeros((1, 2)), 0.0)[0]).sum()
+        assert log_odds == pytest.approx(whole - level, abs=0.3)  # other maxima, and what is no Gaussian
+        assert log_odds > 5.0
+
+
+def test_no_climb_is_told_by_the_rates_of_a_level_motion():
+    """Posterior odds above 1 at prior odds of 1 in 10 come up in less than 1 of 10 runs (Markov's inequality)."""
+    rng = np.random.default_rng(6)
+    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(2)) for _ in range(200)]
+    wrong = sum(egomotion.weigh_climb(found, 1e-8, np.log(0.1))[0] > 0.0 for found in every)
+    assert wrong < 20
+
+
 def test_what_is_at_rest_changes_its_length_by_no_more_than_twice_the_agents_speed():
     """Two tracks of many agree on a motion; were the others' rates just any, two would be chance."""
     toward = -2.0 * np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]])
