@@ -32,12 +32,15 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     window = state.window
     if window.rates is None or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
         return state
+    told = motion_agreement.latest_lengths(state)
+    if told is None:
+        return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps
     lively = float((state.level[0] @ motion.transition(CONSTANTS.stay))[-1])
     best, accel, steps = 0.0, np.zeros(2), 0
     for each in [each for each in LASTED if each < len(window.step)]:
         share = max(lively, 1.0 - CONSTANTS.stay**each)
-        log_odds, by = motion_agreement.weigh_manoeuvre(state, each, float(np.log(share / (1.0 - share))))
+        log_odds, by = motion_agreement.weigh_manoeuvre(state, told, each, float(np.log(share / (1.0 - share))))
         if log_odds > best:
             best, accel, steps = log_odds, by, each
     if not steps:

@@ -9,11 +9,12 @@ such, with its own deviation and what manoeuvres since may have made of it; if i
 walking speed is as good. Laplace evidences of both decide.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
@@ -25,9 +26,8 @@ FEWEST = 3
 a jump or a turn is: two agree on any horizontal motion."""
 
 
-class Rates(NamedTuple):
-    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
-    an array hears some alike from two."""
+class _PlainRates(NamedTuple):
+    """Rates of the path lengths of T tracks or explained paths, E in all."""
 
     toward: Floats
     """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
@@ -51,7 +51,12 @@ class Rates(NamedTuple):
     """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
     rest may have any rate."""
 
-    @property
+
+class Rates(_PlainRates):
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
+    an array hears some alike from two."""
+
+    @cached_property
     def number(self) -> int:
         """Number T of the tracks and paths whose lengths have a rate."""
         return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
@@ -62,14 +67,17 @@ class Rates(NamedTuple):
 
     def mixed(self, value: Floats) -> Floats:
         """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
-        if self.owner is None or np.array_equal(self.owner, np.arange(self.number)):
-            return value
-        return np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
+        return value if self.owner is None else np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
 
-    @property
+    @cached_property
     def share(self) -> Floats:
         """(E,) probability of each direction beforehand: a half where there are two."""
         return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
+
+    @cached_property
+    def kept(self) -> Floats:
+        """(E,) densities of the rates were they of lengths that stay as they are."""
+        return np.exp(-0.5 * self.whole**2 / self.variance) / np.sqrt(2.0 * np.pi * self.variance)
 
 
 class Manoeuvres(NamedTuple):
@@ -116,94 +124,135 @@ class Heard(NamedTuple):
     """[wavelengths] of the antennas."""
 
 
-def rates(heard: Heard) -> Rates:
-    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
-    positions leave of the lengths' change, so that a turn or an acceleration bends none."""
-    return _fitted(heard, None)
+class Lengths(NamedTuple):
+    """Lengths of tracks and explained paths to which lines are fitted, E of them as in `Rates`, by N components."""
+
+    heard: Heard
+    """What they are taken from."""
+    which: Integers
+    """(N,) the direction of a track or path that each component is of."""
+    time: Floats
+    """(N,) [s] until the last pose, negative."""
+    weight: Floats
+    """(N,) [1/m^2] one over the variances of the lengths."""
+    length: Floats
+    """(N,) [m] measured..."""
+    left: Floats
+    """(N,) [m] ...and what the positions leave of it."""
+    toward: Floats
+    """(E, 3) direction of arrival in the room's axes, times -2."""
+    count: Integers
+    """(E,) number of components."""
+    blur: Floats
+    """(E,) as in `Rates`."""
+    owner: Integers
+    """(E,) track or path of each direction."""
+
+    def total(self, value: Floats) -> Floats:
+        """Sums (E,) over each history of lengths of values (N,)."""
+        return np.asarray(np.bincount(self.which, value, len(self.owner)), dtype=np.float64)
 
 
-def accelerations(heard: Heard, steps: int) -> Rates:
-    """Rates [m/s^2] at which the lengths of tracks and explained paths change with the way of a constant acceleration
-    over the last `steps`, by weighted line fits to what the positions leave of the lengths' change: 0 for a path that
-    follows the positions as they are."""
-    return _fitted(heard, steps)
-
-
-def _fitted(heard: Heard, steps: int | None) -> Rates:
-    """Rates of path lengths by time, or by the way of an acceleration over the last `steps`."""
+def lengths(heard: Heard) -> Lengths:
+    """Lengths of tracks and explained paths, with what the positions leave of them, so that a turn or an acceleration
+    bends none."""
     log, heading, place, step, baseline, spacing = heard
-    first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
-    known = log.explained
+    last = int(log.cycle.max(initial=0))
+    first, known = last - len(heading) + 1, log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
-    if not len(rows):
-        return Rates(np.zeros((0, 3)), *np.zeros((4, 0)))
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
     rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
-    count = len(owner)
-    x = (log.cycle[rows] - log.cycle[-1]) * step
-    if steps is not None:
-        x = 0.5 * np.maximum(x + steps * step, 0.0) ** 2
-    weight = 1.0 / log.std[rows, 0] ** 2
+    count = np.bincount(which, minlength=len(owner))
 
     def total(value: Floats) -> Floats:
-        return np.asarray(np.bincount(which, value, count), dtype=np.float64)
+        return np.asarray(np.bincount(which, value, len(owner)), dtype=np.float64)
 
-    def slope(value: Floats) -> Floats:
-        return np.asarray((s * total(weight * x * value) - sx * total(weight * value)) / spread)
-
-    s, sx, sxx = total(weight), total(weight * x), total(weight * x**2)
-    spread = s * sxx - sx**2
-    enough = (np.bincount(which, minlength=count) >= MEASURED) & (spread > 1e-9 * s * s * step**2)
-    spread = np.where(enough, spread, 1.0)
-    since = log.cycle[rows] - first
+    weight, length, since = 1.0 / log.std[rows, 0] ** 2, log.seen[rows, 0], log.cycle[rows] - first
     angle = heading[since]
     cos, sin = np.cos(angle), np.sin(angle)
     toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
-    toward /= np.bincount(which, minlength=count)[:, None]
+    toward /= count[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
-    heard_length = log.seen[rows, 0]
-    rate = slope(heard_length - np.vecdot(toward[which], place[since] - place[-1]))
-    span, variance = step * max(len(place) - 1, 1), CONSTANTS.crowd * s / spread
-    velocity = (place[-1] - place[0]) / span
-    if steps is None:
-        rate = whole = rate + toward @ velocity
-        believed, unit = np.zeros(2), span
-        bend, bend_variance = _bends(which, x, weight, heard_length, float(velocity @ velocity))
-    else:
-        whole, unit = slope(heard_length), 0.5 * (steps * step) ** 2
-        way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
-        way -= way.mean()
-        believed = way @ place[:, :2] / (way @ way)
-        bend = bend_variance = np.zeros(count)
-    enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9  # at the rim, but for rounding
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
-    blur = 2.0 * baseline * s / np.maximum(total(weight * heard_length), 1e-9)
-    doubt = total((spread_of**2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
-    blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
-    turning = baseline * float(np.abs(np.diff(heading)).sum()) / unit
-    owner = owner[enough]
-    return Rates(
-        toward[enough], rate[enough], variance[enough], blur[enough], whole[enough], turning, bend[enough],
-        bend_variance[enough], np.searchsorted(np.unique(owner), owner), believed,
+    blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
+    doubt = total((spread_of**2).mean(axis=1)) / count**2
+    return Lengths(
+        heard, which, (log.cycle[rows] - last) * step, weight, length,
+        length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
+        np.hypot(blur, 2.0 * np.sqrt(doubt)), owner,
     )  # fmt: skip
 
 
-def _bends(which: Integers, x: Floats, weight: Floats, length: Floats, square_speed: float) -> tuple[Floats, Floats]:
-    """Quadratic parts (E,) [m/s^2] of lengths (N,) over times `x` (N,), beside their lines, and the variances of these,
-    for an agent of squared speed `square_speed` [m^2/s^2] which passes points."""
+def rates(found: Lengths) -> Rates:
+    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
+    positions leave of the lengths' change."""
+    place, time = found.heard.place, found.heard.step * max(len(found.heard.place) - 1, 1)
+    velocity = (place[-1] - place[0]) / time
+    (rate,), variance, fine = _slopes(found, found.time, found.left)
+    rate = rate + found.toward @ velocity
+    bends = _bends(found, float(velocity @ velocity))
+    return _rates(found, fine, (rate, variance, found.blur, rate), time, np.zeros(2), bends)
 
-    def total(value: Floats) -> Floats:
-        return np.asarray(np.bincount(which, weight * value), dtype=np.float64)
 
-    s = total(np.ones(len(x)))
+def accelerations(found: Lengths, steps: int) -> Rates:
+    """Rates [m/s^2] at which the lengths of tracks and explained paths change with the way of a constant acceleration
+    over the last `steps`, by weighted line fits to what the positions leave of the lengths' change: 0 for a path that
+    follows the positions as they are."""
+    place, step = found.heard.place, found.heard.step
+    by = 0.5 * np.maximum(found.time + steps * step, 0.0) ** 2
+    (rate, whole), variance, fine = _slopes(found, by, found.left, found.length)
+    way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
+    way -= way.mean()
+    believed = way @ place[:, :2] / (way @ way)
+    return _rates(found, fine, (rate, variance, found.blur, whole), 0.5 * (steps * step) ** 2, believed)
+
+
+def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], Floats, Booleans]:
+    """Slopes (E,) of weighted line fits over `x` (N,) to each of some values (N,), their variance (E,), and whether
+    there are enough components (E,) for a fit."""
+    total, weighted = found.total, found.weight * x
+    s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
+    spread = s * sxx - sx**2
+    enough = (found.count >= MEASURED) & (spread > 1e-9 * s * s * found.heard.step**2)
+    spread = np.where(enough, spread, 1.0)
+    slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
+    return slopes, CONSTANTS.crowd * s / spread, enough
+
+
+def _rates(
+    found: Lengths, fine: Booleans, values: tuple[Floats, Floats, Floats, Floats], unit: float, believed: Floats,
+    bends: tuple[Floats, ...] = (),
+) -> Rates:  # fmt: skip
+    """Rates of those lengths (E,) that are `fine`, from their rates, variances, blurs and rates of the measured lengths
+    over a `unit` [s or s^2]."""
+    toward, heard = found.toward, found.heard
+    fine = fine & (np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
+    turning = heard.baseline * float(np.abs(np.diff(heard.heading)).sum()) / unit
+    every, owner = np.unique(found.owner[fine], return_inverse=True)
+    alone = np.array_equal(owner, np.arange(len(every)))
+    return Rates(
+        toward[fine], *(value[fine] for value in values), turning, *([bend[fine] for bend in bends] or (None, None)),
+        None if alone else owner, believed,
+    )  # fmt: skip
+
+
+def _bends(found: Lengths, square_speed: float) -> tuple[Floats, Floats]:
+    """Quadratic parts (E,) [m/s^2] of lengths over time, beside their lines, and the variances of these, for an agent
+    of squared speed `square_speed` [m^2/s^2] which passes points."""
+    which, x = found.which, found.time
+
+    def total(value: Floats | float) -> Floats:
+        return found.total(found.weight * value)
+
+    s = total(1.0)
     u = x - (total(x) / s)[which]
     line = total(u**3) / np.maximum(total(u**2), 1e-300)
     u2 = u**2 - (total(u**2) / s)[which] - line[which] * u
     square = np.maximum(total(u2**2), 1e-300)
-    passing = square_speed * s / np.maximum(total(length), 1e-9)
-    return 2.0 * total(u2 * length) / square, 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
+    passing = square_speed * s / np.maximum(total(found.length), 1e-9)
+    return 2.0 * total(u2 * found.length) / square, 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
 
 
 def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None = None) -> StartCheck:
@@ -331,17 +380,16 @@ def _likelihoods(found: Rates, velocity: Floats, climb: float) -> tuple[Floats, 
     variance = found.variance + found.blur**2 * np.vecdot(speed, speed)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
-    either_way = np.stack([variance, variance + found.turning**2])
+    either_way = variance + np.array([0.0, found.turning**2])[:, None, None]
     likely = 0.25 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
     close = found.mixed(likely.sum(axis=0))
-    kept = np.exp(-0.5 * found.whole**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
-    other = np.full((1, 1), 1.0 / (4.0 * CONSTANTS.walk))
+    other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
         wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed) + climb**2)[:, None]
         still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
-    return close + 0.5 / 4.0 * found.mixed(found.share * (kept + 3.0 * other)), likely, either_way
+    return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, either_way
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

@@ -66,22 +66,28 @@ def log_agreement(state: WindowState, after: Window) -> float:
     return other - one
 
 
-def weigh_manoeuvre(state: WindowState, steps: int, log_prior: float) -> tuple[float, Floats]:
+def latest_lengths(state: WindowState) -> egomotion.Lengths | None:
+    """Lengths of tracks and of explained paths over the last `PAST` cycles, before those of the last pose are measured;
+    None where they are too few."""
+    passed = state.window.step[:-1][-PAST:]
+    silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
+    if silent or len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
+        return None
+    return _lengths(state, slice(-2 - len(passed), -1), float(passed.mean()))
+
+
+def weigh_manoeuvre(
+    state: WindowState, told: egomotion.Lengths, steps: int, log_prior: float
+) -> tuple[float, Floats]:  # fmt: skip
     """Posterior log odds of a manoeuvre that has lasted for `steps` until the last measurement, and its horizontal
-    acceleration (2,) [m/s^2], by the rates at which the lengths of tracks and of explained paths changed over the last
-    `PAST` cycles.
+    acceleration (2,) [m/s^2], by the rates at which the lengths that `told` change.
 
     It is an acceleration of the liveliest mode, where the agent faces or in any direction.
     """
-    window = state.window
-    passed = window.step[:-1][-PAST:]  # the last pose is not measured yet
-    silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
-    if silent or len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
-        return -np.inf, np.zeros(2)
-    found = egomotion.accelerations(_heard(state, slice(-2 - len(passed), -1), float(passed.mean())), steps)
+    found = egomotion.accelerations(told, steps)
     if found.number < egomotion.FEWEST:
         return -np.inf, np.zeros(2)
-    calm, facing = _acceleration_covariance(window, steps), rotation_z(state.heading[-1])[:2, 0]
+    calm, facing = _acceleration_covariance(state.window, steps), rotation_z(state.heading[-1])[:2, 0]
     ways = [calm + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
     return egomotion.weigh_change(found, calm, ways, log_prior)
 
@@ -100,20 +106,20 @@ def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
 
     Where the heading is estimated, its deviation turns all directions: each rate by twice the way across.
     """
-    found, window = egomotion.rates(_heard(state, rows, step)), state.window
+    found, window = egomotion.rates(_lengths(state, rows, step)), state.window
     if not window.turns:
         return found
     heading_std = np.sqrt(np.diag(pose_covariance(window, TURN))[rows].max())
     return found._replace(blur=np.hypot(found.blur, 2.0 * heading_std))
 
 
-def _heard(state: WindowState, rows: slice, step: float) -> egomotion.Heard:
-    """What is heard at the window's poses `rows`, `step` [s] apart."""
+def _lengths(state: WindowState, rows: slice, step: float) -> egomotion.Lengths:
+    """Lengths that are heard at the window's poses `rows`, `step` [s] apart."""
     body, pose = state.scene.body, window_gaussian.poses(state.window)[rows]
-    return egomotion.Heard(
+    return egomotion.lengths(egomotion.Heard(
         state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step,
         float(np.linalg.norm(body.tx_offset - body.rx_offset)), state.scene.radio.array.spacing,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
