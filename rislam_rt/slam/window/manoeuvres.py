@@ -14,7 +14,7 @@ from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
 from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares
 from rislam_rt.slam.window.motion_learning import solve_livelier
-from rislam_rt.slam.window.relinearisation import relinearise
+from rislam_rt.slam.window.relinearisation import levelled, predictions, relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.solver_limits import LASTED
@@ -60,10 +60,11 @@ def _booked_anew(state: WindowState, until: int) -> WindowState:
     """State whose wall returns scatter about the motion as it is now estimated by as much as they did in the first
     `until` cycles of the window: what a manoeuvre that was not believed in did to them was held for neighbours' pull,
     whose variance would go on holding the agent back."""
-    state, left = relinearise(state, 0)
+    found = predictions(state, 0)
+    state, left = levelled(state, 0, found)
     spread = prediction_variance(state.window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread))
     log = reweigh_wall_returns(state.log, left, state.window.num_poses, until)
     rows = (log.form[:, 0, 0] == TX).nonzero()[0]
     visibility = with_scatter(state.visibility, log.form[rows, 0], log.scatter(rows))
-    return relinearise(state._replace(log=log, visibility=visibility), 0)[0]
+    return relinearise(state._replace(log=log, visibility=visibility), 0, found)[0]
