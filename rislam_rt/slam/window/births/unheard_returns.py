@@ -58,7 +58,7 @@ def log_unheard(
     gap = scene.sensor.nearest(log.seen[:, 0] - length[:, slot])
     wall, heard = (np.abs(gap) < near[:, :1]).nonzero()
     off, spacing = log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing
-    off -= np.where(log.mirrored(spacing)[heard], np.round(off * spacing) / spacing, 0.0)
+    off -= np.where(log.mirrored(heard, spacing), np.round(off * spacing) / spacing, 0.0)
     off = (rotation_z(ends.heading)[:, :2, :2][slot[heard]] @ off[..., None])[..., 0]
     inside = (np.abs(off) < near[wall, 1:]).all(axis=1)
     present = np.zeros(length.shape, dtype=np.bool_)
