@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rislam_rt.blas_threads import in_one_blas_thread
 from rislam_rt.errors import ConfigError, RislamError, expect
 from rislam_rt.measurement.config import check_half_turn
 from rislam_rt.model import Body, Paths, Scene, SchemeResult, SlamResult
@@ -111,6 +112,7 @@ def check_one_piece(cycles: int, way_out: str) -> None:
         )
 
 
+@in_one_blas_thread
 def run_slam(
     scene: Scene, spec: PipelineSpec, *, rng: np.random.Generator, jobs: int = 1,
     done: MutableMapping[str, SchemeResult] | None = None, progress: Tell = tell_nobody,
@@ -161,6 +163,7 @@ def result_of(
     )  # fmt: skip
 
 
+@in_one_blas_thread
 def run_scheme(
     name: str, setup: RunSetup, spec: PipelineSpec, tell: Tell, estimator: Estimator | None = None
 ) -> SchemeResult:

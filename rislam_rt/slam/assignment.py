@@ -50,7 +50,7 @@ def pair_costs(
     to be expected per metre, unit of each cosine and e-fold of amplitude; pairs beyond the gate (on
     delay and cosines) do not compete at all. `pairs` (P,), (P,) are those that may, where that is known.
     """
-    wide = np.diagonal(candidates.covariance, axis1=1, axis2=2)
+    wide = candidates.covariance[:, DIAGONAL, DIAGONAL]
     row, column = pairs or within_reach(candidates.seen, wide, candidates, observations, gate)
     spread = candidates.covariance[row]
     spread[:, DIAGONAL, DIAGONAL] += observations.std[column] ** 2
@@ -58,10 +58,12 @@ def pair_costs(
     variance = candidates.log_amplitude_std[row] ** 2 + observations.log_amplitude_std[column] ** 2
     surplus = observations.log_amplitude[column] - candidates.log_amplitude[row]
     loudness = surplus**2 / variance + np.log(variance) + np.log(2.0 * np.pi)
-    loudness = np.where(candidates.fades[row], -2.0 * log_rayleigh(surplus), loudness)
+    fades = candidates.fades[row]
+    loudness[fades] = -2.0 * log_rayleigh(surplus[fades])
     cost = distance + log_det + 3.0 * np.log(2.0 * np.pi) + loudness
     costs = np.zeros((len(candidates.seen), len(observations.seen)))
-    cost += 2.0 * np.log(np.broadcast_to(strangers, costs.shape[1])[column]) - 2.0 * candidates.log_odds[row]
+    density = strangers + np.zeros(costs.shape[1])
+    cost += 2.0 * np.log(density[column]) - 2.0 * candidates.log_odds[row]
     costs[row, column] = np.where(distance < gate, np.minimum(cost, 0.0), 0.0)
     return costs
 
@@ -86,8 +88,9 @@ def within_reach(
     inside = gap**2 <= gate * (variance[row] + observations.std[column] ** 2)
     doubt = candidates.log_amplitude_std[row] ** 2 + observations.log_amplitude_std[column] ** 2
     near = inside[:, 1] & inside[:, 2] & ((loudness - observations.log_amplitude[column]) ** 2 < gate * doubt)
-    side, other = candidates.side[row], observations.sides[column]
-    near &= (side == other) | (side == UNTOLD) | (other == UNTOLD)
+    if observations.side is not None:
+        side, other = candidates.side[row], observations.side[column]
+        near &= (side == other) | (side == UNTOLD) | (other == UNTOLD)
     return row[near], column[near]
 
 

@@ -23,6 +23,7 @@ FLOORS = {
         "shipped",
         "toml",
         "worker_pool",
+        "blas_threads",
     ),
     1: ("geometry", "storage"),
     2: ("model",),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.blas_threads import in_one_blas_thread
 from rislam_rt.errors import ConfigError, RislamError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.input_messages import did_you_mean, nearest
@@ -65,6 +66,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 give."""
 
 
+@in_one_blas_thread
 def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) -> Answers:
     """Estimate pose and map, cycle by cycle, from recorded or own measurements alone: no scene, channel or truth.
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.blas_threads import in_one_blas_thread
 from rislam_rt.errors import ConfigError, expect
 from rislam_rt.model import Body, DataSheet, MapEstimate, Measurement, RisCode, SlamEstimate, empty_map
 from rislam_rt.pipeline.assumed_model import tell_settings
@@ -148,6 +149,7 @@ GONE = ("gate", "window", "birth_margin", "max_misses", "merge_distance")
 """Settings `nested.*` of earlier versions that a replay leaves out: they do not exist any more."""
 
 
+@in_one_blas_thread
 def replay(
     inputs: Inputs, config: Mapping[str, Any], scheme: str, changes: Mapping[str, Any] | None = None,
     estimator: Estimator | None = None, *, rng: np.random.Generator,

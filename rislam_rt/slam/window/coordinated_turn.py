@@ -63,20 +63,20 @@ def _log_likelihoods(state: WindowState, turn: Floats) -> Floats:
     (K,) [rad]: did the agent go where it faces, and did it not."""
     window, count = state.window, len(turn)
     spread = window_gaussian.step_covariances(window, count)[:, :2, :2]
-    shift = np.stack([_asked_for(window, angle) for angle in (turn, np.zeros(count))])
+    shift = _asked_for(window, np.stack([turn, np.zeros(count)]))
     found = motion.log_likelihood(window.accel[:count, :2], spread, window.solved[:count, 0], shift)
     found[..., motion.is_level_only()] = -np.inf
     return found
 
 
 def _asked_for(window: Window, angle: Floats) -> Floats:
-    """Accelerations (K, 2) [m/s^2] beyond those of the window's first K steps that other turns (K,) [rad] of the
-    velocity ask for, if the agent moves the same; 0 over steps that take no time."""
-    count = len(angle)
+    """Accelerations (..., K, 2) [m/s^2] beyond those of the window's first K steps that other turns (..., K) [rad] of
+    the velocity ask for, if the agent moves the same; 0 over steps that take no time."""
+    count = angle.shape[-1]
     step, own = window.step[:count], window.velocity_turn[:count]
     speed = _velocities(window)[:count]
     by = (np.exp(1j * own) - np.exp(1j * angle)) * speed / np.where(step > 0.0, step, np.inf)
-    return np.stack([by.real, by.imag], axis=1)
+    return np.stack([by.real, by.imag], axis=-1)
 
 
 def _velocities(window: Window) -> Complexes:

@@ -219,10 +219,10 @@ def _follow(
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
     late = found.last == state.cycle - 1
     if state.config.motion == "learnt" and state.window.covariance[-1, -1] > 0.0:
-        lively = _predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest)
         found, rows, picks = tracks.match_over_motions(
-            found, lively, observed, free, state.cycle, state.config.new_density, log_manoeuvre(state)
-        )
+            found, lambda: (_predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest), log_manoeuvre(state)),
+            observed, free, state.cycle, state.config.new_density,
+        )  # fmt: skip
     else:  # who is told the motion, or knows it particle by particle, looks for none
         rows, picks, _ = tracks.match(found, observed, free, state.cycle, state.config.new_density)
     horizon = _weigh_tracks(found, rows, view.tilts)

@@ -233,7 +233,7 @@ def _excess_variance(window: Window, left: Residuals) -> Floats:
 
     Of white accelerations over equal steps the variance of the place grows with the cube of time.
     """
-    astray = window_gaussian.now_with_excess(window)[2][:3, :3]
+    astray = window_gaussian.excess_now(window)[:3, :3]
     late = ((left.slot + 1.0) / window.num_poses) ** 3.0
     slopes = left.slopes[..., :3]
     return np.asarray(np.vecdot(slopes @ astray, slopes) * late[:, None])

@@ -14,7 +14,7 @@ from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
 from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares, unique_forms
 from rislam_rt.slam.window.motion_learning import solve_livelier, vertical_information
-from rislam_rt.slam.window.relinearisation import relinearise
+from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.solver_limits import LASTED, STRIDE
@@ -32,6 +32,9 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     window = state.window
     if window.rates is None or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
         return state
+    told = motion_agreement.latest_lengths(state)
+    if told is None:
+        return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps
     lively = (state.level[:2] @ motion.transition(CONSTANTS.stay))[:, -1]
     # a floor is held for level until another is held for true
@@ -39,7 +42,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     best, accel, steps = 0.0, np.zeros(3), 0
     for each in [each for each in LASTED if each < len(window.step)]:
         share = np.maximum(lively, 1.0 - CONSTANTS.stay**each)
-        log_odds, by = motion_agreement.weigh_manoeuvre(state, each, np.log(share / (1.0 - share)) - climbs)
+        log_odds, by = motion_agreement.weigh_manoeuvre(state, told, each, np.log(share / (1.0 - share)) - climbs)
         if log_odds > best:
             best, accel, steps = log_odds, by, each
     if not steps:
@@ -59,16 +62,18 @@ def _booked_anew(state: WindowState, until: int) -> WindowState:
     """State whose wall returns scatter about the motion as it is now estimated by as much as they did in the first
     `until` cycles of the window: what a manoeuvre that was not believed in did to them was held for neighbours' pull,
     whose variance would go on holding the agent back."""
-    state = _reweighed(state, until)
+    found = predictions(state, 0)
+    state = _reweighed(state, until, found)
     log = state.log
     rows = (log.form[:, 0, 0] == TX).nonzero()[0]
     visibility = with_scatter(state.visibility, log.form[rows, 0], log.scatter(rows))
-    return relinearise(state._replace(visibility=visibility), 0)[0]
+    return relinearise(state._replace(visibility=visibility), 0, found)[0]
 
 
-def _reweighed(state: WindowState, until: int) -> WindowState:
-    """State whose log weighs wall returns by their residuals in the first `until` cycles of the window."""
-    state, left = relinearise(state, 0)
+def _reweighed(state: WindowState, until: int, found: Predictions) -> WindowState:
+    """State whose log weighs wall returns by their residuals, of what is `found`, in the first `until` cycles of the
+    window."""
+    state, left = levelled(state, 0, found)
     spread = prediction_variance(state.window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread))
     return state._replace(log=reweigh_wall_returns(state.log, left, state.window.num_poses, until))
@@ -84,25 +89,26 @@ def with_climb(state: WindowState) -> WindowState:
     window, steps = state.window, int(LASTED[-1])
     if state.cycle % STRIDE or state.config.motion != "learnt" or len(window.step) <= steps:
         return state
-    trial = _scattering_as_before(state, steps)
+    found = predictions(state, 0)
+    trial = _scattering_as_before(state, steps, found)
     if trial is state:
         return state
-    for _ in range(2):
-        trial = relinearise(trial, 0)[0]
+    for linearised in (found, None):
+        trial = relinearise(trial, 0, linearised)[0]
         trial = trial._replace(window=solve_livelier(trial.window, steps + 1, upwards=True))
     last, begin = slice(-steps - 1, None), state.cycle - steps
     inner = vertical_information(trial.window).information[last, last]
     free = np.linalg.slogdet(np.eye(steps + 1) + CONSTANTS.liveliest**2 * inner)[1]
     free += float(np.sum(trial.window.accel[last, 2] ** 2)) / CONSTANTS.liveliest**2
-    log_ratio = _log_returns(trial, begin) - _log_returns(state, begin) - 0.5 * free
+    log_ratio = _log_returns(trial, begin, predictions(trial, 0)) - _log_returns(state, begin, found) - 0.5 * free
     return trial if log_ratio + CONSTANTS.log_rare - CONSTANTS.log_upright > CONSTANTS.log_born else state
 
 
-def _scattering_as_before(state: WindowState, steps: int) -> WindowState:
-    """State whose returns over walls alone scatter no more than they did before the last `steps`; the same state if
-    none has come to scatter by more than still fits (`crowd`)."""
+def _scattering_as_before(state: WindowState, steps: int, found: Predictions) -> WindowState:
+    """State whose returns over walls alone scatter no more than they did before the last `steps`, by what is
+    `found`; the same state if none has come to scatter by more than still fits (`crowd`)."""
     log = state.log
-    before = _reweighed(state, state.window.num_poses - 1 - steps).log
+    before = _reweighed(state, state.window.num_poses - 1 - steps, found).log
     rows = (log.form[:, 0, 0] == TX).nonzero()[0]
     fewer = np.minimum(log.scatter(rows), before.scatter(rows))
     if not (log.scatter(rows) > CONSTANTS.crowd * fewer).any():
@@ -111,10 +117,11 @@ def _scattering_as_before(state: WindowState, steps: int) -> WindowState:
     return state._replace(log=log._replace(extra=np.minimum(log.extra, before.extra)), visibility=visibility)
 
 
-def _log_returns(state: WindowState, begin: int) -> float:
-    """Log likelihood, without its constants, of the lengths of returns over walls alone since a cycle, at the estimate;
-    each path scatters by a variance of its own, of which beforehand no more is known than that it fits (`crowd`)."""
-    log, left = state.log, relinearise(state, 0)[1]
+def _log_returns(state: WindowState, begin: int, found: Predictions) -> float:
+    """Log likelihood, without its constants, of the lengths of returns over walls alone since a cycle, as they are
+    `found` at the estimate; each path scatters by a variance of its own, of which beforehand no more is known than that
+    it fits (`crowd`)."""
+    log, left = state.log, levelled(state, 0, found)[1]
     left = left.take((log.form[left.row, 0, 0] == TX) & (log.cycle[left.row] >= begin))
     _, which = unique_forms(log.form[left.row, 0])
     square = left.left[:, 0] ** 2 * (1.0 + log.extra[left.row, 0] / log.std[left.row, 0] ** 2)

@@ -87,22 +87,22 @@ class Log(NamedTuple):
         whole = self.std[rows] ** 2 + self.extra[rows]
         return np.asarray(np.sqrt(whole / self.momentary(rows)))
 
-    def mirrored(self, spacing: float) -> Booleans:
-        """Whether each component's cosines (N, 2) may as well be one period of the array off, whose antennas stand
-        `spacing` wavelengths apart.
+    def mirrored(self, rows: Integers, spacing: float) -> Booleans:
+        """Whether the cosines (A, 2) of the components `rows` (A,) may as well be one period of the array off, whose
+        antennas stand `spacing` wavelengths apart.
 
         Near the array's own line the receiver takes now the one and now the other, and counts the period into the
         variance by the other's probability. The other has to lie in the sky, within what the other axis deviates by.
         """
-        cosine, across, std = np.abs(self.seen[:, 1:]), np.abs(self.seen[:, :0:-1]), self.std[:, 1:]
-        inside = np.hypot(1.0 / spacing - cosine, across) < 1.0 + CONSTANTS.fit * std[:, ::-1]
+        cosine, std = np.abs(self.seen[rows, 1:]), self.std[rows, 1:]
+        inside = np.hypot(1.0 / spacing - cosine, cosine[:, ::-1]) < 1.0 + CONSTANTS.fit * std[:, ::-1]
         return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
 
     def mostly_mirrored(self, rows: Integers, which: Integers, count: int, spacing: float) -> Booleans:
         """Whether most of the components `rows` (A,) of each of T = `count` tracks or paths `which` (A,) are `mirrored`
         along either axis of the array (T, 2)."""
         excess = np.zeros((count, 2))
-        np.add.at(excess, which, self.mirrored(spacing)[rows] - 0.5)
+        np.add.at(excess, which, self.mirrored(rows, spacing) - 0.5)
         return excess > 0.0
 
     def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "ArrayEnds":

@@ -16,7 +16,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.cholesky import form_and_log_det, inverse
+from rislam_rt.slam.window.smoother.cholesky import inverse, log_evidence
 from rislam_rt.slam.window.smoother.manoeuvre_segments import manoeuvring_share
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, step_covariances
@@ -108,15 +108,11 @@ def manoeuvre_share(
     to one. Priors in between are `PRIORS` steps in equal ratios of the precision; a manoeuvre of any size is a rare
     event.
     """
-    information, slope = told
     floor = float(motion.expected_precision(motion.first_motion_mode(0.0)))
-    share = np.linspace(0.0, 1.0, PRIORS)
+    share = np.arange(PRIORS) / (PRIORS - 1.0)
     std = np.sqrt(floor ** (share[:, None] - 1.0) * precision ** -share[:, None])
     std = np.concatenate([std, np.full((1, len(precision)), STILL)])
-    # N(0, P^-1) against what is told
-    inside, pull = np.eye(len(slope)) + std[:, :, None] * information * std[:, None, :], std * slope
-    form, log_det = np.array([form_and_log_det(*each) for each in zip(inside, pull, strict=True)]).T
-    log_like = 0.5 * (form - log_det)
+    log_like = np.array([log_evidence(*told, each) for each in std])
     log_like[1:-1] += CONSTANTS.log_rare
     log_like[-2] += lively
     log_like[-1] += CONSTANTS.log_upright if was_level else CONSTANTS.log_rare

@@ -16,35 +16,80 @@ from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, poses
 from rislam_rt.slam.window.state import WindowState
 
 
-def relinearise(state: WindowState, first: int) -> tuple[WindowState, Residuals]:
+class Predictions(NamedTuple):
+    """Predictions of A explained components of the log at the window's estimate."""
+
+    row: Integers
+    """(A,) row of each in the log."""
+    slot: Integers
+    """(A,) index of its pose in the window."""
+    seen: Floats
+    """(A, 3) length and cosines."""
+    bias: Floats
+    """(A, 3) by how much less is reported on average (see `horizon_bias`)."""
+    slopes: Floats
+    """(A, 3, 4 + 3F) derivatives by pose and features of what is reported."""
+
+
+class Whitened(NamedTuple):
+    """Residuals of A components of the log, in standard deviations as all else here."""
+
+    row: Integers
+    """(A,) row of each in the log."""
+    slot: Integers
+    """(A,) index of its pose in the window."""
+    left: Floats
+    """(A, 3) measured less predicted."""
+    slopes: Floats
+    """(A, 3, 4 + 3F) derivatives of the predictions by pose and features."""
+    turned: Floats
+    """(A, 3, Z) those by the attitude."""
+
+
+def relinearise(
+    state: WindowState, first: int, found: Predictions | None = None
+) -> tuple[WindowState, Residuals]:  # fmt: skip
     """Re-linearise the measurements of the poses from `first` on at the window's estimate, whose last pose is that of
-    the cycle, and level them by the attitudes that they tell; returns the state and its residuals."""
-    window, log = state.window, state.log
-    slot = log.cycle - (state.cycle - window.num_poses + 1)
-    rows, place = (log.explained & (slot >= first)).nonzero()[0], poses(window)
-    found, slopes = residuals(state, rows, slot[rows], place)
-    size, many, of, variance = slopes.shape[2], window.num_poses - first, found.slot - first, state.attitude_variance
-    turned = attitude.jacobian(log.seen[rows, 1:], len(variance)) / found.std[..., None]
-    # the components of each slot side by side
-    at = np.arange(len(rows)) - np.searchsorted(of, of)
-    wide = np.zeros((many, int(at.max(initial=-1)) + 1, 3, size + len(variance) + 1))
-    weight = np.sqrt(trust(found.left))[:, None, None]
-    wide[of, at, :, :size], wide[of, at, :, size:-1] = weight * slopes, weight * turned
-    wide[of, at, :, -1] = weight[..., 0] * found.left
-    flat = wide.reshape(many, -1, wide.shape[-1])
+    the cycle, and level them by the attitudes that they tell; returns the state and its residuals. `found` are their
+    `predictions`, where they are known."""
+    found = found or predictions(state, first)
+    window, variance, heard = state.window, state.attitude_variance, whitened(state, found)
+    weight = np.sqrt(trust(heard.left))[:, None, None]
+    parts = [weight * part for part in (heard.slopes, heard.turned, heard.left[..., None])]
+    flat = _side_by_side(heard.slot - first, window.num_poses - first, *parts)
     one = attitude.marginalise(np.swapaxes(flat, 1, 2) @ flat, state.attitude[first:], variance)
-    own = np.zeros((many, wide.shape[1], 3, len(variance) + 1))
-    own[of, at] = wide[of, at, :, size:] * log.sharper(rows)[..., None]
-    own = own.reshape(many, -1, own.shape[-1])
-    change = attitude.change(np.swapaxes(own, 1, 2) @ own, state.attitude[first:], variance)
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[first:], gradient[first:] = one.hessian, -one.slope
-    middle[first:, :POSE], middle[first:, POSE:] = place[first:], window.features.ravel()
+    middle[first:, :POSE], middle[first:, POSE:] = poses(window)[first:], window.features.ravel()
     state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
-    left = found.left - (turned @ change[of][..., None])[..., 0]
-    return level(state, first, change), Residuals(
-        found.row, found.slot, left, slopes, np.zeros(len(rows))
-    )  # fmt: skip
+    return _levelled(state, first, heard)
+
+
+def levelled(state: WindowState, first: int, found: Predictions) -> tuple[WindowState, Residuals]:
+    """State and residuals as `relinearise` returns them, but for the quadratics."""
+    return _levelled(state, first, whitened(state, found))
+
+
+def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowState, Residuals]:
+    """Level measurements by the attitudes that their whitened residuals tell."""
+    of, sharper = heard.slot - first, state.log.sharper(heard.row)[..., None]
+    weight = np.sqrt(trust(heard.left))[:, None, None]
+    parts = [weight * part * sharper for part in (heard.turned, heard.left[..., None])]
+    own = _side_by_side(of, state.window.num_poses - first, *parts)
+    change = attitude.change(np.swapaxes(own, 1, 2) @ own, state.attitude[first:], state.attitude_variance)
+    left = heard.left - (heard.turned @ change[of][..., None])[..., 0]
+    return level(state, first, change), Residuals(heard.row, heard.slot, left, heard.slopes, np.zeros(len(left)))
+
+
+def _side_by_side(of: Integers, count: int, *parts: Floats) -> Floats:
+    """Rows (K, N, ...) of numbers (A, 3, ...) of components in slots `of` (A,), sorted, those of one slot side by side
+    for a re-linearisation."""
+    at = np.arange(len(of)) - np.searchsorted(of, of)
+    ends = np.cumsum([part.shape[2] for part in parts]).tolist()
+    wide = np.zeros((count, int(at.max(initial=-1)) + 1, 3, ends[-1]))
+    for part, end in zip(parts, ends, strict=True):
+        wide[of, at, :, end - part.shape[2] : end] = part
+    return wide.reshape(count, -1, ends[-1])
 
 
 def level(state: WindowState, first: int, change: Floats) -> WindowState:
@@ -59,22 +104,15 @@ def level(state: WindowState, first: int, change: Floats) -> WindowState:
     return state._replace(log=log._replace(seen=seen), attitude=rotation)
 
 
-class _Whitened(NamedTuple):
-    """Residuals of A components of the log in standard deviations, and these."""
-
-    row: Integers
-    slot: Integers
-    left: Floats
-    std: Floats
-
-
-def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats) -> tuple[_Whitened, Floats]:
-    """Residuals (A, 3) as re-linearised of explained rows of the log, heard at slots (A,) of the poses (K, 4), and the
-    predictions' jacobians (A, 3, 4 + 3F) by pose and features, both in standard deviations."""
-    window, log, scene, form = state.window, state.log, state.scene, state.log.form[rows]
+def predictions(state: WindowState, first: int) -> Predictions:
+    """Predictions, as re-linearised, of the explained components that were heard at the poses from `first` on."""
+    window, log, scene = state.window, state.log, state.scene
+    slot = log.cycle - (state.cycle - window.num_poses + 1)
+    rows = (log.explained & (slot >= first)).nonzero()[0]
+    form, slot = log.form[rows], slot[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
-    place = place[at]
+    place = poses(window)[at]
     ends = poses_of(place[:, :3], state.heading[at] + place[:, 3], scene.body)
     returns = forms_apart(state.landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])))
     linear = linearise_each(returns, window.features, state.landmarks.anchor, ends, POSE)
@@ -87,12 +125,20 @@ def residuals(state: WindowState, rows: Integers, slot: Integers, place: Floats)
     gap[:, 0] = scene.sensor.nearest(gap[:, 0])
     seen[both] += share * gap
     slopes[both] += share[..., None] * (by_other - slopes[both])
+    bias = np.zeros(seen.shape)
+    correct_horizon_bias(seen, log.std[rows], bias, slopes)
+    return Predictions(rows, slot, seen, bias, slopes)
+
+
+def whitened(state: WindowState, found: Predictions) -> Whitened:
+    """Residuals of the log's components as re-linearised, by their predictions."""
+    log, rows = state.log, found.row
     std = np.sqrt(log.std[rows] ** 2 + log.extra[rows])
-    left = log.seen[rows] - seen
-    left[:, 0] = scene.sensor.nearest(left[:, 0])
-    correct_horizon_bias(seen, log.std[rows], left, slopes)
-    slopes /= std[..., None]
-    return _Whitened(rows, slot, left / std, std), slopes
+    left = log.seen[rows] - found.seen
+    left[:, 0] = state.scene.sensor.nearest(left[:, 0])
+    turned = attitude.jacobian(log.seen[rows, 1:], len(state.attitude_variance))
+    each = std[..., None]
+    return Whitened(rows, found.slot, (left + found.bias) / std, found.slopes / each, turned / each)
 
 
 def trust(left: Floats) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
-from rislam_rt.slam.window.divergence.egomotion import MEASURED
+from rislam_rt.slam.window.divergence.length_rates import MEASURED
 from rislam_rt.slam.window.measurement_log import ArrayEnds
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
@@ -56,14 +56,16 @@ class _Histories(NamedTuple):
         """Sums (T,) over each track's history of values (N,)."""
         return np.asarray(np.bincount(self.which, value, len(self.span)), dtype=np.float64)
 
-    def mean(self, value: Floats) -> Floats:
-        """Weighted means (T,) over each track's history of values (N,)."""
-        return self.total(self.weight * value) / self.total(self.weight)
+    def means(self, *values: Floats) -> list[Floats]:
+        """Weighted means (T,) over each track's history of each of some values (N,)."""
+        weight = self.total(self.weight)
+        return [self.total(self.weight * value) / weight for value in values]
 
-    def slope(self, value: Floats) -> tuple[Floats, Floats]:
-        """Rates (T,) [m/s] of the tracks, slopes of weighted line fits to values (N,), and their variances."""
-        information = self.total(self.weight * self.time**2)
-        return self.total(self.weight * self.time * value) / information, 1.0 / information
+    def slopes(self, *values: Floats) -> tuple[list[Floats], Floats]:
+        """Rates (T,) [m/s] of the tracks, slopes of weighted line fits to each of some values (N,), and their
+        variances."""
+        information, weighted = self.total(self.weight * self.time**2), self.weight * self.time
+        return [self.total(weighted * value) / information for value in values], 1.0 / information
 
 
 def with_rates(state: WindowState) -> WindowState:
@@ -99,8 +101,9 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     def total(value: Floats) -> Floats:
         return np.asarray(np.bincount(which, value), dtype=np.float64)
 
-    weight = log.std[rows, 0] ** -2.0
-    time = clock[slot] - (total(weight * clock[slot]) / total(weight))[which]
+    weight, time = log.std[rows, 0] ** -2.0, clock[slot]
+    mass = total(weight)
+    time = time - (total(weight * time) / mass)[which]
     toward, doubt = _directions(state, ends, slot, time)
     moved, joined = np.diff(place[slot], axis=0), np.diff(which) == 0
     follow = np.append(0.0, np.cumsum(np.where(joined, np.vecdot(0.5 * (toward[1:] + toward[:-1]), moved), 0.0)))
@@ -113,7 +116,7 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     turning = baseline * (turned[spans[:, 1]] - turned[spans[:, 0]]) / span
     length = log.seen[rows, 0]
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
-    apart = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
+    apart = 2.0 * baseline * mass / np.maximum(total(weight * length), 1e-9)
     own = (apart**2 + doubt) * speed**2 + turning**2 + STILL**2
     weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
     return _Histories(
@@ -156,8 +159,8 @@ def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> F
 def _shares(found: _Histories, state: WindowState) -> Floats:
     """Probability (T,) that each track's length follows the poses, as half of all paths do; of the others a quarter
     keep their length, as over opposite walls, and the rest have any rate that the agent's speed allows."""
-    (rate, spread), (whole, _) = found.slope(found.left), found.slope(found.length)
-    mean = np.stack([found.mean(side) for side in found.toward.T], axis=1)
+    (rate, whole), spread = found.slopes(found.left, found.length)
+    mean = np.stack(found.means(*found.toward.T), axis=1)
     doubt = np.vecdot(mean**2, way_variance(state.window, *found.ends.T)) / found.span**2
     half = 1.0 / np.bincount(found.owner)[found.owner]
     along = 0.5 * half * _normal(rate, spread + found.own_variance + doubt)
@@ -169,8 +172,9 @@ def _shares(found: _Histories, state: WindowState) -> Floats:
 def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
     """Rates of tracks as a quadratic cost on the window's positions, by tracks that follow them with probabilities
     `share` (T,)."""
-    count, many, left = len(found.span), state.window.num_poses, found.left - found.mean(found.left)[found.which]
-    rate, spread = found.slope(left)
+    (middle,), count, many = found.means(found.left), len(found.span), state.window.num_poses
+    left = found.left - middle[found.which]
+    (rate,), spread = found.slopes(left)
     trust = (CONSTANTS.tail + 1.0) / (CONSTANTS.tail + found.weight * (left - rate[found.which] * found.time) ** 2)
     weight = share[found.which] * found.weight * trust
     own = _own_numbers(found, weight)

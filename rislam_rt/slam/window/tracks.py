@@ -1,6 +1,7 @@
 """Tracks: components that no path of the map explains, followed from cycle to cycle by Kalman filters until a birth
 explains them."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -112,11 +113,11 @@ def match(
 
 
 def match_over_motions(
-    calm: WindowTracks, lively: WindowTracks, observed: Observations, free: Integers, cycle: int, strangers: float,
-    log_odds: float,
+    calm: WindowTracks, manoeuvred: Callable[[], tuple[WindowTracks, float]], observed: Observations, free: Integers,
+    cycle: int, strangers: float,
 ) -> tuple[WindowTracks, Integers, Integers]:  # fmt: skip
-    """Assign components to tracks as predicted by the motion as believed, `calm`, or in a manoeuvre, `lively`, of prior
-    odds `log_odds`, whichever is likelier for all of them together: the tracks, and as in `match`.
+    """Assign components to tracks as predicted by the motion as believed, `calm`, or as they are `manoeuvred`, with
+    the prior log odds of that, whichever is likelier for all of them together: the tracks, and as in `match`.
 
     One track alone that would go on only in a manoeuvre has reasons of its own, as a neighbour's pull.
     """
@@ -125,6 +126,7 @@ def match_over_motions(
     kept = int(np.isin(late, rows).sum())
     if kept + 1 >= len(late):
         return calm, rows, picks
+    lively, log_odds = manoeuvred()
     other_rows, other_picks, other = match(lively, observed, free, cycle, strangers)
     likelier = other + log_odds > score and np.isin(late, other_rows).sum() > kept + 1
     return (lively, other_rows, other_picks) if likelier else (calm, rows, picks)

@@ -53,6 +53,8 @@ def _open(probability: Floats) -> Floats:
 def _log_ratio(view: CycleAssociation, observed: Observations, both: Integers) -> Floats:
     """Log likelihood ratios of the components of associated clusters `both`: with their unresolved partners, against
     the leading paths alone."""
+    if not len(both):
+        return np.zeros(0)
     groups, expected = view.groups, view.expected
     row, pick = view.row[both], view.pick[both]
     lead, mate, share = groups.leader[row], groups.partner[row], groups.share[row, None]

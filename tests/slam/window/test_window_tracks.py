@@ -38,7 +38,7 @@ def test_tracks_go_on_as_in_a_manoeuvre_if_that_is_likelier_for_all_of_them():
     calm, lively = (tracks.advance(found, 0.1, 0.0, np.array([bend, 0.1, 0.1]), np.zeros(2)) for bend in (0.1, 2.0))
     for moved, followed in ((3, True), (1, False), (0, False)):
         now = heard._replace(seen=seen + 0.03 * (np.arange(4) < moved)[:, None] * [1.0, 0.0, 0.0])
-        both, rows, picks = tracks.match_over_motions(calm, lively, now, np.arange(4), 1, 1e-3, np.log(0.02))
+        both, rows, picks = tracks.match_over_motions(calm, lambda: (lively, np.log(0.02)), now, np.arange(4), 1, 1e-3)
         assert both is (lively if followed else calm)
         np.testing.assert_array_equal(rows, picks)
         assert len(rows) == (4 if followed else 4 - moved)

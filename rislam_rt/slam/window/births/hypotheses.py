@@ -59,6 +59,13 @@ class Hypotheses(NamedTuple):
     trials: Trials
     """Inputs of the fits."""
 
+    @property
+    def pair(self) -> Integers:
+        """(H,) which of `_pairs` two unknown walls make: opposite ones (0, and wherever there are none), two upright
+        ones (1), or an upright and a level one (2)."""
+        across, up = self.trials.turn[:, 0, 0, 0], self.trials.turn[:, 0, 2, 2]
+        return np.where(self.trials.is_pair & (up < 0.0), 2, self.trials.is_pair & (across < 0.0)).astype(np.int64)
+
     def take(self, rows: Any) -> "Hypotheses":
         """Only some of the hypotheses of what caused a track."""
         trials = Trials._make(field[rows] for field in self.trials)

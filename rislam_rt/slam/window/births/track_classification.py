@@ -122,7 +122,7 @@ def _weigh(
     evidence = fits.log_evidence + log_place(table, fits.place, summary.middle)
     evidence += log_kind(table, landmarks)
     # of what is heard too early, single returns may lie beyond the window
-    evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track]], 0.0)
+    evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track], table.pair], 0.0)
     evidence += log_amplitudes(table, fits, summary, landmarks, scene) + log_opacity(
         table, fits, summary, known, landmarks, scene.use_vt
     )
@@ -156,9 +156,9 @@ def decide_tracks(
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
-    `track_rows` are the tracks' rows of the log, `owner` (E,) the track of each summary; `lonely` (T,) is the log
-    probability that so few single-bounce returns are heard beside a return over two unknown walls, `beside` (T,) the
-    log odds that its direction speaks for a path over unknown walls.
+    `track_rows` are the tracks' rows of the log, `owner` (E,) the track of each summary; `lonely` (T, 3) is the log
+    probability that so few single-bounce returns are heard beside a return over two unknown walls of each kind of pair,
+    `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
     table, fits, evidence, length = _weigh(context, track_rows, summary, owner, known, lonely)

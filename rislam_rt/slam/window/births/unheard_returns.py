@@ -59,7 +59,7 @@ def log_unheard(
     gap = scene.sensor.nearest(log.seen[:, 0] - length[:, slot])
     wall, heard = (np.abs(gap) < near[:, :1]).nonzero()
     off, spacing = log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing
-    off -= np.where(log.mirrored(spacing)[heard], np.round(off * spacing) / spacing, 0.0)
+    off -= np.where(log.mirrored(heard, spacing), np.round(off * spacing) / spacing, 0.0)
     off = (rotation_z(ends.heading)[:, :2, :2][slot[heard]] @ off[..., None])[..., 0]
     inside = (np.abs(off) < near[wall, 1:]).all(axis=1)
     present = np.zeros(length.shape, dtype=np.bool_)
@@ -124,12 +124,13 @@ def log_silence(shows: Floats, present: Booleans) -> float:
 
 
 def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
-    """Log probability (T,) that so few single-bounce returns are heard beside each track, were it a return over two
-    unknown walls.
+    """Log probability (T, 3) that so few single-bounce returns are heard beside each track, were it a return over two
+    unknown walls: opposite ones, two upright ones, or an upright and a level one (as `hypotheses` has them).
 
-    Two walls shift the Tx by the sum of what each does: a single return of theirs comes along the same line (opposite
-    walls), or is one leg of a right angle; it is shorter and brighter. The floor's is never heard. All of them are
-    compared as they are now: near a corner they change fast.
+    Two walls shift the Tx by the sum of what each does. At right angles, a single return of theirs is one leg of a
+    right angle; something may stand in its way. Of opposite walls both come along the same line, over the very ways
+    that the track goes: nothing blocks one alone, and their lengths add up to the track's. All are brighter than the
+    track, the floor's is never heard, and they are compared as they are now: near a corner they change fast.
     """
     every, looked = context.tracks, bearings(context, rows, mean)
     shine = every.log_amplitude[rows[looked.track]] + np.log(looked.length)
@@ -146,12 +147,18 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
         shines = np.concatenate([shines, np.full(len(walls), np.inf)])
         owner = np.concatenate([owner, len(old) + np.arange(len(walls))])
     along, share = looked.ray @ away.T, reach / looked.length[:, None]
-    leg = (np.abs(along - share) < LEG) | (np.abs(along) > 1.0 - LEG)
-    leg &= (share < 0.995) & (shines > shine[:, None] - 0.3)
-    found = np.zeros((len(rows), len(old) + len(walls)), dtype=np.bool_)
-    np.logical_or.at(found, (looked.track[:, None], owner), leg)
-    missing = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])  # both, one of them, none
-    return missing[np.minimum(found.sum(axis=1), 2)]
+    heard = (share < 0.995) & (shines > shine[:, None] - 0.3)
+    legs = np.zeros((len(rows), len(old) + len(walls)), dtype=np.bool_)
+    np.logical_or.at(legs, (looked.track[:, None], owner), heard & (np.abs(along - share) < LEG))
+    square = np.array([CONSTANTS.log_rare, np.log1p(-CONSTANTS.steady), 0.0])[np.minimum(legs.sum(axis=1), 2)]
+    on_line, rest = heard & (np.abs(along) > 1.0 - LEG), np.abs(share[:, :, None] + share[:, None] - 1.0)
+    both = (on_line[:, :, None] & on_line[:, None] & (rest < LEG) & (owner[:, None] != owner)).any(axis=(1, 2))
+    opposite = np.zeros(len(rows), dtype=np.int64)
+    np.maximum.at(opposite, looked.track, on_line.any(axis=1).astype(np.int64) + both)
+    if context.scene.radio.array.pattern == "upper":
+        opposite += looked.ray[: len(rows), 2] > 1.0 - LEG
+    along_one = np.log1p(-CONSTANTS.shown) * (2 - np.minimum(opposite, 2))
+    return np.stack([along_one, square, square], axis=1)
 
 
 class Bearings(NamedTuple):
@@ -175,7 +182,7 @@ def bearings(context: WindowState, rows: Integers, mean: Floats) -> Bearings:
     order = np.argsort(tracks.ident[rows])
     which = order[np.searchsorted(tracks.ident[rows], log.track[at], sorter=order)]
     twofold = log.mostly_mirrored(at, which, count, context.scene.radio.array.spacing)
-    owner = twofold.any(axis=1).nonzero()[0]
+    owner = np.flatnonzero(twofold.any(axis=1))
     rim = np.sqrt(np.maximum(1.0 - seen[:, :0:-1] ** 2, 0.0))
     seen[:, 1:] = np.where(twofold, rim, seen[:, 1:])
     other = seen[owner]

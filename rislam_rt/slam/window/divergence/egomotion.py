@@ -9,67 +9,18 @@ such, with its own deviation and what manoeuvres since may have made of it; if i
 walking speed is as good. Laplace evidences of both decide.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, unique_forms
+from rislam_rt.slam.window.divergence.length_rates import Rates
 
-MEASURED = 6
-"""Measurements of a track from which on it has a rate of length: as many as births ask for."""
 FEWEST = 3
 """Tracks with a rate of length from which on the motion is checked, and pairs of a return and a component from which on
 a jump or a turn is: two agree on any horizontal motion."""
-
-
-class Rates(NamedTuple):
-    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
-    an array hears some alike from two."""
-
-    toward: Floats
-    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
-    rate: Floats
-    """(E,) [m/s] rate at which the path length changes."""
-    variance: Floats
-    """(E,) [m^2/s^2] of the rate."""
-    blur: Floats
-    """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
-    whole: Floats
-    """(E,) rate of the measured length itself; `rate` may be that of what the positions leave of it."""
-    turning: float = 0.0
-    """[m/s] speed of Tx and Rx against each other, as the body turns."""
-    bend: Floats | None = None
-    """(E,) [m/s^2] at which the rates change."""
-    bend_variance: Floats | None = None
-    """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
-    owner: Integers | None = None
-    """(E,) track or path of each direction; None where each has one."""
-    believed: Floats | None = None
-    """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
-    rest may have any rate."""
-
-    @property
-    def number(self) -> int:
-        """Number T of the tracks and paths whose lengths have a rate."""
-        return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
-
-    def each(self, value: Floats) -> Floats:
-        """Values (..., E) by track or path: of those (..., T) given."""
-        return value if self.owner is None else value[..., self.owner]
-
-    def mixed(self, value: Floats) -> Floats:
-        """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
-        if self.owner is None or np.array_equal(self.owner, np.arange(self.number)):
-            return value
-        return np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
-
-    @property
-    def share(self) -> Floats:
-        """(E,) probability of each direction beforehand: a half where there are two."""
-        return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
 
 
 class Manoeuvres(NamedTuple):
@@ -97,113 +48,6 @@ class StartCheck(NamedTuple):
     """[m/s] standard deviation of that velocity; where the compass is wrong, with the told one's included."""
     turn: float
     """[rad] by which the compass shows too little, if it is that which is wrong."""
-
-
-class Heard(NamedTuple):
-    """What rates of path lengths are fitted to: the log's components in the cycles of K poses."""
-
-    log: Log
-    """All components that were measured; the last cycle's are those of the last pose."""
-    heading: Floats
-    """(K,) [rad] the agent's headings."""
-    place: Floats
-    """(K, 3) [m] its estimated positions."""
-    step: float
-    """[s] from pose to pose."""
-    baseline: float
-    """[m] from Tx to Rx."""
-    spacing: float
-    """[wavelengths] of the antennas."""
-
-
-def rates(heard: Heard) -> Rates:
-    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
-    positions leave of the lengths' change, so that a turn or an acceleration bends none."""
-    return _fitted(heard, None)
-
-
-def accelerations(heard: Heard, steps: int) -> Rates:
-    """Rates [m/s^2] at which the lengths of tracks and explained paths change with the way of a constant acceleration
-    over the last `steps`, by weighted line fits to what the positions leave of the lengths' change: 0 for a path that
-    follows the positions as they are."""
-    return _fitted(heard, steps)
-
-
-def _fitted(heard: Heard, steps: int | None) -> Rates:
-    """Rates of path lengths by time, or by the way of an acceleration over the last `steps`."""
-    log, heading, place, step, baseline, spacing = heard
-    first = int(log.cycle[-1]) - len(heading) + 1 if len(log.cycle) else 0
-    known = log.explained
-    rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
-    if not len(rows):
-        return Rates(np.zeros((0, 3)), *np.zeros((4, 0)))
-    forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
-    every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
-    count = len(owner)
-    x = (log.cycle[rows] - log.cycle[-1]) * step
-    if steps is not None:
-        x = 0.5 * np.maximum(x + steps * step, 0.0) ** 2
-    weight = 1.0 / log.std[rows, 0] ** 2
-
-    def total(value: Floats) -> Floats:
-        return np.asarray(np.bincount(which, value, count), dtype=np.float64)
-
-    def slope(value: Floats) -> Floats:
-        return np.asarray((s * total(weight * x * value) - sx * total(weight * value)) / spread)
-
-    s, sx, sxx = total(weight), total(weight * x), total(weight * x**2)
-    spread = s * sxx - sx**2
-    enough = (np.bincount(which, minlength=count) >= MEASURED) & (spread > 1e-9 * s * s * step**2)
-    spread = np.where(enough, spread, 1.0)
-    since = log.cycle[rows] - first
-    angle = heading[since]
-    cos, sin = np.cos(angle), np.sin(angle)
-    toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
-    toward /= np.bincount(which, minlength=count)[:, None]
-    up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
-    toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
-    heard_length = log.seen[rows, 0]
-    rate = slope(heard_length - np.vecdot(toward[which], place[since] - place[-1]))
-    span, variance = step * max(len(place) - 1, 1), CONSTANTS.crowd * s / spread
-    velocity = (place[-1] - place[0]) / span
-    if steps is None:
-        rate = whole = rate + toward @ velocity
-        believed, unit = np.zeros(2), span
-        bend, bend_variance = _bends(which, x, weight, heard_length, float(velocity @ velocity))
-    else:
-        whole, unit = slope(heard_length), 0.5 * (steps * step) ** 2
-        way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
-        way -= way.mean()
-        believed = way @ place[:, :2] / (way @ way)
-        bend = bend_variance = np.zeros(count)
-    enough &= np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9  # at the rim, but for rounding
-    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
-    blur = 2.0 * baseline * s / np.maximum(total(weight * heard_length), 1e-9)
-    doubt = total((spread_of**2).mean(axis=1)) / np.bincount(which, minlength=count) ** 2
-    blur = np.hypot(blur, 2.0 * np.sqrt(doubt))
-    turning = baseline * float(np.abs(np.diff(heading)).sum()) / unit
-    owner = owner[enough]
-    return Rates(
-        toward[enough], rate[enough], variance[enough], blur[enough], whole[enough], turning, bend[enough],
-        bend_variance[enough], np.searchsorted(np.unique(owner), owner), believed,
-    )  # fmt: skip
-
-
-def _bends(which: Integers, x: Floats, weight: Floats, length: Floats, square_speed: float) -> tuple[Floats, Floats]:
-    """Quadratic parts (E,) [m/s^2] of lengths (N,) over times `x` (N,), beside their lines, and the variances of these,
-    for an agent of squared speed `square_speed` [m^2/s^2] which passes points."""
-
-    def total(value: Floats) -> Floats:
-        return np.asarray(np.bincount(which, weight * value), dtype=np.float64)
-
-    s = total(np.ones(len(x)))
-    u = x - (total(x) / s)[which]
-    line = total(u**3) / np.maximum(total(u**2), 1e-300)
-    u2 = u**2 - (total(u**2) / s)[which] - line[which] * u
-    square = np.maximum(total(u2**2), 1e-300)
-    passing = square_speed * s / np.maximum(total(length), 1e-9)
-    return 2.0 * total(u2 * length) / square, 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
 
 
 def weigh(found: Rates, told: Floats, std: Floats, manoeuvres: Manoeuvres | None = None) -> StartCheck:
@@ -265,14 +109,20 @@ def log_evidence(found: Rates, told: Floats, std: Floats) -> float:
     return float(_find_modes(found, _starts(found, told), told, np.diag(std[:2] ** 2)).evidence.max())
 
 
-def weigh_change(found: Rates, calm: Floats, ways: list[Floats], log_prior: float) -> tuple[float, Floats]:
+def possible_changes(found: Rates, log_prior: float) -> Floats | None:
+    """Initial values (S, 2) for `weigh_change`; None where the rates of path lengths tell of no change by more than
+    its prior log odds `log_prior` ask for, which how large it may be only adds to."""
+    every, level = _agreed_by_two(found, np.zeros(3))
+    return _likeliest(every, level) if level.max() - level[0] + log_prior > 0.0 else None
+
+
+def weigh_change(
+    found: Rates, starts: Floats, calm: Floats, ways: list[Floats], log_prior: float
+) -> tuple[float, Floats]:  # fmt: skip
     """Posterior log odds that rates of path lengths change by a horizontal velocity or acceleration of one of the
-    covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,); `log_prior` are
-    the odds beforehand."""
-    starts, nothing = _starts(found, np.zeros(3)), np.zeros(3)
-    level = np.log(_likelihoods(found, starts, 0.0)[0]).sum(axis=1)
-    if level.max() - level[0] + log_prior <= 0.0:  # no prior makes a change likelier than that
-        return -np.inf, nothing[:2]
+    covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,), from initial
+    values `starts` (S, 2); `log_prior` are the odds beforehand."""
+    nothing = np.zeros(3)
     modes = [_find_modes(found, starts, nothing, spread) for spread in ways]
     best = max(modes, key=lambda each: each.evidence.max())
     at = int(np.argmax(best.evidence))
@@ -284,8 +134,7 @@ def weigh_climb(found: Rates, calm: float, log_prior: float) -> tuple[float, flo
     """Posterior log odds that rates of path lengths change by a vertical acceleration of the liveliest mode rather than
     of variance `calm`, and the likeliest one; `log_prior` are the odds beforehand."""
     up, nowhere = found.toward[:, 2], np.zeros((1, 2))
-    steep = np.abs(up) > STEEP
-    starts = np.append(0.0, found.rate[steep] / up[steep])[:, None]
+    starts = np.append(0.0, found.rate[up != 0.0] / up[up != 0.0])[:, None]
     level = np.log(_likelihoods(found, nowhere, starts)[0]).sum(axis=1)
     if level.max() - level[0] + log_prior <= 0.0:
         return -np.inf, 0.0
@@ -293,10 +142,6 @@ def weigh_climb(found: Rates, calm: float, log_prior: float) -> tuple[float, flo
     change, evidence = _find_climb(found, likeliest, CONSTANTS.liveliest**2)
     at, nothing = int(np.argmax(evidence)), _find_climb(found, starts[:1], calm)[1][0]
     return float(evidence[at] - nothing) + log_prior, float(change[at, 0])
-
-
-STEEP = 0.5
-"""Vertical part of a direction, times 2, from which on a rate of length proposes a climb."""
 
 
 def _find_climb(found: Rates, climb: Floats, variance: float) -> tuple[Floats, Floats]:
@@ -336,20 +181,39 @@ class _Modes(NamedTuple):
 
 
 def _starts(found: Rates, told: Floats) -> Floats:
-    """Initial horizontal velocities (S, 2) of the search for agreement: the told one, and those on which two tracks
-    agree."""
-    first, second = np.triu_indices(len(found.rate), 1)
-    pair = np.stack([found.toward[first], found.toward[second]], axis=1)
-    aim = np.stack([found.rate[first], found.rate[second]], axis=1) - pair[..., 2] * told[2]
-    det = pair[:, 0, 0] * pair[:, 1, 1] - pair[:, 0, 1] * pair[:, 1, 0]
+    """Initial horizontal velocities (S, 2) of the search for agreement: the told one, and the likeliest of those on
+    which two tracks agree."""
+    return _likeliest(*_agreed_by_two(found, told))
+
+
+def _agreed_by_two(found: Rates, told: Floats) -> tuple[Floats, Floats]:
+    """Horizontal velocities (S, 2), the told one and all those on which two tracks agree, and their log likelihoods
+    (S,)."""
+    first, second = _pairs(len(found.rate))
+    (along, across, _), aim = found.toward.T, found.rate - found.toward[:, 2] * told[2]
+    det = along[first] * across[second] - across[first] * along[second]
     fine = np.abs(det) > 0.5
-    x = (aim[:, 0] * pair[:, 1, 1] - aim[:, 1] * pair[:, 0, 1])[fine] / det[fine]
-    y = (aim[:, 1] * pair[:, 0, 0] - aim[:, 0] * pair[:, 1, 0])[fine] / det[fine]
-    every = np.stack([x, y], axis=1)[np.hypot(x, y) < 3.0 * CONSTANTS.walk]
-    level, cell = np.log(_likelihoods(found, every, told[2])[0]).sum(axis=1), np.round(every / NEAR) @ [1.0, 1e6]
-    order = np.argsort(-level, kind="stable")
+    first, second, det = first[fine], second[fine], det[fine]
+    x = (aim[first] * across[second] - aim[second] * across[first]) / det
+    y = (aim[second] * along[first] - aim[first] * along[second]) / det
+    slow = np.hypot(x, y) < 3.0 * CONSTANTS.walk
+    every = np.concatenate([told[None, :2], np.stack([x, y], axis=1)[slow]])
+    return every, np.log(_likelihoods(found, every, told[2])[0]).sum(axis=1)
+
+
+@lru_cache(maxsize=64)
+def _pairs(count: int) -> tuple[Integers, Integers]:
+    """All pairs (P,), (P,) among so many tracks that may agree."""
+    return np.triu_indices(count, 1)
+
+
+def _likeliest(velocity: Floats, level: Floats) -> Floats:
+    """The first of some horizontal velocities (S, 2), and the likeliest of the others, `MOST` of them, no two of which
+    are `NEAR`, by their log likelihoods (S,)."""
+    every, cell = velocity[1:], np.round(velocity[1:] / NEAR) @ [1.0, 1e6]
+    order = np.argsort(-level[1:], kind="stable")
     _, first = np.unique(cell[order], return_index=True)
-    return np.concatenate([told[None, :2], every[order[np.sort(first)[:MOST]]]])
+    return np.concatenate([velocity[:1], every[order[np.sort(first)[:MOST]]]])
 
 
 NEAR, MOST = 0.01, 8
@@ -365,17 +229,16 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
     variance = found.variance + found.blur**2 * np.vecdot(speed, speed)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
-    either_way = np.stack([variance, variance + found.turning**2])
+    either_way = variance + np.array([0.0, found.turning**2])[:, None, None]
     likely = 0.25 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
     close = found.mixed(likely.sum(axis=0))
-    kept = np.exp(-0.5 * found.whole**2 / found.variance) / np.sqrt(2.0 * np.pi * found.variance)
-    other = np.full((1, 1), 1.0 / (4.0 * CONSTANTS.walk))
+    other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
         wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed)[:, None] + climb**2)
         still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
-    return close + 0.5 / 4.0 * found.mixed(found.share * (kept + 3.0 * other)), likely, either_way
+    return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, either_way
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

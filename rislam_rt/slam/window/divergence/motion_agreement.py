@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.divergence import egomotion
+from rislam_rt.slam.window.divergence import egomotion, length_rates
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
@@ -67,59 +67,68 @@ def log_agreement(state: WindowState, after: Window) -> float:
     return other - one
 
 
-def weigh_manoeuvre(state: WindowState, steps: int, log_prior: Floats) -> tuple[float, Floats]:
+def latest_lengths(state: WindowState) -> length_rates.Lengths | None:
+    """Lengths of tracks and of explained paths over the last `PAST` cycles, before those of the last pose are measured;
+    None where they are too few."""
+    passed = state.window.step[:-1][-PAST:]
+    silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
+    if silent or len(passed) < length_rates.MEASURED - 1 or not is_checked(state):
+        return None
+    return _lengths(state, slice(-2 - len(passed), -1), float(passed.mean()))
+
+
+def weigh_manoeuvre(
+    state: WindowState, told: length_rates.Lengths, steps: int, log_prior: Floats
+) -> tuple[float, Floats]:  # fmt: skip
     """Posterior log odds of a manoeuvre that has lasted for `steps` until the last measurement, and its acceleration
-    (3,) [m/s^2], by the rates at which the lengths of tracks and of explained paths changed over the last `PAST`
-    cycles; `log_prior` (2,) are the odds beforehand, of a horizontal one and of a climb.
+    (3,) [m/s^2], by the rates at which the lengths that `told` change; `log_prior` (2,) are the odds beforehand, of a
+    horizontal one and of a climb.
 
     It is an acceleration of the liveliest mode, where the agent faces or in any direction, or upwards.
     """
-    window, none = state.window, np.zeros(3)
-    passed = window.step[:-1][-PAST:]  # the last pose is not measured yet
-    silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
-    if silent or len(passed) < egomotion.MEASURED - 1 or not is_checked(state):
-        return -np.inf, none
-    found = egomotion.accelerations(_heard(state, slice(-2 - len(passed), -1), float(passed.mean())), steps)
+    found, log_odds, change = length_rates.accelerations(told, steps), -np.inf, np.zeros(3)
     if found.number < egomotion.FEWEST:
-        return -np.inf, none
-    calm, facing = _acceleration_covariance(window, steps), rotation_z(state.heading[-1])[:2, 0]
-    ways = [calm[:2, :2] + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
-    log_odds, across = egomotion.weigh_change(found, calm[:2, :2], ways, log_prior[0])
+        return log_odds, change
+    calm, facing = _acceleration_covariance(state.window, steps), rotation_z(state.heading[-1])[:2, 0]
+    starts = egomotion.possible_changes(found, log_prior[0])
+    if starts is not None:
+        ways = [calm[:2, :2] + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
+        log_odds, change[:2] = egomotion.weigh_change(found, starts, calm[:2, :2], ways, log_prior[0])
     if state.scene.radio.array.pattern == "upper":  # else nobody knows what comes from above
         climbs, by = egomotion.weigh_climb(found, float(calm[2, 2]) + STILL**2, log_prior[1])
         if climbs > log_odds:
             return climbs, np.array([0.0, 0.0, by])
-    return log_odds, np.append(across, 0.0)
+    return log_odds, change
 
 
-def _latest_rates(state: WindowState) -> egomotion.Rates | None:
+def _latest_rates(state: WindowState) -> length_rates.Rates | None:
     """Rates of path lengths over the last `PAST` cycles, with which motion must agree; None where they are too few."""
     cycles, time = _latest(state.window)
-    if cycles < egomotion.MEASURED - 1:
+    if cycles < length_rates.MEASURED - 1:
         return None
     found = _rates(state, slice(-1 - cycles, None), time / cycles)
     return found if found.number >= egomotion.FEWEST else None
 
 
-def _rates(state: WindowState, rows: slice, step: float) -> egomotion.Rates:
+def _rates(state: WindowState, rows: slice, step: float) -> length_rates.Rates:
     """Rates of path lengths over the window's poses `rows`, `step` [s] apart, seen under the estimated headings.
 
     Where the heading is estimated, its deviation turns all directions: each rate by twice the way across.
     """
-    found, window = egomotion.rates(_heard(state, rows, step)), state.window
+    found, window = length_rates.rates(_lengths(state, rows, step)), state.window
     if not window.turns:
         return found
     heading_std = np.sqrt(np.diag(pose_covariance(window, TURN))[rows].max())
     return found._replace(blur=np.hypot(found.blur, 2.0 * heading_std))
 
 
-def _heard(state: WindowState, rows: slice, step: float) -> egomotion.Heard:
-    """What is heard at the window's poses `rows`, `step` [s] apart."""
+def _lengths(state: WindowState, rows: slice, step: float) -> length_rates.Lengths:
+    """Lengths that are heard at the window's poses `rows`, `step` [s] apart."""
     body, pose = state.scene.body, window_gaussian.poses(state.window)[rows]
-    return egomotion.Heard(
+    return length_rates.lengths(length_rates.Heard(
         state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step,
         float(np.linalg.norm(body.tx_offset - body.rx_offset)), state.scene.radio.array.spacing,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def _mean_velocity(window: Window) -> tuple[Floats, Floats]:

@@ -89,9 +89,15 @@ class Attitude(NamedTuple):
 
 def foreseen(before: Floats) -> Floats:
     """Level probabilities (C, L) of the attitude one cycle on, before it is heard."""
-    move = np.full((SWAYS, SWAYS), CONSTANTS.rare / (SWAYS - 1.0))
-    np.fill_diagonal(move, CONSTANTS.stay)
-    return np.asarray(before @ move)
+    return np.asarray(before @ _transition(CONSTANTS.stay, CONSTANTS.rare))
+
+
+@lru_cache(maxsize=4)
+def _transition(stay: float, rare: float) -> Floats:
+    """Transition probabilities (L, L) between the levels of attitude: `stay` in one, and `rare` to any other."""
+    move = np.full((SWAYS, SWAYS), rare / (SWAYS - 1.0))
+    np.fill_diagonal(move, stay)
+    return move
 
 
 def next_levels(before: Floats, told: Attitude) -> Floats:
@@ -104,7 +110,7 @@ def next_levels(before: Floats, told: Attitude) -> Floats:
     found = foreseen(before)
     every = _variances(found)
     slope, inner = told.slope[0], _precision(every, told)
-    gain = slope @ np.linalg.solve(inner, np.broadcast_to(slope[:, None], (*every.shape, 1)))[..., 0][..., None]
+    gain = slope @ np.linalg.solve(inner, slope[:, None])
     log_like = 0.5 * gain[..., 0] - 0.5 * np.linalg.slogdet(inner)[1] - 0.5 * np.log(every).sum(axis=-1)
     found = found * np.exp(log_like - log_like.max(axis=1, keepdims=True))
     return np.asarray(found / found.sum(axis=1, keepdims=True))

@@ -11,7 +11,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion
-from rislam_rt.slam.window.smoother.cholesky import form_and_log_det, inverse
+from rislam_rt.slam.window.smoother.cholesky import inverse, log_evidence
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import AGO
 
@@ -26,9 +26,9 @@ def manoeuvring_share(window: Window, calm: Floats, before: Floats, lively: floa
     """
     count = len(window.accel)
     segments = [slice(count - first, count - last) for last in AGO for first in AGO if last < first <= count]
-    share = float((before @ np.linalg.matrix_power(motion.transition(CONSTANTS.stay), count))[-1])
+    share = float((before @ motion.transition_over(CONSTANTS.stay, count))[-1])
     prior = np.full(len(segments), np.log(share / (1.0 - share)))
-    gain = np.array([_log_ratio(window, calm, each) + lively * (each.stop == count) for each in segments])
+    gain = np.array(_log_ratios(window, calm, segments)) + [lively * (each.stop == count) for each in segments]
     expected, found = (_covered(segments, odds, count) for odds in (prior, prior + gain))
     return np.maximum(found - expected, 0.0) / (1.0 - expected)
 
@@ -43,17 +43,20 @@ def _covered(segments: list[slice], log_odds: Floats, count: int) -> Floats:
     return np.minimum(share, 1.0)
 
 
-def _log_ratio(window: Window, calm: Floats, steps: slice) -> float:
-    """Log ratio of the window's marginal likelihoods with all horizontal accelerations of a segment's `steps` in the
+def _log_ratios(window: Window, calm: Floats, segments: list[slice]) -> list[float]:
+    """Log ratios of the window's marginal likelihoods with all horizontal accelerations of each segment in the
     liveliest motion mode, and with prior precisions `calm` (K - 1,)."""
-    free, count = window.accel.shape[1], steps.stop - steps.start
-    at = len(window.head) + free * np.arange(steps.start, steps.stop)[:, None] + np.arange(2)
-    inner = inverse(window.covariance[np.ix_(at.ravel(), at.ravel())])
-    pull = inner @ window.accel[steps, :2].ravel()
-    told = inner - np.diag(window.solved[steps, :2].ravel())
+    first = min((each.start for each in segments), default=0)
+    free = window.accel.shape[1]
+    at = (len(window.head) + free * np.arange(first, len(calm))[:, None] + np.arange(2)).ravel()
+    covariance, std = window.covariance[at[:, None], at], np.repeat(calm[first:] ** -0.5, 2)
+    lively = np.full(len(std), CONSTANTS.liveliest)
+    accel, solved = window.accel[first:, :2].ravel(), window.solved[first:, :2].ravel()
     found = []
-    for std in (np.full(count, CONSTANTS.liveliest), calm[steps] ** -0.5):
-        each = np.repeat(std, 2)
-        form, log_det = form_and_log_det(np.eye(2 * count) + each[:, None] * told * each, pull * each)
-        found.append(0.5 * (form - log_det))
-    return found[0] - found[1]
+    for segment in segments:
+        own = slice(2 * (segment.start - first), 2 * (segment.stop - first))
+        inner = inverse(covariance[own, own])
+        pull = inner @ accel[own]
+        inner.flat[:: len(inner) + 1] -= solved[own]
+        found.append(log_evidence(inner, pull, lively[own]) - log_evidence(inner, pull, std[own]))
+    return found

@@ -15,7 +15,8 @@ def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Float
     design = np.zeros((window.num_poses - first, POSE, len(window.covariance)))
     design[:, TURN, 6] = 1.0
     design[:, :free, :HEAD], design[:, :free, size:] = along[..., :HEAD], along[..., HEAD:]
-    wide, slot = design @ window.covariance, slot - first
+    wide = (design.reshape(-1, len(window.covariance)) @ window.covariance).reshape(design.shape)
+    slot = slot - first
     pose, cross, inner = (
         wide @ np.swapaxes(design, 1, 2),
         wide[:, :, HEAD:size],

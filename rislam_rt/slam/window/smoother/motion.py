@@ -57,6 +57,12 @@ def transition(stay: float) -> Floats:
     return stay * np.eye(count) + (1.0 - stay) * jump / jump.sum(axis=1, keepdims=True)
 
 
+@lru_cache(maxsize=4)
+def transition_over(stay: float, steps: int) -> Floats:
+    """Transition probabilities (L, L) between motion modes over so many steps."""
+    return np.asarray(np.linalg.matrix_power(transition(stay), steps))
+
+
 def log_likelihood(accel: Floats, spread: Floats, precision: Floats, shift: Floats | None = None) -> Floats:
     """Log likelihoods (..., K, L) of the motion modes in K steps, from posterior means (K, A) and covariances (K, A, A)
     of the accelerations and the prior precisions (K,) within these; or of accelerations that are larger than those by
@@ -101,9 +107,10 @@ def log_evidence(before: Floats, log_like: Floats, stay: float) -> Floats:
     set of probabilities (L,) before them."""
     top = log_like.max(axis=2)
     like, move = np.exp(log_like - top[:, :, None]).swapaxes(0, 1), transition(stay)
-    message, found = np.broadcast_to(before, log_like[:, 0].shape), top.sum(axis=1)
+    message, found, coming = np.tile(before, (len(top), 1)), top.sum(axis=1), np.empty(like[0].shape)
     for row, own in enumerate(like):
-        message = (message @ move) * own
+        np.dot(message, move, out=coming)
+        message = coming * own
         if row % 16 == 15 or row == len(like) - 1:  # nothing can vanish in fewer steps
             total = message.sum(axis=1)
             message, found = message / total[:, None], found + np.log(total)

@@ -177,14 +177,24 @@ def now_with_excess(window: Window) -> tuple[Floats, Floats, Floats]:
     of an estimator with a wrong model (Gelb 1974, chapter 7: suboptimal filter design and sensitivity analysis).
     """
     size, rows = len(window.head), _carried(window, window.covariance)
-    whole, late = rows[:6, :size], rows[:6, size:]
-    pushed = late * np.sqrt(_surplus(window.solved, window.variance)).ravel()
-    excess = whole @ window.noise @ whole.T
-    excess = 0.5 * (excess + excess.T) + pushed @ pushed.T
     covariance = window.covariance[:size, :size].copy()
     covariance[:HEAD, :HEAD], covariance[:HEAD, HEAD:] = _carried(window, rows.T), rows[:, HEAD:size]
     covariance[HEAD:, :HEAD] = rows[:, HEAD:size].T
-    return mean_now(window), covariance, excess
+    return mean_now(window), covariance, _excess(window, rows)
+
+
+def excess_now(window: Window) -> Floats:
+    """Excess covariance (6, 6) of the present's position and velocity (see `now_with_excess`)."""
+    return _excess(window, _carried(window, window.covariance))
+
+
+def _excess(window: Window, rows: Floats) -> Floats:
+    """Excess covariance (6, 6) of the present, from its covariance (7, D) with all of the window's unknowns."""
+    size = len(window.head)
+    whole, late = rows[:6, :size], rows[:6, size:]
+    pushed = late * np.sqrt(_surplus(window.solved, window.variance)).ravel()
+    excess = whole @ window.noise @ whole.T
+    return np.asarray(0.5 * (excess + excess.T) + pushed @ pushed.T)
 
 
 def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] | None = None) -> tuple[Floats, Floats]:
@@ -238,7 +248,7 @@ def extend(
         accel=np.concatenate([window.accel, np.zeros((1, free))]),
         precision=np.concatenate([window.precision, precision[None]]),
         solved=np.concatenate([window.solved, precision[None]]),
-        variance=np.concatenate([window.variance, np.broadcast_to(variance, (1, free))]),
+        variance=np.concatenate([window.variance, np.zeros((1, free)) + variance]),
         uneven=np.append(window.uneven, precision[2]),
         step=np.append(window.step, dt), velocity_turn=np.append(window.velocity_turn, velocity_turn), slots=slots,
         covariance=covariance, rates=None,
@@ -301,7 +311,7 @@ def solve(window: Window, *, spread: bool = True) -> Window:
     hessian, gradient = _normal(window)
     if spread:
         covariance, solved = inverse(hessian), window.precision
-        change = -covariance @ gradient
+        change = -(covariance @ gradient)
     else:
         covariance, solved, change = window.covariance, window.solved, -solution(hessian, gradient)
     return window._replace(

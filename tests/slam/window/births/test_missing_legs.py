@@ -46,7 +46,7 @@ def test_a_corner_has_the_single_returns_of_its_walls_beside_it(heard, expected)
     """All are as loud as mirrors."""
     rays = np.array([[0.96, 0.28], [-0.28, 0.96], np.array([[0.96, -0.28], [0.28, 0.96]]) @ CORNER / np.hypot(*CORNER)])
     context = _context(heard, rays, np.full((3, 2), 1e-3))
-    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0] == pytest.approx(expected)
+    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0, 1:] == pytest.approx([expected, expected])
 
 
 @pytest.mark.parametrize(("heard", "expected"), EVERY)
@@ -55,7 +55,7 @@ def test_walls_on_the_arrays_own_lines_are_heard_beside_their_corner(heard, expe
     no direction. So the corner's return was the first wall of a hall, one that slants."""
     rays = np.array([[1.0, 0.0], [0.0, 1.0], CORNER / np.hypot(*CORNER)])
     context = _context(heard, rays, [[1.0, 1e-3], [1e-3, 1.0], [1e-3, 1e-3]])
-    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0] == pytest.approx(expected)
+    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0, 1:] == pytest.approx([expected, expected])
 
 
 def test_what_is_heard_from_both_ends_has_two_bearings():
@@ -66,3 +66,27 @@ def test_what_is_heard_from_both_ends_has_two_bearings():
     np.testing.assert_allclose(found.length, LENGTH[[2, 1, 0, 1, 0]])
     ends = np.array([[0.6, 0.8], [0.1, 1.0], [1.0, 0.1], [0.1, -1.0], [-1.0, 0.1]])
     np.testing.assert_allclose(found.ray[:, :2], ends, atol=0.11)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "missing"),
+    [((3.0, 4.4), 0), ((3.0, 3.6), 1), ((3.0,), 1), ((), 2)],
+    ids=["both", "another", "one", "none"],
+)
+@pytest.mark.parametrize("turned", [0.0, 0.3], ids=["on the array's line", "aslant"])
+def test_opposite_walls_have_single_returns_that_make_up_the_return_over_both(lengths, missing, turned):
+    """Along one line, where nothing can block one of the three alone."""
+    length = np.array([*lengths, 7.4])
+    count, ray = len(length), np.array([np.cos(turned), np.sin(turned)])
+    state = np.column_stack([length, np.tile(ray, (count, 1)) * (-1.0) ** np.arange(count)[:, None]])
+    std = np.tile([1e-3, 1.0 if turned == 0.0 else 1e-3, 1e-3], (count, 1))
+    log = empty_log()._replace(cycle=np.zeros(count, dtype=int), seen=state, std=std, track=np.arange(count))
+    tracks = SimpleNamespace(
+        hits=np.full(count, 9), mean=np.stack([state, 0.0 * state], axis=-1), log_amplitude=-np.log(length),
+        ident=np.arange(count),
+    )  # fmt: skip
+    landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
+    scene = SimpleNamespace(radio=RadioConfig())
+    context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
+    found = missing_legs(context, np.array([count - 1]), np.zeros(HEAD))[0, 0]
+    assert found == pytest.approx(missing * np.log1p(-CONSTANTS.shown))

@@ -4,8 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from rislam_rt.model import RadioConfig
 from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.window.births.births import _log_same_direction
+from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED
 
@@ -24,9 +26,12 @@ def _odds(points=NOWHERE, rows=ALL, panel=-1):
     body = RAYS @ np.array([[cos, -sin], [sin, cos]])  # from the room's axes into the agent's
     state = np.concatenate([LENGTHS[:, None], body], axis=1)
     old = np.isin(np.arange(4), np.arange(4)[rows])  # of two cycles, the others are company to nobody
-    tracks = SimpleNamespace(hits=np.where(old, 9, 2), mean=np.stack([state, 0.0 * state], axis=-1), side=SIDES)
+    tracks = SimpleNamespace(
+        hits=np.where(old, 9, 2), mean=np.stack([state, 0.0 * state], axis=-1), side=SIDES, ident=np.arange(4)
+    )  # fmt: skip
     context = SimpleNamespace(
-        tracks=tracks, heading=np.array([HEADING]), log=SimpleNamespace(side=SIDES),
+        tracks=tracks, heading=np.array([HEADING]), log=empty_log()._replace(side=SIDES),
+        scene=SimpleNamespace(radio=RadioConfig()),
         landmarks=SimpleNamespace(points=np.arange(len(points)), panels=(panel,)),
     )  # fmt: skip
     histories = SimpleNamespace(weight=np.full((4, 2, 3), 100.0))

@@ -10,7 +10,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
 from rislam_rt.slam.window.divergence import divergence_monitor, egomotion, motion_agreement
-from rislam_rt.slam.window.divergence.egomotion import Heard, Rates
+from rislam_rt.slam.window.divergence.length_rates import Heard, Rates, accelerations, lengths, rates
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
@@ -29,6 +29,12 @@ def _rates(velocity, rng, *, tracks=12, apart=4, error=0.01):
     rate = toward @ velocity + error * rng.standard_normal(tracks)
     rate[:apart] = rng.uniform(-2.0, 2.0, apart)
     return Rates(toward, rate, np.full(tracks, error**2), np.zeros(tracks), rate)
+
+
+def _weigh_change(found, calm):
+    """Even odds beforehand of a change of unit variance, rather than of a variance `calm`."""
+    starts = egomotion.possible_changes(found, 0.0)
+    return egomotion.weigh_change(found, starts, calm * np.eye(2), [np.eye(2)], 0.0)
 
 
 def test_a_start_told_right_is_left_alone():
@@ -106,7 +112,7 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     step, count = 0.1, 8
     time = step * np.arange(count)[:, None]
     place = np.array([0.2, -0.1, 0.0]) * time + 0.5 * bend * np.array([0.3, 1.0, 0.0]) * time**2
-    found = egomotion.rates(Heard(_log(place, heading), np.full(count, heading), place, step, 0.0, 0.5))
+    found = rates(lengths(Heard(_log(place, heading), np.full(count, heading), place, step, 0.0, 0.5)))
     assert len(found.rate) == 3
     velocity = (place[-1] - place[0]) / (step * (count - 1))
     # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
@@ -128,13 +134,13 @@ def test_an_acceleration_that_the_positions_leave_out_is_told_by_all_lengths(ste
     time = step * np.maximum(np.arange(count) - (count - 1 - steps), 0.0)
     place = 0.5 * time[:, None] ** 2 * accel
     heard = Heard(_log(place, 0.2), np.full(count, 0.2), 0.0 * place, step, 0.0, 0.5)
-    found = egomotion.accelerations(heard, steps)
+    found = accelerations(lengths(heard), steps)
     np.testing.assert_allclose(found.rate, found.toward @ accel, atol=0.06)  # a point turns on the way
-    log_odds, told = egomotion.weigh_change(found, 1e-6 * np.eye(2), [np.eye(2)], 0.0)
+    log_odds, told = _weigh_change(found, 1e-6)
     assert log_odds > 0.0
     np.testing.assert_allclose(told, accel[:2], atol=0.06)
-    still = egomotion.accelerations(heard._replace(place=place), steps)
-    assert egomotion.weigh_change(still, 1e-6 * np.eye(2), [np.eye(2)], 0.0)[0] < 0.0
+    still = accelerations(lengths(heard._replace(place=place)), steps)
+    assert _weigh_change(still, 1e-6)[0] < 0.0
 
 
 def test_a_climb_is_told_by_the_rates_of_all_lengths():
@@ -167,7 +173,7 @@ def test_what_is_at_rest_changes_its_length_by_no_more_than_twice_the_agents_spe
     rate = np.array([-1.6, -0.96, 0.0])
     rest = Rates(toward, rate, np.full(3, 0.02**2), np.zeros(3), rate, believed=np.zeros(2))
     free = rest._replace(believed=None)
-    bounded, any_rate = (egomotion.weigh_change(each, 1e-4 * np.eye(2), [np.eye(2)], 0.0)[0] for each in (rest, free))
+    bounded, any_rate = (_weigh_change(each, 1e-4)[0] for each in (rest, free))
     assert bounded > any_rate + 3.0
 
 
@@ -274,7 +280,7 @@ def test_a_cycle_in_which_nothing_is_weighed_names_no_cause():
 def test_a_rate_whose_direction_is_not_told_counts_for_little():
     log = _log(0.1 * np.arange(8)[:, None] * np.array([0.2, -0.1, 0.0]), 0.0)
     vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.4))
-    found = [egomotion.rates(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0, 0.5)).blur for one in (log, vague)]
+    found = [rates(lengths(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0, 0.5))).blur for one in (log, vague)]
     np.testing.assert_allclose(found[1], 2.0 * 0.4 / np.sqrt(8.0))
     assert (found[0] < 0.1).all()
 

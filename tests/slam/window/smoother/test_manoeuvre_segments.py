@@ -6,7 +6,7 @@ from scipy.stats import multivariate_normal
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.manoeuvre_segments import _log_ratio, manoeuvring_share
+from rislam_rt.slam.window.smoother.manoeuvre_segments import _log_ratios, manoeuvring_share
 from rislam_rt.slam.window.smoother.window_gaussian import Quadratic
 
 DT, STEPS = 0.1, 24
@@ -48,7 +48,8 @@ def test_the_ratio_is_that_of_the_measurements_densities(steps):
             for axis, rows in enumerate(design.transpose(1, 0, 2)[:2])
         ))  # fmt: skip
     # the start is held to 1e-5 m, and infinitely well where the density takes it from the prior
-    assert _log_ratio(window_of(place, std), CALM, steps) == pytest.approx(found[0] - found[1], rel=1e-4, abs=1e-3)
+    (ratio,) = _log_ratios(window_of(place, std), CALM, [steps])
+    assert ratio == pytest.approx(found[0] - found[1], rel=1e-4, abs=1e-3)
 
 
 def test_steps_tell_together_what_none_tells_alone():

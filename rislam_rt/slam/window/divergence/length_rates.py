@@ -1,0 +1,217 @@
+"""Rates at which path lengths change, of tracks and of explained paths, by line fits to what the estimated positions
+leave of them: what `egomotion` asks for a motion that many agree on."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.measurement_log import Log, unique_forms
+
+MEASURED = 6
+"""Measurements of a track from which on it has a rate of length: as many as births ask for."""
+
+
+class _PlainRates(NamedTuple):
+    """Rates of the path lengths of T tracks or explained paths, E in all."""
+
+    toward: Floats
+    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
+    rate: Floats
+    """(E,) [m/s] rate at which the path length changes."""
+    variance: Floats
+    """(E,) [m^2/s^2] of the rate."""
+    blur: Floats
+    """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
+    whole: Floats
+    """(E,) rate of the measured length itself; `rate` may be that of what the positions leave of it."""
+    turning: float = 0.0
+    """[m/s] speed of Tx and Rx against each other, as the body turns."""
+    bend: Floats | None = None
+    """(E,) [m/s^2] at which the rates change."""
+    bend_variance: Floats | None = None
+    """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+    owner: Integers | None = None
+    """(E,) track or path of each direction; None where each has one."""
+    believed: Floats | None = None
+    """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
+    rest may have any rate."""
+
+
+class Rates(_PlainRates):
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
+    an array hears some alike from two."""
+
+    @cached_property
+    def number(self) -> int:
+        """Number T of the tracks and paths whose lengths have a rate."""
+        return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
+
+    def each(self, value: Floats) -> Floats:
+        """Values (..., E) by track or path: of those (..., T) given."""
+        return value if self.owner is None else value[..., self.owner]
+
+    def mixed(self, value: Floats) -> Floats:
+        """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
+        return value if self.owner is None else np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
+
+    @cached_property
+    def share(self) -> Floats:
+        """(E,) probability of each direction beforehand: a half where there are two."""
+        return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
+
+    @cached_property
+    def kept(self) -> Floats:
+        """(E,) densities of the rates were they of lengths that stay as they are."""
+        return np.exp(-0.5 * self.whole**2 / self.variance) / np.sqrt(2.0 * np.pi * self.variance)
+
+
+class Heard(NamedTuple):
+    """What rates of path lengths are fitted to: the log's components in the cycles of K poses."""
+
+    log: Log
+    """All components that were measured; the last cycle's are those of the last pose."""
+    heading: Floats
+    """(K,) [rad] the agent's headings."""
+    place: Floats
+    """(K, 3) [m] its estimated positions."""
+    step: float
+    """[s] from pose to pose."""
+    baseline: float
+    """[m] from Tx to Rx."""
+    spacing: float
+    """[wavelengths] of the antennas."""
+
+
+class Lengths(NamedTuple):
+    """Lengths of tracks and explained paths to which lines are fitted, E of them as in `Rates`, by N components."""
+
+    heard: Heard
+    """What they are taken from."""
+    which: Integers
+    """(N,) the direction of a track or path that each component is of."""
+    time: Floats
+    """(N,) [s] until the last pose, negative."""
+    weight: Floats
+    """(N,) [1/m^2] one over the variances of the lengths."""
+    length: Floats
+    """(N,) [m] measured..."""
+    left: Floats
+    """(N,) [m] ...and what the positions leave of it."""
+    toward: Floats
+    """(E, 3) direction of arrival in the room's axes, times -2."""
+    number: Integers
+    """(E,) number of components."""
+    blur: Floats
+    """(E,) as in `Rates`."""
+    owner: Integers | None
+    """(E,) track or path of each direction; None where each has one."""
+
+    def total(self, value: Floats) -> Floats:
+        """Sums (E,) over each history of lengths of values (N,)."""
+        return np.asarray(np.bincount(self.which, value, len(self.number)), dtype=np.float64)
+
+
+def lengths(heard: Heard) -> Lengths:
+    """Lengths of tracks and explained paths, with what the positions leave of them, so that a turn or an acceleration
+    bends none."""
+    log, heading, place, step, baseline, spacing = heard
+    last = int(log.cycle.max(initial=0))
+    first, known = last - len(heading) + 1, log.explained
+    rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
+    forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
+    every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
+    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
+    count = np.bincount(which)
+
+    def total(value: Floats) -> Floats:
+        return np.asarray(np.bincount(which, value), dtype=np.float64)
+
+    weight, length, since = 1.0 / log.std[rows, 0] ** 2, log.seen[rows, 0], log.cycle[rows] - first
+    angle = heading[since]
+    cos, sin = np.cos(angle), np.sin(angle)
+    toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
+    toward /= count[:, None]
+    up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
+    toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
+    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
+    blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
+    doubt = total((spread_of**2).mean(axis=1)) / count**2
+    return Lengths(
+        heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
+        length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
+        np.hypot(blur, 2.0 * np.sqrt(doubt)), owner if (np.diff(owner) < 1).any() else None,
+    )  # fmt: skip
+
+
+def rates(found: Lengths) -> Rates:
+    """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
+    positions leave of the lengths' change."""
+    place, time = found.heard.place, found.heard.step * max(len(found.heard.place) - 1, 1)
+    velocity = (place[-1] - place[0]) / time
+    (rate,), variance, fine = _slopes(found, found.time, found.left)
+    rate = rate + found.toward @ velocity
+    bends = _bends(found, float(velocity @ velocity))
+    return _rates(found, fine, (rate, variance, rate), time, np.zeros(2), bends)
+
+
+def accelerations(found: Lengths, steps: int) -> Rates:
+    """Rates [m/s^2] at which the lengths of tracks and explained paths change with the way of a constant acceleration
+    over the last `steps`, by weighted line fits to what the positions leave of the lengths' change: 0 for a path that
+    follows the positions as they are."""
+    place, step = found.heard.place, found.heard.step
+    by = 0.5 * np.maximum(found.time + steps * step, 0.0) ** 2
+    (rate, whole), variance, fine = _slopes(found, by, found.left, found.length)
+    way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
+    way -= way.mean()
+    believed = way @ place[:, :2] / (way @ way)
+    return _rates(found, fine, (rate, variance, whole), 0.5 * (steps * step) ** 2, believed)
+
+
+def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], Floats, Booleans]:
+    """Slopes (E,) of weighted line fits over `x` (N,) to each of some values (N,), their variance (E,), and whether
+    there are enough components (E,) for a fit."""
+    total, weighted = found.total, found.weight * x
+    s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
+    spread = s * sxx - sx**2
+    enough = (found.number >= MEASURED) & (spread > 1e-9 * s * s * found.heard.step**2)
+    spread = np.where(enough, spread, 1.0)
+    slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
+    return slopes, CONSTANTS.crowd * s / spread, enough
+
+
+def _rates(
+    found: Lengths, fine: Booleans, fits: tuple[Floats, Floats, Floats], unit: float, believed: Floats,
+    bends: tuple[Floats, Floats] | None = None,
+) -> Rates:  # fmt: skip
+    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates, the variances, and the rates of measured
+    lengths, over a `unit` [s or s^2]."""
+    toward, heard = found.toward, found.heard
+    fine = fine & (np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
+    rate, variance, whole = (each[fine] for each in fits)
+    bend, bend_variance = (each[fine] for each in bends) if bends else (None, None)
+    turning = heard.baseline * float(np.abs(np.diff(heard.heading)).sum()) / unit
+    owner = None if found.owner is None else np.unique(found.owner[fine], return_inverse=True)[1]
+    return Rates(
+        toward[fine], rate, variance, found.blur[fine], whole, turning, bend, bend_variance, owner, believed
+    )  # fmt: skip
+
+
+def _bends(found: Lengths, square_speed: float) -> tuple[Floats, Floats]:
+    """Quadratic parts (E,) [m/s^2] of lengths over time, beside their lines, and the variances of these, for an agent
+    of squared speed `square_speed` [m^2/s^2] which passes points."""
+    which, x = found.which, found.time
+
+    def total(value: Floats | float) -> Floats:
+        return found.total(found.weight * value)
+
+    s = total(1.0)
+    u = x - (total(x) / s)[which]
+    line = total(u**3) / np.maximum(total(u**2), 1e-300)
+    u2 = u**2 - (total(u**2) / s)[which] - line[which] * u
+    square = np.maximum(total(u2**2), 1e-300)
+    passing = square_speed * s / np.maximum(total(found.length), 1e-9)
+    return 2.0 * total(u2 * found.length) / square, 4.0 * CONSTANTS.crowd / square + (4.0 * passing) ** 2
