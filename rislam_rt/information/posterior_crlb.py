@@ -69,7 +69,7 @@ def posterior_bound(
 
 
 def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
-    """Square root (N, N + D) of the posterior covariance one time step on, from its root (N, N)."""
+    """Square root (N, N + D) of the posterior CRLB's covariance one time step on, from its root (N, N)."""
     axes = motion.axes
     moved = spread.copy()
     moved[:axes] += dt * spread[axes : 2 * axes]
@@ -79,7 +79,8 @@ def _advance(spread: Floats, dt: float, motion: MotionPrior) -> Floats:
 
 
 def _update(spread: Floats, slope: Floats) -> Floats:
-    """Square root (N, N) of the posterior covariance after measurements (M, N) of unit variance, from a root."""
+    """Square root (N, N) of the posterior CRLB's covariance after measurements (M, N) of unit variance, from its root
+    before."""
     count, size = slope.shape
     stacked = np.zeros((count + size, count + spread.shape[1]))
     stacked[:count, :count] = np.eye(count)

@@ -60,3 +60,8 @@ def safe_name(name: str) -> str:
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     plain = re.sub(r"[^A-Za-z0-9_]+", "_", plain).strip("_")
     return f"{plain or 'name'}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def mesh_file(name: str) -> str:
+    """Relative path in a scene folder of the PLY file of a reflector's or occluder's mesh."""
+    return f"meshes/{safe_name(name)}.ply"

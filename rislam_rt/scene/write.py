@@ -14,7 +14,7 @@ from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.scene_folder import safe_name
+from rislam_rt.scene.scene_folder import mesh_file
 from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.toml import toml_bytes
 
@@ -162,11 +162,6 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
     mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
     shade = scatterer.shade
     return np.array_equal(mesh.vertices, shade.vertices) and np.array_equal(mesh.faces, shade.faces)
-
-
-def mesh_file(name: str) -> str:
-    """Relative path in a scene folder of the PLY file to which a reflector's or occluder's mesh is written."""
-    return f"meshes/{safe_name(name)}.ply"
 
 
 def _material_table(material: Material) -> dict[str, Any]:

@@ -98,7 +98,7 @@ def _write_sweep(folder: Path, sweep: Sweep) -> None:
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:
-    """Write the result or failure of a cell to its file, and return its row of the table.
+    """Store the result or failure of a cell in its file, and return its row of the table.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def rows_by_point(rows: Sequence[Row]) -> list[list[Row]]:
 
 
 def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
-    """Append the time and machine of a cell to `timings.jsonl`, from which costs are estimated; errors are ignored."""
+    """Store the time and machine of a cell in `timings.jsonl`, from which costs are estimated; errors are ignored."""
     line = {
         "ident": cell.ident, "point": dict(cell.point), "repetition": cell.repetition,
         "seconds": round(outcome.seconds, 4), "cpu_seconds": round(outcome.cpu_seconds, 4), "host": outcome.host,
@@ -143,7 +143,7 @@ def append_timing(folder: Path, cell: Cell, outcome: CellOutcome) -> None:
 
 
 def read_timings(folder: Path) -> list[dict[str, Any]]:
-    """Read the times of all cells that ran, from the complete lines of `timings.jsonl`."""
+    """Read the stored times of all cells that ran, from the complete lines of `timings.jsonl`."""
     found = []
     with suppress(OSError):
         for line in (folder / "timings.jsonl").read_text(encoding="utf-8").splitlines():
@@ -172,11 +172,11 @@ def write_table(folder: Path, rows: Sequence[Row]) -> None:
 
 
 def csv_bytes(entries: Sequence[Mapping[str, Any]]) -> bytes:
-    """Encode the rows of a sweep's table as CSV with the columns of the first row; lists are joined by semicolons."""
+    """Encode rows as CSV, as a sweep's table is stored: the columns of the first row, lists joined by semicolons."""
     rows = ([";".join(map(str, v)) if isinstance(v, list) else v for v in entry.values()] for entry in entries)
     return files.csv_file(entries[0] if entries else (), rows)
 
 
 def _file(folder: Path, cell: Cell) -> Path:
-    """Path of a cell's file in a sweep folder."""
+    """Path of the file in a sweep folder that stores a cell."""
     return folder / "cells" / f"{cell.ident}.json"

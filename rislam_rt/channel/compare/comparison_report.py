@@ -88,22 +88,22 @@ class PathReport:
 
     @property
     def matched(self) -> int:
-        """Number of paths that both channels of a comparison have, counted per cycle."""
+        """Number of matched paths in a comparison's report: those that both channels have, counted per cycle."""
         return len(self.kind)
 
     @property
     def explained(self) -> dict[str, int]:
-        """Numbers of compared paths that one channel lacks for a reason that was found, by reason."""
+        """Numbers of paths in a comparison's report that one channel lacks for a reason that was found, by reason."""
         return dict(sorted(Counter(path.reason for path in self.one_sided if path.reason).items()))
 
     @property
     def unexplained(self) -> int:
-        """Number of compared paths that one channel lacks without a reason that was found."""
+        """Number of paths in a comparison's report that one channel lacks without a reason that was found."""
         return sum(not path.reason for path in self.one_sided)
 
     @property
     def judged(self) -> dict[str, tuple[Floats, Floats]]:
-        """Errors (M,) and limits (M,) of compared paths by quantity."""
+        """Errors (M,) and limits (M,) of the matched paths in a comparison's report, by quantity."""
         return {
             "length [m]": (self.length_error, self.limits.length),
             "gain [of the coherent scale]": (self.gain_error, self.limits.gain),
@@ -114,12 +114,12 @@ class PathReport:
 
     @property
     def num_breaches(self) -> int:
-        """Number of errors of matched paths beyond their limits, over all paths and quantities."""
+        """Number of errors beyond their limits in a comparison's report, over all matched paths and quantities."""
         return sum(int(np.sum(~(error <= limit))) for error, limit in self.judged.values())
 
     @property
     def breaches(self) -> list[LimitViolation]:
-        """Errors of matched paths beyond their limits, the worst first, at most `MOST_LISTED`."""
+        """Errors beyond their limits that a comparison's report lists, the worst first, at most `MOST_LISTED`."""
         found = []
         for quantity, (error, limit) in self.judged.items():
             for row in np.flatnonzero(~(error <= limit)):
@@ -131,7 +131,7 @@ class PathReport:
 
     @property
     def passed(self) -> bool:
-        """Whether every one-sided path is explained and every error of a matched one within its limit."""
+        """Whether a comparison's report has every one-sided path explained and every matched one within its limits."""
         return not self.unexplained and not self.num_breaches
 
     @property
@@ -168,7 +168,7 @@ class PathReport:
         }
 
     def _nearest(self, error: Floats, limit: Floats) -> dict[str, Any]:
-        """Range of a quantity's error limits, and the matched path whose error comes nearest to its own limit."""
+        """Range of a quantity's error limits, and the matched path nearest to its own, for the report."""
         if len(error) == 0:
             return {}
         share = error / limit
@@ -185,12 +185,12 @@ class PathReport:
 
 
 def _largest(errors: Floats) -> float:
-    """Largest of the errors (M,) of paths that two channels share, 0 of none."""
+    """Largest of the errors (M,) of matched paths, for the report; 0 of none."""
     return float(errors.max(initial=0.0))
 
 
 def _percentiles(errors: Floats) -> dict[str, float]:
-    """Median, 90th and 99th percentile and maximum of errors (M,) of paths that two channels share; empty of none."""
+    """Median, 90th and 99th percentile and maximum of errors (M,) of matched paths, for the report; empty of none."""
     if len(errors) == 0:
         return {}
     p50, p90, p99, top = np.percentile(errors, [50.0, 90.0, 99.0, 100.0])

@@ -47,7 +47,7 @@ class DiffuseSection(Section):
 
     @property
     def wanted(self) -> bool:
-        """Whether the pipeline file asks for diffuse or diffracted paths."""
+        """Whether the pipeline's specification asks for diffuse or diffracted paths."""
         return self.diffuse or self.diffraction
 
 
@@ -194,7 +194,7 @@ class PanelSection(Section):
 
     @property
     def tolerance(self) -> PanelTolerance:
-        """Hardware tolerances of the RIS panel by the pipeline file, phases in radians."""
+        """Hardware tolerances of the RIS panel by the pipeline's specification, phases in radians."""
         return PanelTolerance(self.amplitude_std, float(np.radians(self.phase_std_deg)), self.dead, self.stuck)
 
 
@@ -322,8 +322,8 @@ class Settings(NamedTuple):
 
 
 def build_receiver(section: ReceiverSection, panels: int = 1, **more: float) -> ReceiverConfig:
-    """Receiver configuration by a pipeline's table `[receiver]`, for a room with that number of RIS panels; `more` is
-    what the table does not hold.
+    """Receiver configuration from the table `[receiver]` of a pipeline's specification, for a room with that number of
+    RIS panels; `more` is what the table does not hold.
 
     Where there is no panel there is nothing to alternate: one capture a cycle, whatever the table says.
 
@@ -356,7 +356,8 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
 
 
 def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
-    """Impairments of the front end by a pipeline's table `[hardware]`; an error if the receiver simulates no signal."""
+    """Impairments of the front end from the table `[hardware]` of a pipeline's specification; an error if the receiver
+    simulates no signal."""
     hardware = HardwareConfig(**section.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
@@ -366,8 +367,8 @@ def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> Hardw
 
 
 def build_design(section: DesignerSection) -> DesignConfig:
-    """Configuration of the phase code designer by a pipeline's table `[design]`; without the certificate of optimality,
-    which takes longer than a cycle.
+    """Configuration of the phase code designer from the table `[design]` of a pipeline's specification; without the
+    certificate of optimality, which takes longer than a cycle.
 
     Raises
     ------

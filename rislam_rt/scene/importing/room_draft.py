@@ -15,7 +15,7 @@ from rislam_rt.scene.importing.free_space import FreeSpace, find_free
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.motion.suggested_motion import BASELINE
 from rislam_rt.scene.room_files import CYCLES, RoomFiles, panel, reflector
-from rislam_rt.scene.write import mesh_file
+from rislam_rt.scene.scene_folder import mesh_file
 
 FROM_EDGE = 0.1
 """Distance [m] of a proposed RIS panel's centre from the edges of its host: the panel measures 9 cm."""

@@ -5,7 +5,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from rislam_rt.model import Material, Scene
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.write import mesh_file, scene_files, write_files
+from rislam_rt.scene.scene_folder import mesh_file
+from rislam_rt.scene.write import scene_files, write_files
 from rislam_rt.scene.xml.materials import material_element, material_word
 
 XML_FILE = "scene.xml"

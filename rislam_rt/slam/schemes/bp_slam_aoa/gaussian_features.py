@@ -103,8 +103,8 @@ def carry(features: GaussianFeatures, step: Step, drift: float) -> GaussianFeatu
 
 
 def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floats:
-    """Returns (..., C, 5) of features' Gaussians: length [m], three direction cosines in the body frame, log amplitude
-    by law."""
+    """Returns (..., C, 5) that Gaussian features predict: length [m], three direction cosines in the body frame, log
+    amplitude by law."""
     tx, rx = agent + ends.tx, agent + ends.rx
     size = np.maximum(length_of(place), NEAREST)
     normal = place / size[..., None]
@@ -120,7 +120,7 @@ def returns_of(kind: Integers, place: Floats, agent: Floats, ends: Ends) -> Floa
 
 
 def predict_returns(features: GaussianFeatures, course: AgentTrajectory, ends: Ends, free: float) -> PredictedReturns:
-    """Predicted returns of all features' Gaussians from the mean position; `free` is the log amplitude of 1 m."""
+    """Returns that all Gaussian features predict from the mean position; `free` is the log amplitude of 1 m."""
     kind, mean, agent = features.kind, features.mean, course.mean[:3]
     spread = features.covariance + spread_over(features.slope, course)
     value, vector = np.linalg.eigh(spread)
@@ -141,10 +141,10 @@ def predict_returns(features: GaussianFeatures, course: AgentTrajectory, ends: E
 
 
 def through(rows: Floats, matrix: Floats) -> Floats:
-    """Products (C, 3, m) of features' rows (C, 3, n) and a matrix (n, m), as one product."""
+    """Products (C, 3, m) of Gaussian features' rows (C, 3, n) and a matrix (n, m), as one product."""
     return np.asarray((rows.reshape(3 * len(rows), len(matrix)) @ matrix).reshape(len(rows), 3, matrix.shape[1]))
 
 
 def spread_over(rows: Floats, course: AgentTrajectory) -> Floats:
-    """Covariances (C, 3, 3) of features' returns by the trajectory's covariance and derivatives (C, 3, n)."""
+    """Covariances (C, 3, 3) of Gaussian features or their returns by the trajectory's, from derivatives (C, 3, n)."""
     return through(rows, course.covariance) @ rows.swapaxes(1, 2)

@@ -130,7 +130,8 @@ def unit_of(mean: Floats, walk: Floats, usual: Floats) -> Floats:
 
 
 def lengths(kind: Integers, mean: Floats, walk: Floats, usual: Floats, moved: Floats, model: Bistatic) -> Floats:
-    """Ranges (..., C) [m] of features' Gaussians, the agent `moved` (..., C, 3) [m] from where its velocity was `walk`.
+    """Ranges (..., C) [m] of the Gaussians in features' Gaussian sums, the agent `moved` (..., C, 3) [m] from where its
+    velocity was `walk`.
 
     The law of cosines takes cosines beyond one without a bend, which a Gaussian has on its rim.
     """
@@ -148,7 +149,7 @@ def _leg(distance: Floats, unit: Floats, end: Floats) -> Floats:
 
 
 def predict_ranges(sums: Sums, course: AgentTrajectory, place: Floats, model: Bistatic) -> PredictedRanges:
-    """Predicted ranges of all features' Gaussians from the present position `place` (3,) [m], by differences."""
+    """Ranges that all features' Gaussian sums predict from the present position `place` (3,) [m], by differences."""
     owner, kind, mean = sums.owner, sums.kind, sums.mean
     spread = np.sum((sums.slope @ course.covariance) * sums.slope, axis=2)
     std = np.sqrt(np.maximum(np.einsum("cii->ci", sums.covariance) + spread, 1e-14))
@@ -210,12 +211,12 @@ def born(
 
 
 def join(one: Features, other: Features) -> Features:
-    """Two sets of features with their Gaussians, concatenated."""
+    """Two sets of features' Gaussian sums, concatenated."""
     return join_rows([one, other._replace(owner=other.owner + len(one.ident))])
 
 
 def prune(features: Features, least_existence: float, least_share: float, most: int) -> Features:
-    """Features without improbable ones, and without Gaussians of small share; every feature keeps its best."""
+    """Features' Gaussian sums without improbable features and Gaussians of small share; each feature keeps its best."""
     rank = np.argsort(np.argsort(-features.existence, kind="stable"), kind="stable")
     keep = (features.existence >= least_existence) & (rank < most)
     best = np.zeros(len(keep))
