@@ -1,4 +1,5 @@
-"""Manoeuvres that only tracks tell of: the agent sets off, stops or turns where the map measures nothing of it.
+"""Manoeuvres that no step tells of: the agent sets off, stops, turns or climbs where the map measures nothing of it,
+or what it measures passes for neighbours' pull.
 
 A track counts as following the agent by its agreement with the motion as believed. While that is wrong, those that tell
 of the right one do not count, and those that keep their length bear the wrong one out: who set off from rest was held
@@ -80,10 +81,10 @@ def _reweighed(state: WindowState, until: int, found: Predictions) -> WindowStat
 
 
 def with_climb(state: WindowState) -> WindowState:
-    """State that climbs or descends in its last steps, if that explains what is heard of walls better than a level
-    floor does, by more than it is rarer.
+    """State that climbs or descends in its last steps, if that explains what is heard of walls better than the height
+    as believed does, by more than it is rarer.
 
-    While the floor is held for level, what a climb does to the returns from above is held for neighbours' pull, whose
+    While a floor is held for level, what a climb does to the returns from above is held for neighbours' pull, whose
     variance would go on holding the height. So both are weighed: the climb with the scatter from before it began.
     """
     window, steps = state.window, int(LASTED[-1])
