@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from rislam_rt.input_messages import counted, did_you_mean, expected_input, nearest
 from rislam_rt.scene.findings import Fault, Faults, one_line
-from rislam_rt.shipped import shipped_rooms
+from rislam_rt.shipped import shipped_missing, shipped_rooms
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -331,7 +331,9 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     if not path.is_file():
         known = {*shipped_rooms(), *(one.name for one in path.parent.parent.glob("*"))} - {path.parent.name}
         hint = did_you_mean(nearest(path.parent.name, sorted(known)))
+        gone = shipped_missing("scenes")
         wanted = f"{hint} give a scene folder, its scene.toml, or the name of a built-in room".lstrip()
+        wanted = f"{wanted}; {gone}" if gone else wanted
         raise Fault("no such scene file", wanted)
     try:
         with path.open("rb") as file:
