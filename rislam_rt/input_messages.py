@@ -10,8 +10,9 @@ from typing import Any
 from rislam_rt.toml import toml_value
 
 UNITS = {
-    "_m_s2": "m/s^2", "_m_s": "m/s", "_bits_s": "bit/s", "_ns_s": "ns/s", "_s_m": "S/m", "_m2": "m^2", "_ghz": "GHz",
-    "_db": "dB", "_deg": "degrees", "_ns": "ns", "_s": "s", "_m": "m", "_j": "J", "_wavelengths": "wavelengths",
+    "_m_s2": "m/s^2", "_m_s": "m/s", "_deg_s": "degrees/s", "_bits_s": "bit/s", "_ns_s": "ns/s", "_s_m": "S/m",
+    "_m2": "m^2", "_ghz": "GHz", "_db": "dB", "_deg": "degrees", "_ns": "ns", "_s": "s", "_m": "m", "_j": "J",
+    "_wavelengths": "wavelengths",
 }  # fmt: skip
 """Units by the suffix of a name; the longest that fits. A name without one has its unit in its meaning."""
 

@@ -23,6 +23,16 @@ def shipped_rooms() -> dict[str, Path]:
     return {file.parent.name: file.parent for file in sorted((_ROOT / "scenes").glob("*/scene.toml"))}
 
 
+def shipped_missing(kind: str) -> str:
+    """What a message says where none of the shipped `pipelines` or `scenes` is there: where they were looked for, and
+    the mend; empty if there are any."""
+    if shipped_pipelines() if kind == "pipelines" else shipped_rooms():
+        return ""
+    inside, beside = _PACKAGE / "shipped" / kind, _PACKAGE.parent / kind
+    place = f"{inside} (of an installed package) and {beside} (of a checkout)"
+    return f"the {kind} that come with the package were not found in {place}: install it whole, or copy '{kind}' there"
+
+
 def find_pipeline(name: str | Path) -> Path:
     """Path of a pipeline file from a path or a name: the file if there is one, else the pipeline of that name that
     comes with the package."""

@@ -112,6 +112,32 @@ def test_a_name_with_a_slip_is_mended() -> None:
         load_spec(find_pipeline("trace_then_slm"))
 
 
+def test_a_package_folder_alone_says_where_it_looked(tmp_path: Path) -> None:
+    """Copied without the folders beside it, and put on the module path; a room of one's own is beside it."""
+    shutil.copytree(ROOT / "rislam_rt", tmp_path / "rislam_rt", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "scenes" / "empty_box", tmp_path / "mine")
+
+    def said(*words: str, code: int = 2) -> list[str]:
+        done = subprocess.run(
+            [sys.executable, "-m", "rislam_rt", *words], cwd=tmp_path, check=False, capture_output=True, text=True,
+            timeout=120, env={**os.environ, "PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"},
+        )  # fmt: skip
+        assert done.returncode == code
+        return " ".join(done.stderr.split()).removeprefix("error: ").split(" error: ")
+
+    def looked(kind: str) -> str:
+        inside, beside = tmp_path / "rislam_rt" / "shipped" / kind, tmp_path / kind
+        return f"not found in {inside} (of an installed package) and {beside} (of a checkout): install it whole, or"
+
+    (line,) = said("check", "mine")
+    assert line.startswith("trace_then_slam: no such pipeline file; the pipelines that come with the package were not")
+    assert looked("pipelines") in line
+    (line,) = said("new", "other")
+    assert line.startswith("template: 'paper_room' received; the scenes that come with the package were not found")
+    for kind, line in zip(("pipelines", "scenes"), said("pipelines", code=3), strict=True):
+        assert looked(kind) in line
+
+
 def test_the_wheel_carries_them(tmp_path: Path) -> None:
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True, timeout=120)

@@ -16,8 +16,12 @@ def command(json: JsonFile = None) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from rislam_rt.shipped import first_sentence, shipped_pipelines, shipped_rooms
+    from rislam_rt.errors import SetupError
+    from rislam_rt.shipped import first_sentence, shipped_missing, shipped_pipelines, shipped_rooms
 
+    gone = [line for line in map(shipped_missing, ("pipelines", "scenes")) if line]
+    if gone:
+        raise SetupError(*gone)
     pipelines = {name: first_sentence(file) for name, file in shipped_pipelines().items()}
     rooms = shipped_rooms()
     table = Table("pipeline", "what it does")

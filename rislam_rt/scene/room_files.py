@@ -32,11 +32,17 @@ def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, An
 
 
 def panel(
-    center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6
+    center: list[float],
+    normal: list[float],
+    up: list[float],
+    host: str = "ceiling",
+    size: int = 6,
+    element: str = "tang",
 ) -> dict[str, Any]:
-    """Table of a new room's scene file for a RIS panel like the paper's, anywhere."""
+    """Table of a new room's scene file for a RIS panel like the paper's, anywhere; its elements, too, are the paper's
+    (`tang`) or reflect as a perfect plate does (`energy`)."""
     lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [0.015, 0.015]}
-    return lie | {"levels": 4, "element": "tang", "host": host}
+    return lie | {"levels": 4, "element": element, "host": host}
 
 
 def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:

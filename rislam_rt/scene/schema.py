@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from rislam_rt.input_messages import did_you_mean, expected_input, nearest
+from rislam_rt.input_messages import counted, did_you_mean, expected_input, nearest
 from rislam_rt.scene.findings import Fault, Faults, one_line
-from rislam_rt.shipped import shipped_rooms
+from rislam_rt.shipped import shipped_missing, shipped_rooms
 from rislam_rt.toml import parse_toml
 
 MAX_SCENE_BYTES = 4_000_000
@@ -183,7 +183,16 @@ class AgentSection(SceneSection):
     random_walk: WalkSection | None = None
     speed_m_s: Length | None = None
     acceleration_m_s2: Length = 0.5
-    """Acceleration at the corners of waypoints or a random walk: their arcs have the radius speed squared over this."""
+    """Acceleration at the corners of waypoints or a random walk: their arcs have the radius speed squared over this;
+    and from rest to the speed and back, where there is a halt or `from_rest`."""
+    halt_s: list[Annotated[float, Field(ge=0.0, le=1e5, allow_inf_nan=False)]] | None = None
+    """Halts [s] at the waypoints, one for each, 0 for none."""
+    from_rest: bool | None = None
+    """Whether waypoints begin and end at rest; as long as `halt_s` is given without it."""
+    heading_deg: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] | None = None
+    """Heading [deg] all along the waypoints; that of the way without it."""
+    turn_deg_s: Annotated[float, Field(gt=0.0, le=1e5, allow_inf_nan=False)] | None = None
+    """Rate [deg/s] of turns on the spot at halts; without it they take the whole halt."""
     cycles: Count | None = None
     cycle_s: Length | None = None
     tx_offset_m: Vector | None = None
@@ -202,10 +211,26 @@ class AgentSection(SceneSection):
             raise ValueError("the first waypoint is the start; leave 'start' out")
         if self.speed_m_s is not None and given[0] not in ("waypoints", "random_walk"):
             raise ValueError(f"'speed_m_s' means nothing with '{given[0]}'; leave it out")
+        self._check_stops(given[0])
         unknown = set(self.columns or ()) - {"time", "x", "y", "z", "heading", "qx", "qy", "qz", "qw"}
         if unknown:
             raise ValueError(f"columns: '{min(unknown)[:20]}' is none of time, x, y, z, heading, qx, qy, qz, qw")
         return self
+
+    def _check_stops(self, motion: str) -> None:
+        """Check the agent's keys of halts and headings against its motion and each other."""
+        keys = [
+            name for name in ("halt_s", "from_rest", "heading_deg", "turn_deg_s") if getattr(self, name) is not None
+        ]
+        if keys and self.waypoints is None:
+            raise ValueError(f"'{keys[0]}' means nothing with '{motion}'; leave it out, or give 'waypoints' instead")
+        if self.halt_s is not None and len(self.halt_s) != len(self.waypoints or ()):
+            what = f"'halt_s' has {counted(len(self.halt_s), 'number')} for {len(self.waypoints or ())} waypoints"
+            raise ValueError(f"{what}; give one for each, 0 where it does not halt")
+        if self.turn_deg_s is not None and self.heading_deg is not None:
+            raise ValueError("'turn_deg_s' means nothing with the fixed 'heading_deg'; leave one of the two out")
+        if self.turn_deg_s is not None and not any((self.halt_s or [])[1:-1]):
+            raise ValueError("'turn_deg_s' means nothing without a halt between the ends; give one in 'halt_s'")
 
 
 MOTIONS = {
@@ -306,7 +331,9 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     if not path.is_file():
         known = {*shipped_rooms(), *(one.name for one in path.parent.parent.glob("*"))} - {path.parent.name}
         hint = did_you_mean(nearest(path.parent.name, sorted(known)))
+        gone = shipped_missing("scenes")
         wanted = f"{hint} give a scene folder, its scene.toml, or the name of a built-in room".lstrip()
+        wanted = f"{wanted}; {gone}" if gone else wanted
         raise Fault("no such scene file", wanted)
     try:
         with path.open("rb") as file:

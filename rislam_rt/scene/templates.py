@@ -7,7 +7,7 @@ from pathlib import Path
 from rislam_rt.errors import SceneError
 from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.write import write_files
-from rislam_rt.shipped import shipped_rooms
+from rislam_rt.shipped import shipped_missing, shipped_rooms
 from rislam_rt.toml import parse_toml, toml_bytes
 
 
@@ -22,6 +22,8 @@ def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> 
         The disk refused.
     """
     rooms = shipped_rooms()
+    if not rooms:
+        raise SceneError(f"template: '{template}' received; {shipped_missing('scenes')}")
     if template not in rooms:
         raise SceneError(f"template: '{template}' received; give one of {', '.join(rooms)}")
     room = rooms[template]

@@ -144,7 +144,11 @@ CASES: dict[str, tuple[Change, str, str]] = {
         "warning scatterer[0].position (sphere)",
         "inside 'table'",
     ),
-    "scatterer below": (lambda s: scatterer(s, [2, 1, 0.4]), "warning scatterer[0].position (sphere)", "below"),
+    "scatterer below": (
+        lambda s: scatterer(s, [2, 1, 0.4]),
+        "warning scatterer[0].position (sphere)",
+        "below the array, which hears from above only",
+    ),
     "panel outside": (lambda s: panel(s, center=[3, 3, 3.1]), "error ris.center", "lies outside"),
     "panel off its host": (lambda s: panel(s, center=[3, 3, 2.98]), "error ris.center", "20 mm off 'ceiling'"),
     "panel beside its host": (

@@ -154,6 +154,9 @@ def test_cylinders_are_for_the_far_field() -> None:
         lines = [f.line for f in found if f.field == "scatterer[0].height_m (post)"]
         assert bool(lines) == near
         assert all("begins at 2 h^2 / lambda = 1.5 m" in line for line in lines)
+        ends = np.stack([scene.agent.tx, scene.agent.rx])
+        sigma = np.pi * 0.02 * np.linalg.norm(ends - CENTER, axis=-1).min()
+        assert all(f"give 'rcs_m2': pi r times the distance, {sigma:.2g} m^2 there" in line for line in lines)
 
 
 @pytest.mark.parametrize(

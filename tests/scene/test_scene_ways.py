@@ -11,7 +11,8 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.agent_motion import along_heading, at_cycles
+from rislam_rt.scene.motion.agent_motion import at_cycles
+from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
 from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv
 from rislam_rt.scene.motion.waypoints import round_corners

@@ -12,6 +12,9 @@ from rislam_rt.slam.model_constants import CONSTANTS
 GRAVITY = 9.81
 """Acceleration [m/s^2] that nothing which rolls or walks on a floor exceeds: friction carries about its weight."""
 
+FEWEST_DIGITS, MOST_DIGITS = 3, 17
+"""Significant digits of a speed in a message, and how many tell any two numbers of float64 apart."""
+
 
 def motion_warnings(scene: Scene, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
     """Warnings of an agent that is faster than its receiver assumes, but for rounding, or that speeds up as nothing on
@@ -26,12 +29,19 @@ def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:
     speed = np.linalg.norm(scene.agent.velocity, axis=1)
     cycle = int(np.argmax(speed))
     if speed[cycle] > (1.0 + 1e-6) * top_speed:
+        limit, fastest = _unequal(top_speed, float(speed[cycle]))
         message = (
-            f"{top_speed:g} m/s, and the agent moves at up to {speed[cycle]:.3g} m/s (cycle {cycle}): paths over walls "
+            f"{limit} m/s, and the agent moves at up to {fastest} m/s (cycle {cycle}): paths over walls "
             "and scatterers may pass for the panel's"
         )
         mend = f"give receiver.top_speed = {np.ceil(10.0 * speed[cycle]) / 10.0:g}"
         yield Finding("warning", file, "receiver.top_speed", message, mend)
+
+
+def _unequal(limit: float, value: float) -> tuple[str, str]:
+    """Spelling of a limit and of a value beyond it in a motion warning, with as many digits as tell them apart."""
+    digits = range(FEWEST_DIGITS, MOST_DIGITS)
+    return f"{limit:g}", next((text for n in digits if (text := f"{value:.{n}g}") != f"{limit:.{n}g}"), repr(value))
 
 
 def _manoeuvring_agent(scene: Scene, file: str) -> Iterator[Finding]:

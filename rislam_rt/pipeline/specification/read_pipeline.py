@@ -13,7 +13,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.section import Section
-from rislam_rt.shipped import beside_of, shipped_pipelines
+from rislam_rt.shipped import beside_of, shipped_missing, shipped_pipelines
 from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
 
 MAX_BYTES = 1_000_000
@@ -165,8 +165,10 @@ def _instead_of_folder(path: Path) -> str:
 
 
 def _near_pipeline(path: Path) -> str:
-    """Hint at built-in pipelines with a name like that of a missing file."""
+    """Hint at built-in pipelines with a name like that of a missing file, or that there are none."""
     known = shipped_pipelines()
+    if not known:
+        return shipped_missing("pipelines")
     return did_you_mean(nearest(path.stem, known)) or f"give one, or a built-in one: {', '.join(known)}"
 
 

@@ -54,7 +54,7 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
             yield room.warning(field, message, "lead the agent around it")
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
             message = "it lies below the array, which hears from above only"
-            yield room.warning(field, message, "raise it above the agent")
+            yield room.warning(field, message, "it will not be heard: fine if that is meant, else raise it")
         name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
             yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")

@@ -49,7 +49,9 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
         if nearest < limit:
             message = f"the agent comes within {nearest:.3g} m, its far field begins at 2 h^2 / lambda = {limit:.3g} m"
             field = f"scatterer[{number}].height_m ({scatterer.name})"
-            yield room.warning(field, message, "take a shorter one, or give 'rcs_m2'")
+            near_field = np.pi * (scatterer.radius or 0.0) * nearest  # a long one's, by geometrical optics
+            mend = f"take a shorter one, or give 'rcs_m2': pi r times the distance, {near_field:.2g} m^2 there"
+            yield room.warning(field, message, mend)
 
 
 def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:

@@ -69,7 +69,8 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
 
 
 def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
-    """Propose a RIS panel like the paper's above or beside the agent's line: its table or None, and a remark."""
+    """Propose a RIS panel of the paper's size above or beside the agent's line, with `energy` elements, which the check
+    has nothing against: its table or None, and a remark."""
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.triangles for mesh, _ in draft.reflectors.values()])
     middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])
@@ -84,7 +85,7 @@ def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | N
         normal = normal * (1.0 if (middle - center) @ normal > 0.0 else -1.0) + 0.0
         right, _ = plane_tangents(normal)
         if _fits(center, normal, right, names[hit], draft, free):
-            table = panel(center.round(9).tolist(), normal.tolist(), right.tolist(), names[hit])
+            table = panel(center.round(9).tolist(), normal.tolist(), right.tolist(), names[hit], element="energy")
             return table, f"a panel of 6 x 6 elements on '{names[hit]}'"
     return None, "no panel: nothing flat is free above or beside the way"
 

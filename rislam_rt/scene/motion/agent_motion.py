@@ -1,5 +1,6 @@
 """The agent's true motion: a straight line, a recording (TUM or CSV), a path along waypoints, or a random walk."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import GeometryError
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
 from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv, parse_tum
+from rislam_rt.scene.motion.stop_and_go import StopAndGo, plan_stops
 from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
 from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.schema import AgentSection
@@ -48,19 +51,7 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
         except Fault as fault:
             fault.key = "trajectory"
             raise
-    assert agent.speed_m_s is not None
-    assert agent.cycle_s is not None
-    radius = agent.speed_m_s**2 / agent.acceleration_m_s2
-    if agent.waypoints is not None:
-        way = round_corners(np.array(agent.waypoints, dtype=np.float64), radius)
-    else:
-        assert agent.random_walk is not None
-        assert agent.cycles is not None
-        length = agent.speed_m_s * agent.cycle_s * (agent.cycles - 1)
-        rng = np.random.default_rng(agent.random_walk.seed)
-        start = np.array(agent.start, dtype=np.float64)
-        way = draw_walk(start, length, radius, agent.random_walk.clearance_m, triangles, rng=rng)
-    return travel(way, agent.speed_m_s, agent.cycle_s, agent.cycles, body), b""
+    return (_waypoint_motion(agent, body) if agent.waypoints is not None else _walk(agent, triangles, body)), b""
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
@@ -81,30 +72,21 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
     Fault
         The way is too short for the cycles, or too long.
     """
-    most = int(way.total / (speed * cycle_s) + 1e-9) + 1
-    if cycles is not None and cycles > most:
-        what = f"{cycles} cycles wanted, the way of {way.total:.3g} m ends after {most}"
-        raise Fault(what, "lower agent.cycles, or lead the way on")
-    if (cycles or most) > MAX_CYCLES:
-        raise Fault(f"the way of {way.total:.3g} m takes {most} cycles", f"give at most {MAX_CYCLES}: agent.cycles")
-    time = np.arange(cycles or most, dtype=np.float64) * cycle_s
+    time = _cycle_times(way.total / (speed * cycle_s), way.total, cycle_s, cycles)
     position, along = way.at(speed * time)
     return Trajectory(time, position, speed * along, along_heading(along), body)
 
 
-def along_heading(course: Floats) -> Floats:
-    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one or a standstill, its
-    neighbour's."""
-    length = np.linalg.norm(course, axis=1)
-    # beside a millionth of the highest speed there is only rounding, which points anywhere
-    level = np.hypot(course[:, 0], course[:, 1]) > np.maximum(
-        1e-9 * length, max(1e-6 * length.max(initial=0.0), 1e-300)
-    )
-    if not level.any():
-        return np.zeros(len(course))
-    last = np.maximum.accumulate(np.where(level, np.arange(len(course)), -1))
-    row = np.where(last >= 0, last, int(np.argmax(level)))
-    return np.asarray(np.arctan2(course[row, 1], course[row, 0]))
+def stop_and_go(plan: StopAndGo, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
+    """Motion along waypoints with halts, heading along it and turning on the spot; to its end, or for so many cycles.
+
+    Raises
+    ------
+    Fault
+        The way is too short for the cycles, or takes too long.
+    """
+    time = _cycle_times(plan.duration / cycle_s, plan.total, cycle_s, cycles)
+    return Trajectory(time, *plan.at(time), body)
 
 
 def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
@@ -131,6 +113,51 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
     position = PchipInterpolator(time, recording.position, axis=0)(even) if len(time) > 1 else recording.position
     heading = None if recording.heading is None else np.interp(even, time, np.unwrap(recording.heading))
     return RecordedPoses(recording.time[0] + np.arange(count) * cycle_s, position, heading)
+
+
+def _waypoint_motion(agent: AgentSection, body: Body) -> Trajectory:
+    """Motion of the agent along the waypoints of its section: at constant speed, unless halts or rest are asked for."""
+    assert agent.speed_m_s is not None
+    assert agent.cycle_s is not None
+    points = np.array(agent.waypoints, dtype=np.float64)
+    from_rest = agent.halt_s is not None if agent.from_rest is None else agent.from_rest
+    if agent.halt_s is None and not from_rest:
+        way = round_corners(points, agent.speed_m_s**2 / agent.acceleration_m_s2)
+        motion = travel(way, agent.speed_m_s, agent.cycle_s, agent.cycles, body)
+    else:
+        halts = np.zeros(len(points)) if agent.halt_s is None else np.array(agent.halt_s, dtype=np.float64)
+        rate = None if agent.turn_deg_s is None else float(np.radians(agent.turn_deg_s))
+        plan = plan_stops(points, halts, agent.speed_m_s, agent.acceleration_m_s2, from_rest, rate)
+        motion = stop_and_go(plan, agent.cycle_s, agent.cycles, body)
+    if agent.heading_deg is None:
+        return motion
+    return replace(motion, heading=np.full(len(motion), np.radians(agent.heading_deg)))
+
+
+def _walk(agent: AgentSection, triangles: Floats, body: Body) -> Trajectory:
+    """Motion of the agent on a random walk that keeps away from triangles (T, 3, 3) [m]."""
+    assert agent.random_walk is not None
+    assert agent.cycles is not None
+    assert agent.speed_m_s is not None
+    assert agent.cycle_s is not None
+    length = agent.speed_m_s * agent.cycle_s * (agent.cycles - 1)
+    radius = agent.speed_m_s**2 / agent.acceleration_m_s2
+    rng = np.random.default_rng(agent.random_walk.seed)
+    start = np.array(agent.start, dtype=np.float64)
+    way = draw_walk(start, length, radius, agent.random_walk.clearance_m, triangles, rng=rng)
+    return travel(way, agent.speed_m_s, agent.cycle_s, agent.cycles, body)
+
+
+def _cycle_times(steps: float, length: float, cycle_s: float, cycles: int | None) -> Floats:
+    """Times (K,) [s] of the cycles of the agent's motion along a way of that length [m], which takes so many steps of a
+    cycle."""
+    most = int(steps + 1e-9) + 1
+    if cycles is not None and cycles > most:
+        what = f"{cycles} cycles wanted, the way of {length:.3g} m ends after {most}"
+        raise Fault(what, "lower agent.cycles, or lead the way on")
+    if (cycles or most) > MAX_CYCLES:
+        raise Fault(f"the way of {length:.3g} m takes {most} cycles", f"give at most {MAX_CYCLES}: agent.cycles")
+    return np.arange(cycles or most, dtype=np.float64) * cycle_s
 
 
 def _recorded_motion(agent: AgentSection, content: bytes, body: Body) -> Trajectory:

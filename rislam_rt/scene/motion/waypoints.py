@@ -45,9 +45,9 @@ class RoundedPath(NamedTuple):
         return self.start[piece] + straight + arc, np.cos(angle) * along + np.sin(angle) * inward
 
 
-def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
+def round_corners(waypoints: Floats, radius: float, first: int = 0) -> RoundedPath:
     """Path along waypoints (W, 3) [m], the corner at each but the first and the last rounded by an arc of that radius
-    [m].
+    [m]; `first` is the number of the first one in messages.
 
     Raises
     ------
@@ -57,23 +57,24 @@ def round_corners(waypoints: Floats, radius: float) -> RoundedPath:
     legs = np.diff(waypoints, axis=0)
     length = np.linalg.norm(legs, axis=1)
     if (length < 1e-6).any():
-        pair = int(np.argmax(length < 1e-6))
+        pair = first + int(np.argmax(length < 1e-6))
         raise Fault(f"waypoints {pair} and {pair + 1} are the same point", "leave one out")
     along = legs / length[:, None]
     before, after = along[:-1], along[1:]
     turn = np.arctan2(np.linalg.norm(cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
     if (turn > SHARPEST).any():
+        corner = first + int(np.argmax(turn)) + 1
         raise Fault(
-            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {int(np.argmax(turn)) + 1}",
-            f"give a way round: at most {np.degrees(SHARPEST):.0f} degrees at a waypoint",
+            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner}",
+            f"give a way round (up to {np.degrees(SHARPEST):.0f} degrees at a waypoint), or a halt there: agent.halt_s",
         )
     cut = np.concatenate([[0.0], np.where(turn > STRAIGHT, radius * np.tan(turn / 2.0), 0.0), [0.0]])
     left = length - cut[:-1] - cut[1:]
     if (left < 0.0).any():
         leg = int(np.argmin(left))
         raise Fault(
-            f"{length[leg]:.3g} m from waypoint {leg} to {leg + 1}, of which the corners' arcs (radius {radius:.3g} m, "
-            f"speed squared over acceleration) take {cut[leg] + cut[leg + 1]:.3g} m",
+            f"{length[leg]:.3g} m from waypoint {first + leg} to {first + leg + 1}, of which the corners' arcs (radius "
+            f"{radius:.3g} m, speed squared over acceleration) take {cut[leg] + cut[leg + 1]:.3g} m",
             "lower agent.speed_m_s, raise agent.acceleration_m_s2, or part the waypoints",
         )
     return _pieces(waypoints, along, turn, cut, left, radius)

@@ -26,6 +26,10 @@ def test_a_speed_above_the_receivers_is_said_with_its_cycle(room):
     assert line.startswith("scene.toml: receiver.top_speed: 0.5 m/s, and the agent moves at up to 0.6 m/s (cycle 7)")
     assert line.endswith("give receiver.top_speed = 0.6")
     assert not said(faster(room, 7, [0.6, 0.0, 0.0]), top_speed=0.6)
+    for speed, figure in ((0.5001, "0.5001"), (0.500004, "0.500004"), (0.50049, "0.5005")):
+        (line,) = said(faster(room, 7, [speed, 0.0, 0.0]))
+        assert f"0.5 m/s, and the agent moves at up to {figure} m/s" in line
+        assert line.endswith("give receiver.top_speed = 0.6")
     assert not said(faster(room, 7, [0.6, 0.0, 0.0]), alternation=False)
     assert not said(replace(faster(room, 7, [0.6, 0.0, 0.0]), ris=None))
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rislam_rt.errors import SceneError
-from rislam_rt.model import Scene
-from rislam_rt.scene import load_scene
+from rislam_rt.model import RadioConfig, Scene
+from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
 
@@ -35,6 +35,15 @@ def test_one_room_from_its_corners(tmp_path: Path, corners: str) -> None:
     assert area(surface(scene)) == pytest.approx(2 * (12.0 + 2.5 * 7.0))
     assert np.ptp(surface(scene, "wall_north")[..., 1]) == 0.0
     assert surface(scene, "wall_north")[0, 0, 1] == 3.0
+
+
+@pytest.mark.parametrize("ghz", [2.4, 5.0, 10.0, 28.0])
+def test_the_proposed_panel_reflects_no_more_than_a_plate(tmp_path: Path, ghz: float) -> None:
+    import_corners("0,0 4,0 4,3 0,3", tmp_path / "room", ImportOptions(carrier_ghz=ghz))
+    (panel,) = load_scene(tmp_path / "room").panels
+    assert panel.spec.element == "energy"
+    radio = RadioConfig(carrier=1e9 * ghz, bandwidth=min(1e9, 1e9 * ghz))
+    assert not [f.line for f in check_scene(tmp_path / "room", radio) if f.field == "ris.element"]
 
 
 def test_a_room_of_any_shape_is_closed(tmp_path: Path) -> None:
