@@ -87,8 +87,8 @@ def with_climb(state: WindowState) -> WindowState:
     While a floor is held for level, what a climb does to the returns from above is held for neighbours' pull, whose
     variance would go on holding the height. So both are weighed: the climb with the scatter from before it began.
     """
-    window, steps = state.window, int(LASTED[-1])
-    if state.cycle % STRIDE or state.config.motion != "learnt" or len(window.step) <= steps:
+    window, steps, learnt = state.window, int(LASTED[-1]), state.config.motion == "learnt"
+    if state.cycle % STRIDE or not learnt or not state.scene.use_vt or len(window.step) <= steps:
         return state
     found = predictions(state, 0)
     trial = _scattering_as_before(state, steps, found)
