@@ -54,12 +54,12 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     trial.accel[last, :3] = window.accel[last, :3] + accel
     for until in (state.window.num_poses - 2 - steps, state.window.num_poses):
         # which tracks follow hangs on the motion, and the motion on them
-        state = with_rates(_booked_anew(state._replace(window=trial), until))
+        state = with_rates(_with_scatter_relearnt(state._replace(window=trial), until))
         trial = window_gaussian.solve(state.window)
     return state._replace(window=trial)
 
 
-def _booked_anew(state: WindowState, until: int) -> WindowState:
+def _with_scatter_relearnt(state: WindowState, until: int) -> WindowState:
     """State whose wall returns scatter about the motion as it is now estimated by as much as they did in the first
     `until` cycles of the window: what a manoeuvre that was not believed in did to them was held for neighbours' pull,
     whose variance would go on holding the agent back."""

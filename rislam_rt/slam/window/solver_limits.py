@@ -20,13 +20,14 @@ NEAR = np.array([0.3, 0.15, 0.15])
 MOST = 2
 """Most predicted returns of the map, the nearest, that are weighed as explanations of one track."""
 STRIDE = 3
-"""Cycles between two examinations of tracks for births."""
+"""Cycles between two examinations of tracks for births, and of returns for a climb."""
 NEARBY = 2.0
 """Distance [m] beyond which two hypothetical features are not compared."""
 LATELY = 5
 """Number of last steps that a manoeuvre may cover: one that began within half a second."""
 LASTED = np.array([3, 5, 10])
-"""Numbers of last steps over which a manoeuvre is looked for that only tracks tell of."""
+"""Numbers of last steps over which a manoeuvre is looked for that only tracks tell of; the most of them over which a
+climb is looked for that returns tell of."""
 AGO = np.array([0, 3, 5, 10, 20])
 """Numbers of steps ago at which a lively segment may have begun or ended."""
 DRAWS = 12
