@@ -3,6 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import wrap
 
 HALF_TURN = 1e-9
 """Angle [rad] to half a turn below which rounding alone would say whether it goes left or right: it goes left."""
@@ -26,5 +27,5 @@ def along_heading(course: Floats) -> Floats:
 def short_turn(before: Floats, after: Floats) -> Floats:
     """Turns (N,) [rad] on the spot from headings (N,) to headings (N,) [rad], the short way; half a turn to the
     left."""
-    turn = np.arctan2(np.sin(after - before), np.cos(after - before))
+    turn = wrap(after - before)
     return np.where(np.abs(turn) > np.pi - HALF_TURN, np.pi, turn)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import wrap
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion.headings import along_heading, short_turn
 from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
@@ -89,7 +90,7 @@ class StopAndGo(NamedTuple):
                 share = np.clip((part - begin[number + 1] + takes) / takes, 0.0, 1.0)
                 turned[-1] = self.turns[number] * share
         angle = along_heading(np.concatenate(tangents)) + np.concatenate(turned)
-        return np.concatenate(places), np.concatenate(velocities), np.arctan2(np.sin(angle), np.cos(angle))
+        return np.concatenate(places), np.concatenate(velocities), wrap(angle)
 
 
 def plan_stops(
