@@ -53,7 +53,8 @@ def find_candidate(
     """Point or track that is the likeliest to be RIS panel number `panel`, or None if none is likely enough
     (`DISMISSAL`).
 
-    A track that seems to come from behind a wall may be the panel over that wall: aiming there would miss it.
+    A track that seems to come from behind a wall may be the panel over that wall, or the wall ends before: the panel
+    is there as rarely as any new feature is (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
@@ -62,17 +63,23 @@ def find_candidate(
     few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
     told = tracks.log_ris[:, panel] - few
     rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
-    spots, _ = scatterer_positions(tracks.mean[rows, :, 0], poses)
-    if len(walls) and len(rows):
-        out = features[walls] - mean[:3]
-        image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])
-        gap = np.linalg.norm(spots[:, None] - image, axis=-1) - np.linalg.norm(spots - mean[:3], axis=1)[:, None]
-        shown = (gap > -DEEP).all(axis=1)
-        rows, spots = rows[shown], spots[shown]
-    odds = np.concatenate([landmarks.log_ris[points, panel] - few, told[rows]])
+    places, _ = scatterer_positions(tracks.mean[rows, :, 0], poses)
+    out = features[walls] - mean[:3]
+    image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])
+    gap = np.linalg.norm(places[:, None] - image, axis=-1) - np.linalg.norm(places - mean[:3], axis=1)[:, None]
+    behind = (gap < -DEEP).sum(axis=1)
+    places = np.concatenate([features[points], places])
+    hits = np.append(landmarks.hits[points], tracks.hits[rows])
+    odds = np.append(landmarks.log_ris[points, panel] - few, told[rows] + CONSTANTS.log_rare * behind)
+    odds += log_images(np.linalg.norm(places - mean[:3], axis=1), np.where(hits > 1, odds, -np.inf))
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
     best = int(np.argmax(odds))
-    if best < len(points):
-        return PanelCandidate(features[points[best]], int(landmarks.hits[points[best]]), panel)
-    return PanelCandidate(spots[best - len(points)], int(tracks.hits[rows[best - len(points)]]), panel)
+    return PanelCandidate(places[best], int(hits[best]), panel)
+
+
+def log_images(reach: Floats, log_odds: Floats) -> Floats:
+    """Gain (N,) in the log odds of N panel candidates at distances `reach` (N,) [m] with `log_odds` (N,), as each of
+    those farther off may be its image in a wall: a path over the panel and a wall is longer than that over the panel."""
+    image = np.logaddexp(0.0, 2.0 * CONSTANTS.wall_ratio + log_odds)
+    return np.where(np.isfinite(log_odds), (image * (reach > reach[:, None])).sum(axis=1), 0.0)
