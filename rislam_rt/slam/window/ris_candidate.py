@@ -79,7 +79,7 @@ def find_candidate(
 
 
 def log_images(reach: Floats, log_odds: Floats) -> Floats:
-    """Gain (N,) in the log odds of N panel candidates at distances `reach` (N,) [m] with `log_odds` (N,), as each of
-    those farther off may be its image in a wall: a path over the panel and a wall is longer than that over the panel."""
+    """Gain (N,) in the log odds of N panel candidates at distances `reach` (N,) [m] with `log_odds` (N,): those farther
+    off may be images of it in walls, as paths over a panel and a wall are longer than that over the panel."""
     image = np.logaddexp(0.0, 2.0 * CONSTANTS.wall_ratio + log_odds)
     return np.where(np.isfinite(log_odds), (image * (reach > reach[:, None])).sum(axis=1), 0.0)
