@@ -12,7 +12,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations, stranger_density
 from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.step_info import LossCause, StepInfo, StepOutcome
-from rislam_rt.slam.window import coordinated_turn, motion_learning, tracks
+from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.cycle_association import CycleAssociation, associate_cycle, score_again, with_tilts
 from rislam_rt.slam.window.cycle_explanation import (
     beside_panels,
@@ -29,15 +29,16 @@ from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.manoeuvres import with_climb, with_manoeuvre
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log, reweigh_wall_returns, squares
+from rislam_rt.slam.window.motion import coordinated_turn, motion_learning
+from rislam_rt.slam.window.motion.manoeuvres import with_climb, with_manoeuvre
+from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import LASTED, LATELY, REFRESH
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.track_rates import with_rates
 
 
 def init(
@@ -57,7 +58,7 @@ def init(
     return WindowState(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
-        motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
+        motion_mode, motion.by_axis(motion_mode), True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
         attitude.first_levels(compass=not turns),
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
@@ -129,11 +130,13 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
+        window = window_gaussian.extend(
+            window, dt, motion_learning.assumed_precision(state.config, dt, window.turns), facing=heading
+        )
     else:
         precision = motion_learning.precisions(level)
         velocity_turn = coordinated_turn.velocity_turn(state, turn)
-        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level), velocity_turn)
+        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level), velocity_turn, heading)
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
         coordinated_log_odds=odds,

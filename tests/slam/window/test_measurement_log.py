@@ -14,7 +14,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironm
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import append, empty_log, scatter_variance, squares
-from rislam_rt.slam.window.motion_learning import assumed_precision
+from rislam_rt.slam.window.motion.motion_learning import assumed_precision
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds

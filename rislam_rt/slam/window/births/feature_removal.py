@@ -10,11 +10,11 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, remove_f
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log, Residuals
+from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.solver_limits import FEWEST
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.track_rates import with_rates
 from rislam_rt.slam.window.tracks import WindowTracks
 
 

@@ -16,57 +16,69 @@ MEASURED = 6
 
 
 class _PlainRates(NamedTuple):
-    """Rates of the path lengths of T tracks or explained paths, E in all."""
+    """Rates of the path lengths of T tracks or explained paths, E in all: each over an odd number of walls, or a point,
+    and over two walls."""
 
     toward: Floats
-    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
+    """(E, 3) derivative of the length by the position: the rate is its product with the velocity."""
     rate: Floats
     """(E,) [m/s] rate at which the path length changes."""
     variance: Floats
     """(E,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
+    """(E,) error of the rate by the direction's, as a share of the speed."""
     whole: Floats
     """(E,) rate of the measured length itself; `rate` may be that of what the positions leave of it."""
-    turning: float = 0.0
-    """[m/s] speed of Tx and Rx against each other, as the body turns."""
+    share: Floats
+    """(E,) probability beforehand of each of the ways in which a track or path may come."""
+    owner: Integers
+    """(E,) track or path of each way."""
+    turning: Floats
+    """(E,) [m/s] speed of Tx and Rx against each other, as the body turns; 0 where it changes no length."""
+    tried: int
+    """Number of the ways, the first of them, of which two give a first guess of the motion."""
     bend: Floats | None = None
     """(E,) [m/s^2] at which the rates change."""
     bend_variance: Floats | None = None
     """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
-    owner: Integers | None = None
-    """(E,) track or path of each direction; None where each has one."""
     believed: Floats | None = None
     """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
     rest may have any rate."""
 
 
 class Rates(_PlainRates):
-    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
-    an array hears some alike from two."""
+    """Rates at which the lengths of T tracks or explained paths change, by the E ways in which they may come."""
 
     @cached_property
     def number(self) -> int:
         """Number T of the tracks and paths whose lengths have a rate."""
-        return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
+        return int(self.owner.max(initial=-1)) + 1
 
     def each(self, value: Floats) -> Floats:
         """Values (..., E) by track or path: of those (..., T) given."""
-        return value if self.owner is None else value[..., self.owner]
+        return np.asarray(value[..., self.owner])
 
     def mixed(self, value: Floats) -> Floats:
-        """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
-        return value if self.owner is None else np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
+        """Sums (..., T) of values (..., E) over the ways in which a track or path may come."""
+        return np.asarray(value @ self._mixing)
 
     @cached_property
-    def share(self) -> Floats:
-        """(E,) probability of each direction beforehand: a half where there are two."""
-        return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
+    def _mixing(self) -> Floats:
+        """(E, T) 1 where a way is of a track or path."""
+        return np.asarray(self.owner[:, None] == np.arange(self.number), dtype=np.float64)
 
     @cached_property
     def kept(self) -> Floats:
         """(E,) densities of the rates were they of lengths that stay as they are."""
         return np.exp(-0.5 * self.whole**2 / self.variance) / np.sqrt(2.0 * np.pi * self.variance)
+
+
+def lone_rates(toward: Floats, rate: Floats, variance: Floats) -> Rates:
+    """Rates (T,) with variances (T,) of paths that come in one way each, along `toward` (T, 3)."""
+    count = len(rate)
+    return Rates(
+        toward, rate, variance, np.zeros(count), rate, np.ones(count), np.arange(count), np.zeros(count), count
+    )  # fmt: skip
 
 
 class Heard(NamedTuple):
@@ -80,8 +92,8 @@ class Heard(NamedTuple):
     """(K, 3) [m] its estimated positions."""
     step: float
     """[s] from pose to pose."""
-    baseline: float
-    """[m] from Tx to Rx."""
+    baseline: Floats
+    """(2,) [m] from Tx to Rx, in the body's axes."""
     spacing: float
     """[wavelengths] of the antennas."""
 
@@ -102,13 +114,15 @@ class Lengths(NamedTuple):
     left: Floats
     """(N,) [m] ...and what the positions leave of it."""
     toward: Floats
-    """(E, 3) direction of arrival in the room's axes, times -2."""
+    """(E, 3) derivative of the length by the position, of returns over an odd number of walls and of points."""
+    parallax: Floats
+    """(E, 2) by how much that of returns over two walls, the direction of arrival times -2, is more."""
     number: Integers
     """(E,) number of components."""
     blur: Floats
     """(E,) as in `Rates`."""
-    owner: Integers | None
-    """(E,) track or path of each direction; None where each has one."""
+    owner: Integers
+    """(E,) track or path of each direction."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -136,14 +150,18 @@ def lengths(heard: Heard) -> Lengths:
     toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
     toward /= count[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
-    toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
-    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
-    blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
+    toward = np.concatenate([toward, up[:, None]], axis=1)
+    # a point, or a wall's normal, is seen from midway between the two ends
+    far = np.maximum(total(weight * length) / total(weight), 1e-3)
+    across = total(cos * baseline[0] - sin * baseline[1]), total(sin * baseline[0] + cos * baseline[1])
+    apart = np.stack([*across, np.zeros(len(far))], axis=1) / (count * far)[:, None]
+    apart -= np.vecdot(apart, toward)[:, None] * toward
+    toward = -2.0 * (toward + apart)
     doubt = total((spread_of**2).mean(axis=1)) / count**2
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
-        length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
-        np.hypot(blur, 2.0 * np.sqrt(doubt)), owner if (np.diff(owner) < 1).any() else None,
+        length - np.vecdot(toward[which], place[since] - place[-1]), toward, 2.0 * apart, count,
+        2.0 * np.sqrt(doubt), owner,
     )  # fmt: skip
 
 
@@ -190,13 +208,18 @@ def _rates(
     """Rates of those lengths (E,) that are `fine`, from `fits`: their rates, the variances, and the rates of measured
     lengths, over a `unit` [s or s^2]."""
     toward, heard = found.toward, found.heard
-    fine = fine & (np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
+    ray = toward + found.parallax
+    fine = fine & (np.vecdot(ray[:, :2], ray[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
     rate, variance, whole = (each[fine] for each in fits)
-    bend, bend_variance = (each[fine] for each in bends) if bends else (None, None)
-    turning = heard.baseline * float(np.abs(np.diff(heard.heading)).sum()) / unit
-    owner = None if found.owner is None else np.unique(found.owner[fine], return_inverse=True)[1]
+    bend, bend_variance = (np.tile(each[fine], 2) for each in bends) if bends else (None, None)
+    turning = float(np.hypot(*heard.baseline) * np.abs(np.diff(heard.heading)).sum()) / unit
+    owner, parallax = np.unique(found.owner[fine], return_inverse=True)[1], found.parallax[fine]
+    owner = np.tile(owner, 2)
+    moved = rate if believed is None else rate - parallax[:, :2] @ believed
     return Rates(
-        toward[fine], rate, variance, found.blur[fine], whole, turning, bend, bend_variance, owner, believed
+        np.concatenate([toward[fine], toward[fine] + parallax]), np.append(rate, moved), np.tile(variance, 2),
+        np.tile(found.blur[fine], 2), np.tile(whole, 2), 1.0 / np.bincount(owner)[owner], owner,
+        np.repeat([0.0, turning], len(rate)), len(rate), bend, bend_variance, believed,
     )  # fmt: skip
 
 

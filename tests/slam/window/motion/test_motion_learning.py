@@ -5,7 +5,7 @@ import pytest
 
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.motion_learning import (
+from rislam_rt.slam.window.motion.motion_learning import (
     assumed_precision,
     manoeuvre_share,
     nearer_floor,
@@ -48,7 +48,7 @@ def test_one_datum_does_not_make_an_agent_climb():
     size = len(window.head)
     single = motion.log_likelihood(
         window.accel[:, 2:3], window.covariance[size + 2 :: 3, size + 2 :: 3].diagonal()[:, None, None],
-        window.solved[:, 2],
+        window.solved[:, 2:3],
     )  # fmt: skip
     # what forty steps together seemed to tell, and the most that a datum three deviations off can
     assert (single[:, -1] - single[:, 0]).sum() > 10.0 > 0.5 * 3.0**2

@@ -15,7 +15,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.window.divergence import motion_agreement
 
-ROOM, COUNT = Path(__file__).parents[3] / "scenes" / "paper_room", 28
+ROOM, COUNT = Path(__file__).parents[4] / "scenes" / "paper_room", 28
 CONFIG = SlamConfig(filter="window", use_vt=True)
 RECEIVER = ReceiverConfig("bound", alternation=False)
 
