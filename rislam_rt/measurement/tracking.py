@@ -7,50 +7,43 @@ they cross. Nothing here knows what a path is: associating landmarks is the filt
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import scipy
+from annotated_types import Ge
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import ConfigError
 from rislam_rt.model import Measurement
+from rislam_rt.ranges import Count, Positive, check_ranges
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingConfig:
     """Settings of the tracker of multipath components. SI units."""
 
-    length_acceleration: float = 0.05
+    length_acceleration: Positive = 0.05
     """Standard deviation of the white acceleration of a path's length [m/s^2]."""
-    cosine_acceleration: float = 0.05
+    cosine_acceleration: Positive = 0.05
     """Standard deviation of the white acceleration of a direction cosine [1/s^2]."""
-    length_rate: float = 0.5
+    length_rate: Positive = 0.5
     """Standard deviation of a new track's rate of length [m/s]."""
-    cosine_rate: float = 0.2
+    cosine_rate: Positive = 0.2
     """Standard deviation of a new track's rate of a cosine [1/s]."""
-    std_scale: float = 1.5
+    std_scale: Positive = 1.5
     """Factor of true errors over the reported standard deviations: unresolved neighbours pull at a component."""
-    loudness_std: float = 0.35
+    loudness_std: Positive = 0.35
     """Standard deviation of the change of the log amplitude (natural) from cycle to cycle; 0.35 is 3 dB."""
-    gate: float = 20.0
+    gate: Positive = 20.0
     """Largest squared distance of length, cosines and log amplitude together (chi^2, 4 dof: 0.9995)."""
-    confirm_hits: int = 3
+    confirm_hits: Count = 3
     """Number of components after which a track is confirmed as a path; before, one miss ends it."""
-    max_misses: int = 10
+    max_misses: Annotated[int, Ge(0)] = 10
     """Number of cycles without a component that a confirmed track survives."""
 
     def __post_init__(self) -> None:
-        for name in ("length_acceleration", "cosine_acceleration", "length_rate", "cosine_rate", "std_scale"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"tracking.{name}: {getattr(self, name)} received; give a positive number")
-        if not (self.loudness_std > 0.0 and self.gate > 0.0):
-            raise ConfigError(f"tracking.loudness_std, gate: {self.loudness_std}, {self.gate} received; give positive")
-        if self.confirm_hits < 1 or self.max_misses < 0:
-            raise ConfigError(
-                f"tracking.confirm_hits, max_misses: {self.confirm_hits}, {self.max_misses} received; give 1, 0 or more"
-            )
+        check_ranges("tracking", self)
 
 
 class TrackState(NamedTuple):
