@@ -56,11 +56,6 @@ class HardwareConfig:
     def __post_init__(self) -> None:
         check_ranges("hardware", self)
 
-    @property
-    def ideal(self) -> bool:
-        """Whether the front end has no hardware fault."""
-        return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
-
 
 class Correction(NamedTuple):
     """Correction of a front end's faults that calibration found, applied to samples (L, M)."""
