@@ -50,7 +50,7 @@ class HardwareConfig:
     """Full scale of the converters over the root mean square of real or imaginary part; 0: the largest sample fits."""
     told: bool = False
     """Whether the estimator counts the expected power of all these faults as noise."""
-    calibration_cycles: Annotated[int, Ge(0), Le(1_000_000)] = 0
+    calibration_cycles: Annotated[int, Ge(0), Le(1_000_000_000_000)] = 0
     """Cycles at the start whose signals are recorded, to calibrate on the direct path and the walls; 0 for none."""
 
     def __post_init__(self) -> None:
