@@ -25,7 +25,6 @@ from rislam_rt.measurement import (
     step_tracks,
     with_reference_snr,
 )
-from rislam_rt.measurement.tracking import TrackingConfig
 from rislam_rt.measurement.waveform_receiver import to_measurement
 from rislam_rt.model import Paths, RadioConfig, RxArray, Trajectory
 from rislam_rt.scene import load_scene
@@ -102,7 +101,7 @@ def track_times(paths: Paths, motion: Trajectory, radio: RadioConfig) -> list[fl
         measurement, _ = draw(paths, motion, cycle, radio, WAVEFORM)
         for _ in range(4):
             begin = time.process_time()
-            state, _ = step_tracks(state, measurement, 0.1, TrackingConfig())
+            state, _ = step_tracks(state, measurement, 0.1)
             seconds.append(time.process_time() - begin)
     return seconds
 

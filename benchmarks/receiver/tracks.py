@@ -11,7 +11,8 @@ import numpy as np
 
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.evaluate import association_score
-from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
+from rislam_rt.measurement import ReceiverConfig, init_tracks, measure, step_tracks
+from rislam_rt.measurement.tracking import CONFIRM_HITS
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
 
@@ -31,10 +32,10 @@ def main() -> None:
         for cycle in range(len(motion)):
             heading = float(motion.heading[cycle])
             measurement, known = measure(paths, cycle, heading, RADIO, config, measurement, rng=rng)
-            state, info = step_tracks(state, measurement, 0.1, TrackingConfig())
-            label.append(info.label)
+            state, now = step_tracks(state, measurement, 0.1)
+            label.append(now)
             truth.append(known.path)
-            confirmed.append(info.confirmed)
+            confirmed.append(np.isin(now, state.label[state.hits >= CONFIRM_HITS]))
         all_labels, path, sure = (np.concatenate(rows) for rows in (label, truth, confirmed))
         print(f"{config.estimator}: {len(path)} components, {len(np.unique(all_labels[sure]))} confirmed labels")
         print(f"  clutter in confirmed tracks: {np.mean(path[sure] < 0):.3f}")

@@ -1,46 +1,45 @@
 """Result of a code design: code, CRLB and bound; and the settings and interface of designers."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
+from annotated_types import Ge
 
 from rislam_rt.arrays import Floats
 from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import Outcome
 from rislam_rt.model import RisCode
+from rislam_rt.ranges import Count, Probability, check_ranges
 
 
 @dataclass(frozen=True, slots=True)
 class DesignConfig:
     """Settings of the designers of panel codes; each reads its own."""
 
-    population: int = 50
+    population: Annotated[int, Ge(2)] = 50
     """Population size K of CRLB-GA."""
-    elite: int = 10
+    elite: Annotated[int, Ge(0)] = 10
     """Number Q of individuals that survive in CRLB-GA; K - Q must be even."""
-    iterations: int = 100
+    iterations: Count = 100
     """Number C^A of generations of CRLB-GA."""
-    mutation: float = 0.02
+    mutation: Probability = 0.02
     """Mutation probability p_m of CRLB-GA."""
-    max_steps: int = 200
+    max_steps: Count = 200
     """Largest number of steps of a coordinate descent."""
-    starts: int = 2
+    starts: Count = 2
     """Number of single-path optima from which coordinate descent starts, the best first."""
     certify: bool = True
     """Whether to compute the relaxation bound and the gap of the direct path's gain to its optimum."""
 
     def __post_init__(self) -> None:
-        if not self.population >= 2 or not 0 <= self.elite < self.population or (self.population - self.elite) % 2:
+        check_ranges("design", self)
+        if self.elite >= self.population or (self.population - self.elite) % 2:
             raise ConfigError(
                 f"design.population, design.elite: {self.population}, {self.elite} received; "
-                "give at least 2, fewer elites than individuals, and an even difference"
+                "give fewer elites than individuals, and an even difference"
             )
-        if not 0.0 <= self.mutation <= 1.0:
-            raise ConfigError(f"design.mutation: {self.mutation} received; give a probability")
-        if self.iterations < 1 or self.max_steps < 1 or self.starts < 1:
-            raise ConfigError("design.iterations, design.max_steps, design.starts: give at least 1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,6 @@ from rislam_rt.evaluate.association import AssociationScore, association_fractio
 from rislam_rt.evaluate.confidence_intervals import (
     Interval,
     bootstrap,
-    bootstrap_ratio,
     median_over_runs,
     rms_over_runs,
     share_interval,
@@ -23,7 +22,7 @@ from rislam_rt.evaluate.set_distances import gospa, match_points
 
 __all__ = [
     "NEAR_ANGLE", "NEAR_WALL", "AssociationScore", "Interval", "Surfaces", "align", "association_fractions",
-    "association_score", "bootstrap", "bootstrap_ratio", "ghost_planes", "gospa", "match_planes", "match_points",
+    "association_score", "bootstrap", "ghost_planes", "gospa", "match_planes", "match_points",
     "median_over_runs", "normalised_squares", "plane_angle", "plane_distance", "position_errors", "rms_over_runs",
     "rmse", "root_mean_square", "share_interval",
 ]  # fmt: skip

@@ -81,19 +81,3 @@ def bootstrap(
         if not np.isfinite(found.confidence_interval).all():  # no spread without any one run: a median, or all alike
             found = again(method="percentile", n_resamples=0, bootstrap_result=found)
     return Interval(value, *(float(end) for end in found.confidence_interval))
-
-
-def bootstrap_ratio(
-    numerator: Floats, denominator: Floats, *, rng: np.random.Generator, level: float = 0.95
-) -> Interval:
-    """Bootstrap interval of the ratio of two schemes' root mean squares, both run on the same R seeds.
-
-    Seeds are drawn in pairs, so that what both schemes share (room, noise) does not widen the interval. 1 minus this is
-    the gain over the denominator's scheme.
-    """
-    pairs = np.stack([np.asarray(numerator), np.asarray(denominator)], axis=-1)
-
-    def ratio(samples: Floats) -> Floats:
-        return rms_over_runs(samples[..., 0]) / rms_over_runs(samples[..., 1])
-
-    return bootstrap(pairs, rng=rng, statistic=ratio, level=level)

@@ -1,13 +1,16 @@
 """Prior information of bounds and designs: from a covariance, of the agent's motion, and on floor and walls."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Le
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.information.landmark_model import LandmarkModel
+from rislam_rt.ranges import NotNegative, check_ranges
 
 FLOOR_TILT, UPRIGHT_TILT = 0.05, 0.01
 """Standard deviations [rad] of tilts that the filter assumes: of the floor from level, and, with wall returns in the
@@ -48,26 +51,22 @@ def assumed_std(model: LandmarkModel, height: float, *, upright: bool) -> Floats
 class MotionPrior:
     """Prior of a bound on the agent's motion: standard deviations per axis of acceleration noise and of the start."""
 
-    acceleration: float = 0.01
+    acceleration: NotNegative = 0.01
     """Standard deviation sigma_a [m/s^2] of the white-noise acceleration."""
-    start_position: float = 0.01
+    start_position: NotNegative = 0.01
     """Standard deviation [m] of the start position."""
-    start_velocity: float = 0.01
+    start_velocity: NotNegative = 0.01
     """Standard deviation [m/s] of the start velocity."""
-    axes: int = 2
+    axes: Annotated[int, Ge(2), Le(3)] = 2
     """Number of unknown axes: 2, height known, the agent moves in a horizontal plane; 3, height unknown too."""
-    climb: float | None = None
+    climb: NotNegative | None = None
     """Vertical sigma_a [m/s^2] of an agent whose height and climb are known at the start alone (3 axes); None: as in
     the other directions."""
 
     def __post_init__(self) -> None:
-        for name in ("acceleration", "start_position", "start_velocity"):
-            if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"motion.{name}: {getattr(self, name)} received; give a standard deviation")
-        if self.axes not in (2, 3):
-            raise ConfigError(f"motion.axes: {self.axes} received; give 2 or 3")
-        if self.climb is not None and (self.axes != 3 or not self.climb >= 0.0):
-            raise ConfigError(f"motion.climb: {self.climb} received; give a standard deviation, with 3 axes")
+        check_ranges("motion", self)
+        if self.climb is not None and self.axes != 3:
+            raise ConfigError(f"motion.climb: {self.climb} received; give it with 3 axes")
 
     @property
     def accelerations(self) -> Floats:

@@ -10,12 +10,12 @@ from rislam_rt.measurement.received_paths import Clutter, Received, receive
 from rislam_rt.measurement.received_signal import num_tones, to_samples
 from rislam_rt.measurement.receiver import measure
 from rislam_rt.measurement.signal_dataset import NO_COMPONENT, load_signals, signals_dataset
-from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
+from rislam_rt.measurement.tracking import init_tracks, step_tracks
 from rislam_rt.measurement.waveform_receiver import capture, find_components
 from rislam_rt.model import detection_probability
 
 __all__ = [
-    "NO_COMPONENT", "Clutter", "FrontEnd", "HardwareConfig", "Received", "ReceiverConfig", "TrackingConfig",
+    "NO_COMPONENT", "Clutter", "FrontEnd", "HardwareConfig", "Received", "ReceiverConfig",
     "build_front_end", "build_sensor", "calibrate", "capture", "detection_probability", "expected_distortion",
     "find_components", "init_tracks", "load_signals", "measure", "num_tones", "paper_snr_db", "path_std",
     "receive", "reference_gain", "signals_dataset", "step_tracks", "to_samples", "with_reference_snr",

@@ -7,69 +7,54 @@ control and clipping; quantisation.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import scipy
+from annotated_types import Ge, Le, Lt
 
 from rislam_rt.arrays import Complexes, Floats
-from rislam_rt.errors import ConfigError
-from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.config import Bounded, ReceiverConfig
 from rislam_rt.measurement.received_signal import add_noise, convert, num_tones, to_samples, to_tones
 from rislam_rt.model import RadioConfig
-
-LARGEST = 1e12
-"""Largest value of a hardware fault's setting: float64 carries its square."""
+from rislam_rt.ranges import check_ranges
 
 
 @dataclass(frozen=True, slots=True)
 class HardwareConfig:
     """Tolerances of a receiver's hardware faults, all 0 for an ideal front end; amplitude ratios: 0.01 is -40 dB."""
 
-    gain_std_db: float = 0.0
+    gain_std_db: Bounded = 0.0
     """Standard deviation [dB] of the gain of an element and its receive chain."""
-    phase_std_deg: float = 0.0
+    phase_std_deg: Bounded = 0.0
     """Standard deviation [degrees] of the phase of an element and its receive chain."""
-    position_std_m: float = 0.0
+    position_std_m: Bounded = 0.0
     """Standard deviation [m] of an element's position along each axis."""
-    coupling: float = 0.0
-    """Amplitude that an element takes from its nearest neighbours; it falls with distance, and turns with it."""
-    leakage_residue: float = 0.0
+    coupling: Annotated[float, Ge(0.0), Lt(0.2)] = 0.0
+    """Amplitude that an element takes from its nearest neighbours, below -14 dB; it falls with distance, and turns with
+    it."""
+    leakage_residue: Bounded = 0.0
     """Amplitude of what the cancellation leaves, over that of the leakage before it; independent over tones and
     antennas."""
-    iq_image: float = 0.0
+    iq_image: Bounded = 0.0
     """Amplitude of the mixer's image of the band (I/Q imbalance), of a phase of its own in every receive chain."""
-    phase_noise_deg: float = 0.0
+    phase_noise_deg: Bounded = 0.0
     """Root mean square [degrees] of the phase noise of single samples, the same in all chains."""
-    phase_step_deg: float = 0.0
+    phase_step_deg: Bounded = 0.0
     """Root mean square [degrees] of the common phase of one code's signal against the other's."""
-    carrier_offset_hz: float = 0.0
+    carrier_offset_hz: Annotated[float, Ge(-1e12), Le(1e12)] = 0.0
     """Carrier of the Tx less that of the Rx: turns all paths within the slot."""
-    agc_std_db: float = 0.0
+    agc_std_db: Bounded = 0.0
     """Standard deviation [dB] of the gain control's gain from cycle to cycle, not reported."""
-    clip_rms: float = 0.0
+    clip_rms: Bounded = 0.0
     """Full scale of the converters over the root mean square of real or imaginary part; 0: the largest sample fits."""
     told: bool = False
     """Whether the estimator counts the expected power of all these faults as noise."""
-    calibration_cycles: int = 0
+    calibration_cycles: Annotated[int, Ge(0), Le(1_000_000_000_000)] = 0
     """Cycles at the start whose signals are recorded, to calibrate on the direct path and the walls; 0 for none."""
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if name not in ("told", "carrier_offset_hz") and not 0.0 <= value <= LARGEST:
-                raise ConfigError(f"hardware.{name}: {value} received; give 0 to {LARGEST:g}")
-        if not abs(self.carrier_offset_hz) <= LARGEST:
-            raise ConfigError(
-                f"hardware.carrier_offset_hz: {self.carrier_offset_hz} received; give {-LARGEST:g} to {LARGEST:g}"
-            )
-        if self.coupling >= 0.2:
-            raise ConfigError(f"hardware.coupling: {self.coupling} received; give less than 0.2 (-14 dB)")
-
-    @property
-    def ideal(self) -> bool:
-        """Whether the front end has no hardware fault."""
-        return self == HardwareConfig(told=self.told, calibration_cycles=self.calibration_cycles)
+        check_ranges("hardware", self)
 
 
 class Correction(NamedTuple):

@@ -11,7 +11,7 @@ from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.measurement import waveform_receiver
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.received_paths import receive
-from rislam_rt.measurement.tracking import TrackingConfig, init_tracks, step_tracks
+from rislam_rt.measurement.tracking import init_tracks, step_tracks
 from rislam_rt.model import Paths, RadioConfig, Trajectory
 from rislam_rt.storage.netcdf import Entry, padded, read_dataset, variables
 from rislam_rt.waveform import subcarrier_frequencies
@@ -61,13 +61,13 @@ def signals_dataset(
         components = waveform_receiver.find_components(captures, radio, config, previous)
         previous = waveform_receiver.to_measurement(components, radio, config)
         step = float(trajectory.time[cycle] - last)
-        tracks, info = step_tracks(tracks, previous, step, TrackingConfig())
+        tracks, label = step_tracks(tracks, previous, step)
         last = trajectory.time[cycle]
         samples.append(np.array([one.samples for one in captures], dtype=np.complex64))
         noise.append([one.noise_psd for one in captures])
         heard[cycle, received.path] = 1
         found.append(components)
-        labels.append(info.label)
+        labels.append(label)
         truth.append(waveform_receiver.true_paths(components, received, radio, config))
         over_panel.append(np.zeros(len(components.tau)) if previous.from_panel is None else previous.from_panel)
         which.append(previous.panel)

@@ -6,51 +6,33 @@ tracks to components within a gate. The amplitude takes part, so that a strong a
 they cross. Nothing here knows what a path is: associating landmarks is the filter's business.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import ConfigError
 from rislam_rt.model import Measurement
 
-
-@dataclass(frozen=True, slots=True)
-class TrackingConfig:
-    """Settings of the tracker of multipath components. SI units."""
-
-    length_acceleration: float = 0.05
-    """Standard deviation of the white acceleration of a path's length [m/s^2]."""
-    cosine_acceleration: float = 0.05
-    """Standard deviation of the white acceleration of a direction cosine [1/s^2]."""
-    length_rate: float = 0.5
-    """Standard deviation of a new track's rate of length [m/s]."""
-    cosine_rate: float = 0.2
-    """Standard deviation of a new track's rate of a cosine [1/s]."""
-    std_scale: float = 1.5
-    """Factor of true errors over the reported standard deviations: unresolved neighbours pull at a component."""
-    loudness_std: float = 0.35
-    """Standard deviation of the change of the log amplitude (natural) from cycle to cycle; 0.35 is 3 dB."""
-    gate: float = 20.0
-    """Largest squared distance of length, cosines and log amplitude together (chi^2, 4 dof: 0.9995)."""
-    confirm_hits: int = 3
-    """Number of components after which a track is confirmed as a path; before, one miss ends it."""
-    max_misses: int = 10
-    """Number of cycles without a component that a confirmed track survives."""
-
-    def __post_init__(self) -> None:
-        for name in ("length_acceleration", "cosine_acceleration", "length_rate", "cosine_rate", "std_scale"):
-            if not getattr(self, name) > 0.0:
-                raise ConfigError(f"tracking.{name}: {getattr(self, name)} received; give a positive number")
-        if not (self.loudness_std > 0.0 and self.gate > 0.0):
-            raise ConfigError(f"tracking.loudness_std, gate: {self.loudness_std}, {self.gate} received; give positive")
-        if self.confirm_hits < 1 or self.max_misses < 0:
-            raise ConfigError(
-                f"tracking.confirm_hits, max_misses: {self.confirm_hits}, {self.max_misses} received; give 1, 0 or more"
-            )
+LENGTH_ACCELERATION = 0.05
+"""Standard deviation of the white acceleration of a path's length [m/s^2]."""
+COSINE_ACCELERATION = 0.05
+"""Standard deviation of the white acceleration of a direction cosine [1/s^2]."""
+LENGTH_RATE = 0.5
+"""Standard deviation of a new track's rate of length [m/s]."""
+COSINE_RATE = 0.2
+"""Standard deviation of a new track's rate of a cosine [1/s]."""
+STD_SCALE = 1.5
+"""Factor of true errors over the reported standard deviations: unresolved neighbours pull at a component."""
+LOUDNESS_STD = 0.35
+"""Standard deviation of the change of the log amplitude (natural) from cycle to cycle; 0.35 is 3 dB."""
+GATE = 20.0
+"""Largest squared distance of length, cosines and log amplitude together (chi^2, 4 dof: 0.9995)."""
+CONFIRM_HITS = 3
+"""Number of components after which a track is confirmed as a path; before, one miss ends it."""
+MAX_MISSES = 10
+"""Number of cycles without a component that a confirmed track survives."""
 
 
 class TrackState(NamedTuple):
@@ -72,35 +54,20 @@ class TrackState(NamedTuple):
     """Label of the next new track."""
 
 
-class TrackInfo(NamedTuple):
-    """Track labels of a cycle's M components, and how many tracks began and ended."""
-
-    label: Integers
-    """(M,) label of each component: every one gets one, a new one if it fits no track."""
-    confirmed: Booleans
-    """(M,) whether its track has been seen often enough to be a path."""
-    born: int
-    """Number of tracks that began in this cycle."""
-    died: int
-    """Number of tracks that ended in this cycle."""
-
-
 def init_tracks() -> TrackState:
     """Empty set of tracks of multipath components, with which tracking begins."""
     none = np.zeros(0, dtype=np.int64)
     return TrackState(none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, 0)
 
 
-def step_tracks(
-    state: TrackState, measurement: Measurement, dt: float, config: TrackingConfig
-) -> tuple[TrackState, TrackInfo]:
+def step_tracks(state: TrackState, measurement: Measurement, dt: float) -> tuple[TrackState, Integers]:
     """Track multipath components over a cycle: predict tracks over `dt` [s], assign components to them, update, start
-    and end tracks."""
+    and end tracks; also the label (M,) of each component's track, a new one if it fits none."""
     seen = np.column_stack([SPEED_OF_LIGHT * measurement.tau, measurement.cosines])
-    noise = config.std_scale**2 * np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std]) ** 2
+    noise = STD_SCALE**2 * np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std]) ** 2
     loudness = np.log(np.maximum(measurement.amplitude, 1e-300))
-    state = _predict(state, dt, config)
-    rows, cols = _assign(state, seen, noise, loudness, config)
+    state = _predict(state, dt)
+    rows, cols = _assign(state, seen, noise, loudness)
 
     mean, covariance = state.mean.copy(), state.covariance.copy()
     mean[rows], covariance[rows] = _update(mean[rows], covariance[rows], seen[cols], noise[cols])
@@ -109,15 +76,13 @@ def step_tracks(
     level = state.loudness.copy()
     level[rows] += 0.5 * (loudness[cols] - level[rows])
     hits, misses = state.hits + hit, np.where(hit, 0, state.misses + 1)
-    alive = hit | ((state.hits >= config.confirm_hits) & (misses <= config.max_misses))
+    alive = hit | ((state.hits >= CONFIRM_HITS) & (misses <= MAX_MISSES))
 
     fresh = np.setdiff1d(np.arange(len(seen)), cols)
     label = np.full(len(seen), -1)
     label[cols] = state.label[rows]
     label[fresh] = state.next_label + np.arange(len(fresh))
-    confirmed = np.zeros(len(seen), dtype=bool)
-    confirmed[cols] = hits[rows] >= config.confirm_hits
-    new_mean, new_covariance = _start(seen[fresh], noise[fresh], config)
+    new_mean, new_covariance = _start(seen[fresh], noise[fresh])
     tracks = TrackState(
         np.concatenate([state.label[alive], label[fresh]]),
         np.concatenate([mean[alive], new_mean]),
@@ -127,29 +92,27 @@ def step_tracks(
         np.concatenate([misses[alive], np.zeros(len(fresh), dtype=np.int64)]),
         state.next_label + len(fresh),
     )
-    return tracks, TrackInfo(label, confirmed, len(fresh), int(np.sum(~alive)))
+    return tracks, label
 
 
-def _predict(state: TrackState, dt: float, config: TrackingConfig) -> TrackState:
+def _predict(state: TrackState, dt: float) -> TrackState:
     """Kalman prediction of tracks of multipath components over `dt` [s] by discrete white-noise acceleration."""
     transition = np.array([[1.0, dt], [0.0, 1.0]])
     shape = np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
-    strength = np.array([config.length_acceleration, config.cosine_acceleration, config.cosine_acceleration]) ** 2
+    strength = np.array([LENGTH_ACCELERATION, COSINE_ACCELERATION, COSINE_ACCELERATION]) ** 2
     covariance = transition @ state.covariance @ transition.T + strength[:, None, None] * shape
     return state._replace(mean=state.mean @ transition.T, covariance=covariance)
 
 
-def _assign(
-    state: TrackState, seen: Floats, noise: Floats, loudness: Floats, config: TrackingConfig
-) -> tuple[Integers, Integers]:
+def _assign(state: TrackState, seen: Floats, noise: Floats, loudness: Floats) -> tuple[Integers, Integers]:
     """Optimal assignment of tracks to multipath components within the gate: rows of tracks, rows of components."""
     innovation = seen - state.mean[:, None, :, 0]
     spread = state.covariance[:, None, :, 0, 0] + noise
     distance = np.sum(innovation**2 / spread, axis=-1)
-    distance += ((loudness - state.loudness[:, None]) / config.loudness_std) ** 2
+    distance += ((loudness - state.loudness[:, None]) / LOUDNESS_STD) ** 2
     # The normaliser keeps an uncertain track from taking every component: it fits all of them badly.
     cost = distance + np.sum(np.log(spread), axis=-1)
-    barred = distance > config.gate
+    barred = distance > GATE
     ceiling = np.abs(np.where(barred, 0.0, cost)).max(initial=0.0) * 2.0 * (min(cost.shape) + 1) + 1.0
     rows, cols = scipy.optimize.linear_sum_assignment(np.where(barred, ceiling, cost))
     good = ~barred[rows, cols]
@@ -163,10 +126,10 @@ def _update(mean: Floats, covariance: Floats, seen: Floats, noise: Floats) -> tu
     return mean, covariance - gain[..., :, None] * covariance[..., None, 0, :]
 
 
-def _start(seen: Floats, noise: Floats, config: TrackingConfig) -> tuple[Floats, Floats]:
+def _start(seen: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Mean and covariance of new tracks of multipath components, one component each: its value, a rate about 0."""
     mean = np.stack([seen, np.zeros_like(seen)], axis=-1)
     covariance = np.zeros((*seen.shape, 2, 2))
     covariance[..., 0, 0] = noise
-    covariance[..., 1, 1] = np.array([config.length_rate, config.cosine_rate, config.cosine_rate]) ** 2
+    covariance[..., 1, 1] = np.array([LENGTH_RATE, COSINE_RATE, COSINE_RATE]) ** 2
     return mean, covariance

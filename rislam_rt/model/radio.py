@@ -1,14 +1,16 @@
 """The agent's radio: carrier, bandwidth, gains, noise, antennas with their patterns and polarisation, receive array."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
+from rislam_rt.ranges import Count, Positive, check_ranges
 
-PATTERNS = ("iso", "dipole", "hw_dipole", "tr38901")
+Pattern = Literal["iso", "dipole", "hw_dipole", "tr38901"]
 """Antenna patterns: isotropic, short and half-wave dipole along z, sector of 3GPP TR 38.901 (8 dBi, along body x)."""
 
 
@@ -20,24 +22,17 @@ class Antennas:
     Rx has is lost.
     """
 
-    tx: str = "iso"
-    """Pattern of the Tx, one of `PATTERNS`."""
-    rx: str = "iso"
-    """Pattern of the Rx, one of `PATTERNS`."""
-    polarization: str = "V"
+    tx: Pattern = "iso"
+    """Pattern of the Tx."""
+    rx: Pattern = "iso"
+    """Pattern of the Rx."""
+    polarization: Literal["V", "H"] = "V"
     """Polarisation of the Tx, `V` or `H`."""
-    rx_polarization: str = ""
+    rx_polarization: Literal["", "V", "H"] = ""
     """Polarisation of the Rx, `V` or `H`; empty: the Tx's. A crossed link receives only what walls have turned."""
 
     def __post_init__(self) -> None:
-        for name in ("tx", "rx"):
-            pattern = getattr(self, name)
-            if pattern not in PATTERNS:
-                raise ConfigError(f"antennas.{name}: '{pattern}' received; give one of {', '.join(PATTERNS)}")
-        if self.polarization not in ("V", "H"):
-            raise ConfigError(f"antennas.polarization: '{self.polarization}' received; give 'V' or 'H'")
-        if self.rx_polarization not in ("", "V", "H"):
-            raise ConfigError(f"antennas.rx_polarization: '{self.rx_polarization}' received; give 'V' or 'H'")
+        check_ranges("antennas", self)
 
     @property
     def of_tx(self) -> tuple[str, str]:
@@ -69,20 +64,15 @@ class RxArray:
     A planar array cannot tell a direction from its mirror image in the array's plane; the blind side settles that.
     """
 
-    rows: int = 4
-    cols: int = 4
-    spacing: float = 0.5
+    rows: Count = 4
+    cols: Count = 4
+    spacing: Positive = 0.5
     """Distance between neighbouring elements, in wavelengths."""
-    pattern: str = "upper"
+    pattern: Literal["upper", "isotropic"] = "upper"
     """Element pattern, `upper` or `isotropic`."""
 
     def __post_init__(self) -> None:
-        if self.rows < 1 or self.cols < 1:
-            raise ConfigError(f"array.rows, array.cols: {self.rows} x {self.cols} received; give at least 1 x 1")
-        if not self.spacing > 0.0:
-            raise ConfigError(f"array.spacing: {self.spacing} received; give a positive number of wavelengths")
-        if self.pattern not in ("upper", "isotropic"):
-            raise ConfigError(f"array.pattern: '{self.pattern}' received; give 'upper' or 'isotropic'")
+        check_ranges("array", self)
 
     @property
     def num_antennas(self) -> int:
@@ -107,27 +97,24 @@ class RadioConfig:
     """Parameters of the agent's radio: carrier, bandwidth, gains, signal energy, noise and receive array. SI units;
     gains and ratios are linear."""
 
-    carrier: float = 10e9
+    carrier: Positive = 10e9
     """Carrier frequency [Hz]."""
-    bandwidth: float = 1e9
+    bandwidth: Positive = 1e9
     """Bandwidth of the flat band [Hz]."""
-    tx_gain: float = 1.0
+    tx_gain: Positive = 1.0
     """Power gain of the Tx antenna, the same in all directions; times the pattern in `antennas`."""
-    rx_gain: float = 1.0
+    rx_gain: Positive = 1.0
     """Power gain of the Rx antenna, the same in all directions; times the pattern in `antennas`."""
-    energy: float = 1.0
+    energy: Positive = 1.0
     """E: energy of one sounding signal [J]."""
-    noise_psd: float = 3.52e-11
+    noise_psd: Positive = 3.52e-11
     """N0: noise power spectral density [W/Hz]; by default the paper's sphere, 3 m away, has 13 dB over 16 antennas."""
     array: RxArray = field(default_factory=RxArray)
     antennas: Antennas = field(default_factory=Antennas)
     """Pattern and polarisation of Tx and Rx; isotropic and vertical by default."""
 
     def __post_init__(self) -> None:
-        for name in ("carrier", "bandwidth", "tx_gain", "rx_gain", "energy", "noise_psd"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ConfigError(f"radio.{name}: {value} received; give a positive number")
+        check_ranges("radio", self)
         if self.bandwidth >= 2.0 * self.carrier:
             raise ConfigError(f"radio.bandwidth: {self.bandwidth:g} Hz received; keep it below twice the carrier")
 

@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
+from annotated_types import Ge
 
 from rislam_rt.arrays import Complexes, Floats, cross, freeze
 from rislam_rt.errors import ConfigError, SceneError
+from rislam_rt.ranges import Count, Share, check_ranges
+
+ElementPattern = Literal["tang", "energy"]
+"""Pattern of a RIS panel's elements: the paper's, or that of a perfect plate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,33 +23,25 @@ class RisSpec:
     `center + (n - (N-1)/2) spacing[1] up + (m - (M-1)/2) spacing[0] right`.
     """
 
-    rows: int
-    cols: int
+    rows: Count
+    cols: Count
     spacing: Floats
     """(2,) [m] distances between columns and between rows."""
     normal: Floats
     """(3,) unit vector out of the panel's front."""
     up: Floats
     """(3,) unit vector along a column, at right angles to `normal`."""
-    levels: int = 4
+    levels: Annotated[int, Ge(2)] = 4
     """H: number of phase levels, 2 pi / H apart."""
-    element: str = "tang"
-    """Element pattern: `tang` or `energy`."""
-    amplitude: float = 1.0
+    element: ElementPattern = "tang"
+    amplitude: Share = 1.0
     """A: reflection coefficient of an element."""
 
     def __post_init__(self) -> None:
         freeze(self, np.float64, spacing=(2,), normal=(3,), up=(3,))
-        if self.rows < 1 or self.cols < 1:
-            raise SceneError(f"ris.rows, ris.cols: {self.rows} x {self.cols} received; give at least 1 x 1")
+        check_ranges("ris", self, SceneError)
         if not (self.spacing > 0.0).all():
             raise SceneError(f"ris.spacing_m: {self.spacing.tolist()} received; give two positive lengths")
-        if self.levels < 2:
-            raise SceneError(f"ris.levels: {self.levels} received; give at least 2")
-        if self.element not in ("tang", "energy"):
-            raise SceneError(f"ris.element: '{self.element}' received; give 'tang' or 'energy'")
-        if not 0.0 < self.amplitude <= 1.0:
-            raise SceneError(f"ris.amplitude: {self.amplitude} received; give a number in (0, 1]")
         if abs(np.linalg.norm(self.normal) - 1.0) > 1e-9 or abs(np.linalg.norm(self.up) - 1.0) > 1e-9:
             raise SceneError("ris.normal, ris.up: unit vectors needed")
         if abs(self.normal @ self.up) > 1e-9:

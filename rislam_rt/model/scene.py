@@ -1,15 +1,19 @@
 """A scene: reflecting meshes, occluders, point scatterers, RIS panels, and the agent's true motion."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge, Le, Lt
 
 from rislam_rt.arrays import Floats, freeze, show_point
 from rislam_rt.errors import SceneError
 from rislam_rt.model.plan_view import PlanView, html_with, outline
 from rislam_rt.model.ris import RisPanel, RisPanels
 from rislam_rt.model.trajectory import Trajectory
+from rislam_rt.ranges import NotNegative, Positive, Share, check_ranges
+
+Reflection = Annotated[float, Ge(-1.0), Le(1.0)]
 
 BODY_THICKNESS, BODY_LOSS, BODY_LEAST = 10.0, 0.1, 2e-3
 """Dielectric body that stands for a constant reflection coefficient R: its thickness [m]; the conductivity [S/m] that,
@@ -21,22 +25,22 @@ class Material:
     """Radio material of a reflector, one of four kinds: a reflection coefficient for every angle, one for each
     polarisation, a slab of an ITU-R P.2040 material, or a slab of a given permittivity and conductivity."""
 
-    reflection: float | None = None
+    reflection: Share | None = None
     """Reflection coefficient R in (0, 1] of the amplitude, the same for every angle and polarisation."""
     itu: str | None = None
     """Name in ITU-R P.2040, e.g. `concrete`."""
-    thickness: float = 0.1
+    thickness: Positive = 0.1
     """Thickness [m] of the slab; unused with a constant R."""
-    permittivity: float | None = None
+    permittivity: Annotated[float, Ge(1.0)] | None = None
     """Real part of the relative permittivity, at least 1, the same at every carrier."""
-    conductivity: float = 0.0
+    conductivity: NotNegative = 0.0
     """Conductivity [S/m] of the slab that `permittivity` describes."""
-    reflection_te: float | None = None
+    reflection_te: Reflection | None = None
     """Reflection coefficient in [-1, 1] of the field across the plane of incidence (TE), the same at every angle."""
-    reflection_tm: float | None = None
+    reflection_tm: Reflection | None = None
     """Reflection coefficient in [-1, 1] of the field in the plane of incidence (TM); signs as Fresnel's: of a dense
     dielectric near normal incidence, TE is negative and TM positive."""
-    scattering: float = 0.0
+    scattering: Annotated[float, Ge(0.0), Lt(1.0)] = 0.0
     """Scattering coefficient S in [0, 1): share of the reflected field that the surface scatters in all directions; the
     mirrored ray keeps `sqrt(1 - S^2)` of its field."""
 
@@ -45,24 +49,13 @@ class Material:
             raise SceneError("material: give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
         if (self.reflection_te is None) != (self.reflection_tm is None):
             raise SceneError("material: give 'reflection_te' and 'reflection_tm' together")
-        for name in ("reflection_te", "reflection_tm"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < abs(value) <= 1.0:
-                raise SceneError(f"material.{name}: {value} received; give a number in [-1, 1], and not 0")
-        if self.reflection is not None and not 0.0 < self.reflection <= 1.0:
-            raise SceneError(f"material.reflection: {self.reflection} received; give a number in (0, 1]")
-        if not self.thickness > 0.0:
-            raise SceneError(f"material.thickness_m: {self.thickness} received; give a positive length")
-        if self.permittivity is not None and not 1.0 <= self.permittivity < np.inf:
-            raise SceneError(f"material.permittivity: {self.permittivity} received; give a number of at least 1")
+        check_ranges("material", self, SceneError)
+        if 0.0 in (self.reflection_te, self.reflection_tm):
+            raise SceneError("material.reflection_te, reflection_tm: 0 received; give a number in [-1, 1], and not 0")
         if self.permittivity == 1.0 and self.conductivity == 0.0:
             raise SceneError("material.permittivity: 1 without conductivity is air; give more of either, or no mesh")
-        if not 0.0 <= self.conductivity < np.inf or (self.conductivity > 0.0 and self.permittivity is None):
-            raise SceneError(
-                f"material.conductivity_s_m: {self.conductivity} received; give 0 or more, and 'permittivity' beside it"
-            )
-        if not 0.0 <= self.scattering < 1.0:
-            raise SceneError(f"material.scattering: {self.scattering} received; give a number in [0, 1)")
+        if self.conductivity > 0.0 and self.permittivity is None:
+            raise SceneError(f"material.conductivity: {self.conductivity} received; give 'permittivity' beside it")
 
     @property
     def is_slab(self) -> bool:

@@ -91,12 +91,10 @@ def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> 
 
 def _lost(scores: Mapping[str, Any]) -> Iterator[str]:
     """Conclusions on the loss of one scheme: when and why its filter held itself for lost, and what it did not hear."""
-    lost, outcomes = scores.get("lost"), scores["outcomes"]
+    lost, outcomes = scores["lost"], scores["outcomes"]
     silent = outcomes.get(StepOutcome.NO_MEASUREMENTS, 0)
     if silent:
         yield f"nothing was heard in {silent} of {sum(outcomes.values())} cycles"
-    if lost is None:  # of an earlier version
-        return
     if lost["times"]:
         often = "once, after" if lost["times"] == 1 else f"{lost['times']} times, first after"
         yield f"held itself for lost {often} {lost['first_s']:.1f} s: {words_of_loss(lost)}"

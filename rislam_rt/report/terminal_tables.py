@@ -57,9 +57,8 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         ["diverged", *("yes" if s["diverged"] else "no" for s in schemes)],
         ["held itself for lost", *(_said(s["outcomes"]) for s in schemes)],
     ]
-    lost = [s.get("lost", {"times": 0}) for s in schemes]
-    if any(one["times"] for one in lost):
-        rows.append(["because", *(words_of_loss(one) if one["times"] else "-" for one in lost)])
+    if any(s["lost"]["times"] for s in schemes):
+        rows.append(["because", *(words_of_loss(s["lost"]) if s["lost"]["times"] else "-" for s in schemes)])
     return rows
 
 

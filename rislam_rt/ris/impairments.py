@@ -8,6 +8,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 from rislam_rt.errors import ConfigError
 from rislam_rt.model.ris import DataSheet, RisCode
+from rislam_rt.ranges import NotNegative, Probability, check_ranges
 
 FREE = -1
 """Level of an element that is not stuck."""
@@ -17,22 +18,17 @@ FREE = -1
 class PanelTolerance:
     """Tolerances of a RIS panel's elements; all zero: a perfect panel."""
 
-    amplitude_std: float = 0.0
+    amplitude_std: NotNegative = 0.0
     """Standard deviation of an element's amplitude about that of the data sheet, relative; at least 0 remains."""
-    phase_std: float = 0.0
+    phase_std: NotNegative = 0.0
     """Standard deviation [rad] of an element's own phase offset (normal)."""
-    dead: float = 0.0
+    dead: Probability = 0.0
     """Probability that an element reflects nothing."""
-    stuck: float = 0.0
+    stuck: Probability = 0.0
     """Probability that an element stays at a level of its own, whatever the code."""
 
     def __post_init__(self) -> None:
-        for name in ("amplitude_std", "phase_std"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"panel.{name}: {value} received; give a number of 0 or more")
-        for name in ("dead", "stuck"):
-            _check_probability(f"panel.{name}", getattr(self, name))
+        check_ranges("panel", self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,15 +85,10 @@ def flip_bits(code: RisCode, probability: float, *, rng: np.random.Generator) ->
     ConfigError
         H is not a power of two, or the probability is outside [0, 1].
     """
-    _check_probability("panel.bit_flip", probability)
+    if not 0.0 <= probability <= 1.0:
+        raise ConfigError(f"panel.bit_flip: {probability} received; give a probability from 0 to 1")
     bits = int(code.levels).bit_length() - 1
     if code.levels != 1 << bits:
         raise ConfigError(f"ris.levels: {code.levels} received; bit errors need a power of two")
     flipped: Integers = (rng.random((*code.index.shape, bits)) < probability) @ (1 << np.arange(bits))
     return RisCode(code.index ^ flipped, code.levels)
-
-
-def _check_probability(name: str, value: float) -> None:
-    """Raise `ConfigError` unless the probability of an impairment lies in [0, 1]."""
-    if not 0.0 <= value <= 1.0:
-        raise ConfigError(f"{name}: {value} received; give a probability from 0 to 1")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rislam_rt.arrays import Floats, freeze
-from rislam_rt.errors import ConfigError
+from rislam_rt.ranges import NotNegative, check_ranges
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -18,15 +18,13 @@ class StartPrior:
     """Mean (3,) [m/s] of the velocity."""
     heading: float
     """Mean [rad] of the heading."""
-    position_std: float = 0.01
+    position_std: NotNegative = 0.01
     """Standard deviation [m] of the position along each axis; the height is exact when it is known."""
-    velocity_std: float = 0.01
+    velocity_std: NotNegative = 0.01
     """Standard deviation [m/s] of the velocity along each axis."""
-    heading_std: float = 0.0
+    heading_std: NotNegative = 0.0
     """Standard deviation [rad] of the heading, where it is estimated."""
 
     def __post_init__(self) -> None:
         freeze(self, np.float64, position=(3,), velocity=(3,))
-        for name in ("position_std", "velocity_std", "heading_std"):
-            if not getattr(self, name) >= 0.0:
-                raise ConfigError(f"start.{name}: {getattr(self, name)} received; give a number that is not negative")
+        check_ranges("start", self)

@@ -11,6 +11,7 @@ from rislam_rt.design import DesignProblem, GainCurves, direct_only, gain_curves
 from rislam_rt.design.gain_curves import GainInterval
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Paths, RadioConfig, RisPanel, Scatterer, Scene, Trajectory
+from rislam_rt.model.ris import ElementPattern
 from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.specification.pipeline_spec import build_design
 from rislam_rt.pipeline.specification.radio import build_radio
@@ -108,7 +109,7 @@ def walk_to_panel(scene: Scene, places: int, closest: float) -> Trajectory:
 
 
 def place_problems(
-    scene: Scene, motion: Trajectory, radio: RadioConfig, element: str, channel: str
+    scene: Scene, motion: Trajectory, radio: RadioConfig, element: ElementPattern, channel: str
 ) -> list[DesignProblem]:
     """Code design problem of the direct panel path at every place of Fig. 4(a), for one element pattern."""
     panel = lone_panel(scene)

@@ -1,14 +1,19 @@
 """Labels over birth, death, gaps and crossings, on motions made by hand."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.errors import ConfigError
-from rislam_rt.measurement import TrackingConfig, init_tracks, step_tracks
+from rislam_rt.measurement import init_tracks, step_tracks
+from rislam_rt.measurement.tracking import CONFIRM_HITS, MAX_MISSES
 from rislam_rt.model import Measurement
 
-CONFIG = TrackingConfig()
+
+class Labels(NamedTuple):
+    label: np.ndarray
+    confirmed: np.ndarray
 
 
 def components(lengths, cosines, amplitudes, rng, std=(0.01, 0.005)):
@@ -25,12 +30,12 @@ def components(lengths, cosines, amplitudes, rng, std=(0.01, 0.005)):
     )
 
 
-def track(cycles, dt=0.1, config=CONFIG):
-    """Labels and confirmations of a list of measurements."""
+def track(cycles, dt=0.1):
+    """State after a list of measurements; of each its labels, and whether their tracks are confirmed."""
     state, out = init_tracks(), []
     for measurement in cycles:
-        state, info = step_tracks(state, measurement, dt, config)
-        out.append(info)
+        state, label = step_tracks(state, measurement, dt)
+        out.append(Labels(label, np.isin(label, state.label[state.hits >= CONFIRM_HITS])))
     return state, out
 
 
@@ -68,14 +73,13 @@ def test_death_birth_and_gaps():
             [5.0, 8.0][: 1 + present], [[0.1, 0.2], [0.4, -0.3]][: 1 + present], [1e-5, 2e-5][: 1 + present], rng
         )
 
-    short, long = CONFIG.max_misses - 1, CONFIG.max_misses + 2
+    short, long = MAX_MISSES - 1, MAX_MISSES + 2
     state, info = track([cycle(True)] * 10 + [cycle(False)] * short + [cycle(True)] * 5)
     assert info[-1].label.tolist() == info[0].label.tolist()
     state, info = track([cycle(True)] * 10 + [cycle(False)] * long + [cycle(True)] * 5)
     assert info[-1].label[0] == info[0].label[0]
     assert info[-1].label[1] > info[0].label[1]
-    assert sum(i.died for i in info) == 1
-    assert sum(i.born for i in info) == 3
+    assert state.next_label == 3
     assert len(state.label) == 2
 
 
@@ -98,8 +102,3 @@ def test_empty_cycles_are_cycles():
     )
     assert [len(i.label) for i in info] == [0, 1, 0]
     assert len(state.label) == 0
-
-
-def test_senseless_settings_are_refused():
-    with pytest.raises(ConfigError, match="length_rate"):
-        TrackingConfig(length_rate=0.0)

@@ -12,6 +12,7 @@ def _scheme(**walls):
         "rmse_m": 0.02, "rmse_aligned_m": 0.004, "bound_m": 0.01, "landmarks": {}, "walls": walls,
         "map": {"gospa_m": 0.1},
         "association": {"precision": 0.9, "recall": 0.4}, "over_budget": [], "diverged": False, "outcomes": {"ok": 10},
+        "lost": {"times": 0, "first_s": None, "causes": {}},
     }  # fmt: skip
 
 

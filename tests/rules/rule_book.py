@@ -19,6 +19,7 @@ FLOORS = {
         "arrays",
         "tracer_backend",
         "input_messages",
+        "ranges",
         "progress",
         "shipped",
         "toml",

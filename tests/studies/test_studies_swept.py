@@ -154,6 +154,16 @@ def test_gain_and_difference_of_known_numbers():
     assert spread(ours).value == pytest.approx(root)
 
 
+def test_paired_seeds_share_their_luck():
+    rng = np.random.default_rng(5)
+    luck = rng.lognormal(0.0, 0.8, 30)
+    good, bad = luck * rng.normal(0.6, 0.02, 30), luck * rng.normal(1.0, 0.02, 30)
+    paired = paired_gain(good, bad)
+    assert paired.lower < 0.4 < paired.upper or paired.value == pytest.approx(0.4, abs=0.03)
+    broken = paired_gain(good, np.roll(bad, 7))
+    assert paired.upper - paired.lower < 0.2 * (broken.upper - broken.lower)
+
+
 def test_from_the_file_to_the_page_and_on_again(tmp_path, monkeypatch, capsys):
     """Two cells in workers of their own; the second call finds them and writes the same page."""
     from rislam_rt.cli import main

@@ -14,9 +14,9 @@ from rislam_rt.arrays import Complexes, Floats, Integers, freeze
 from rislam_rt.channel.traced.float32_limits import room_center
 from rislam_rt.channel.traced.tracer_startup import start_tracer
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z, unit
 from rislam_rt.model import PathKind, Paths, RadioConfig, Scene, Trajectory
+from rislam_rt.ranges import Count, Probability, check_ranges
 
 
 class DiffuseKind(IntEnum):
@@ -30,25 +30,21 @@ class DiffuseKind(IntEnum):
 class DiffuseConfig:
     """Settings of diffuse scattering and diffraction in the tracer, all off by default."""
 
-    scattering: float = 0.0
+    scattering: Probability = 0.0
     """S in [0, 1]: share of the reflected field that walls scatter (Lambertian) whose material says nothing of it; 0 is
     off. What they reflect specularly would lose `sqrt(1 - S^2)` at every bounce, which `Paths` of the same walls do not
     know; of a material's own `scattering` they do."""
     diffraction: bool = False
     """Edges between walls, and free ones, diffract (uniform theory of diffraction, first order)."""
-    depth: int = 1
+    depth: Count = 1
     """Largest number of interactions."""
-    samples: int = 10_000
+    samples: Count = 10_000
     """Rays shot from every Tx position; each may end in a scattered path."""
     seed: int = 1
     """Seed of the rays' directions."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.scattering <= 1.0:
-            raise ConfigError(f"extras.scattering: {self.scattering} received; give a number in [0, 1]")
-        for name in ("depth", "samples"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"extras.{name}: {getattr(self, name)} received; give at least 1")
+        check_ranges("extras", self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -145,10 +145,6 @@ class Recorder:
         return found
 
 
-GONE = ("gate", "window", "birth_margin", "max_misses", "merge_distance")
-"""Settings `nested.*` of earlier versions that a replay leaves out: they do not exist any more."""
-
-
 @in_one_blas_thread
 def replay(
     inputs: Inputs, config: Mapping[str, Any], scheme: str, changes: Mapping[str, Any] | None = None,
@@ -180,7 +176,6 @@ def replay(
         )
     expect("rng", rng, np.random.Generator)
     content = dict(config)
-    content["nested"] = {name: value for name, value in content.get("nested", {}).items() if name not in GONE}
     for key, value in (changes or {}).items():
         content = put_dotted(content, key, value)
     spec = build_spec(Table(Path("settings of the replay"), content, ()), PipelineSpec, build_settings)

@@ -2,10 +2,9 @@
 
 import ast
 import inspect
-import re
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import is_dataclass, replace
+from collections.abc import Iterator
+from dataclasses import is_dataclass
 from functools import cache
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple, get_args, get_origin
@@ -18,12 +17,6 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.input_messages import did_you_mean, nearest, unit_of
 from rislam_rt.pipeline.specification.pipeline_spec import RECORDS
 from rislam_rt.pipeline.specification.section import Choices, Section
-
-LARGEST = 2.0**40
-"""Largest number tried for the end of a setting's range; a range that includes it counts as unlimited."""
-
-BISECTIONS = 120
-"""Bisections for the end of a setting's range: more than double precision can tell apart."""
 
 
 class Setting(NamedTuple):
@@ -86,10 +79,8 @@ def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -
     owner, record = _owner(model, name)
     meaning = _meanings(record or owner).get(name, "")
     default = None if field.is_required() else field.get_default(call_default_factory=True)
-    allowed = _of_constraints(field) or (_of_record(record, name) if record else "")
-    return Setting(
-        f"{prefix}{name}", default, field.is_required(), _kind(field.annotation), allowed, unit_of(name), meaning
-    )
+    kind, allowed = _kind(field.annotation), _of_constraints(field)
+    return Setting(f"{prefix}{name}", default, field.is_required(), kind, allowed, unit_of(name), meaning)
 
 
 def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
@@ -164,60 +155,6 @@ def _inner_metadata(annotation: Any) -> Iterator[Any]:
     for part in get_args(annotation):
         for item in getattr(part, "__metadata__", ()):
             yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
-
-
-def _of_record(record: type, name: str) -> str:
-    """Range of a setting in words, found by trying which values its record accepts, the others at their defaults."""
-    standard = record()
-    assert is_dataclass(standard)
-    assert not isinstance(standard, type)
-    value = getattr(standard, name)
-
-    def passes(tried: Any) -> bool:
-        try:
-            replace(standard, **{name: tried})
-        except ConfigError:
-            return False
-        return True
-
-    if isinstance(value, bool):
-        return ""
-    if isinstance(value, str):
-        try:
-            replace(standard, **{name: "?"})
-        except ConfigError as error:
-            return re.sub(r"^.*; give (one of )?", "one of ", str(error)).replace(" or ", ", ").replace("'", "")
-        return ""
-    if isinstance(value, int | float):
-        whole = isinstance(value, int)
-        return ", ".join(part for part in (_edge(passes, value, -1, whole), _edge(passes, value, 1, whole)) if part)
-    return ""
-
-
-def _edge(passes: Callable[[Any], bool], inside: float, sign: int, whole: bool) -> str:
-    """End of a listed setting's range in words, found by bisection from a valid value; empty if unlimited."""
-    outside: float = sign * (int(LARGEST) if whole else LARGEST)
-    step = 1 if whole else 1e-9
-    if passes(outside):
-        return ""
-    for landmark in (0, 1):  # most ranges end here, open or closed, and bisection would not tell which
-        beyond = [passes(landmark + sign * step * steps) for steps in (1, 2)]
-        if (landmark - inside) * sign >= 0 and not any(beyond):
-            if passes(landmark):
-                return f"{_word(sign)} {landmark}"
-            if not whole and passes(landmark - sign * step):
-                return f"{'above' if sign < 0 else 'below'} {landmark}"
-    for _ in range(BISECTIONS):
-        middle = (inside + outside) // 2 if whole else (inside + outside) / 2
-        good = passes(middle) or (whole and passes(middle - sign))  # a range may hold even numbers alone
-        inside, outside = (middle, outside) if good else (inside, middle)
-    if whole and not passes(inside):
-        inside -= sign
-    return f"{_word(sign)} {_short(inside)}"
-
-
-def _word(sign: int) -> str:
-    return "at least" if sign < 0 else "at most"
 
 
 def _short(value: float) -> str:

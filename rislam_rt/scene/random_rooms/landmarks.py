@@ -5,6 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec
+from rislam_rt.model.ris import ElementPattern
 from rislam_rt.scene.check.mesh_queries import crossings
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
 from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
@@ -26,7 +27,8 @@ ELEMENTS = (4, 16)
 """Range of a random RIS panel's elements along one side."""
 SQUARE = 0.6
 """Share of random RIS panels that are square."""
-LEVELS, PATTERNS = (2, 4, 8), ("tang", "energy")
+LEVELS = (2, 4, 8)
+PATTERNS: tuple[ElementPattern, ...] = ("tang", "energy")
 """Phase levels and element patterns of random RIS panels, each as often."""
 SPACING = 0.015
 """Distance [m] between the elements of a random RIS panel: half a wavelength at 10 GHz."""
@@ -93,7 +95,7 @@ def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec
     rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
     if rng.uniform() < SQUARE:
         cols = rows
-    levels, element = int(rng.choice(LEVELS)), str(rng.choice(PATTERNS))
+    levels, element = int(rng.choice(LEVELS)), PATTERNS[rng.choice(len(PATTERNS))]
     return RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers, join_rows
 from rislam_rt.channel.doppler import doppler_shift
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.measurement import ReceiverConfig, TrackingConfig, init_tracks, measure, step_tracks
+from rislam_rt.measurement import ReceiverConfig, init_tracks, measure, step_tracks
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 from rislam_rt.slam.classify import FEATURES, Sightings, track_features
 
@@ -66,22 +66,22 @@ def gather_walk(
     """
     believed = motion.position + np.outer(motion.time, rng.standard_normal(3) * [VELOCITY_STD, VELOCITY_STD, 0.0])
     baseline = float(np.linalg.norm(motion.body.tx_offset - motion.body.rx_offset))
-    state, config, memory = init_tracks(), TrackingConfig(), _TrackHistory()
+    state, memory = init_tracks(), _TrackHistory()
     shift, found = doppler_shift(paths, motion, radio.wavelength), []
     for cycle in range(len(motion)):
         heard = measure(paths, cycle, float(motion.heading[cycle]), radio, receiver, None, shift[cycle], rng=rng)
         measurement, truth = heard
         dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
-        state, info = step_tracks(state, measurement, dt, config)
+        state, label = step_tracks(state, measurement, dt)
         length = SPEED_OF_LIGHT * measurement.tau
         std = np.column_stack([SPEED_OF_LIGHT * measurement.tau_std, measurement.cosines_std])
         rows = np.column_stack([length, measurement.cosines, std, np.log(measurement.amplitude)])
-        memory.add(info.label, rows, cycle)
+        memory.add(label, rows, cycle)
         far = length > baseline + LOS_MARGIN + 3.0 * np.minimum(std[:, 0], LOS_MARGIN)
         memory.forget(state.label)
         if cycle % stride == stride - 1 and len(length):
             # a cycle's walk through the window starts at a random phase, so that every age occurs
-            sightings = memory.sightings(info.label[far], cycle, believed, motion.heading)
+            sightings = memory.sightings(label[far], cycle, believed, motion.heading)
             features, age = np.zeros((len(length), len(FEATURES))), np.zeros(len(length), dtype=np.int64)
             if far.any():
                 features[far], age[far] = track_features(sightings, motion.body, radio), sightings.held.sum(axis=1)
@@ -89,7 +89,7 @@ def gather_walk(
             walk, policy = (np.full(len(length), number) for number in name)
             kind, legs = _classes(paths, truth.path)
             ratio = measurement.amplitude * spread  # a false component may have no length
-            found.append(Examples(features, kind, legs, age, ratio, walk, policy, info.label, ~far))
+            found.append(Examples(features, kind, legs, age, ratio, walk, policy, label, ~far))
     return join_rows(found)
 
 

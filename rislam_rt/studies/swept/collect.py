@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.evaluate import Interval, bootstrap, bootstrap_ratio, rms_over_runs
+from rislam_rt.evaluate import Interval, bootstrap, rms_over_runs
+from rislam_rt.evaluate.confidence_intervals import Statistic
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.sweeps import Row
 from rislam_rt.sweeps.store import DONE, MISSING, rows_by_point
@@ -91,11 +92,12 @@ def paired_gain(ours: Floats, theirs: Floats) -> Interval | None:
 
     None for fewer than two seeds.
     """
-    pairs = _pairs(ours, theirs)
-    if len(pairs) < 2:
-        return None
-    value, low, high = bootstrap_ratio(pairs[:, 0], pairs[:, 1], rng=np.random.default_rng(0), level=LEVEL)
-    return Interval(1.0 - value, 1.0 - high, 1.0 - low)
+
+    def ratio(samples: Floats) -> Floats:
+        return rms_over_runs(samples[..., 0]) / rms_over_runs(samples[..., 1])
+
+    found = _paired(ours, theirs, ratio)
+    return Interval(1.0 - found.value, 1.0 - found.upper, 1.0 - found.lower) if found else None
 
 
 def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
@@ -105,14 +107,17 @@ def paired_difference(ours: Floats, theirs: Floats) -> Interval | None:
         root = rms_over_runs(samples)
         return np.asarray(root[..., 1] - root[..., 0])
 
-    pairs = _pairs(ours, theirs)
-    return None if len(pairs) < 2 else bootstrap(pairs, rng=np.random.default_rng(0), statistic=difference, level=LEVEL)
+    return _paired(ours, theirs, difference)
 
 
-def _pairs(ours: Floats, theirs: Floats) -> Floats:
-    """Pairs (S, 2) of the collected values of those seeds that both have."""
+def _paired(ours: Floats, theirs: Floats, statistic: Statistic) -> Interval | None:
+    """Statistic of collected pairs (S, 2), of those seeds that both have, with its interval; None of fewer than two.
+
+    Seeds are drawn in pairs, so that what both schemes share (room, noise) does not widen the interval.
+    """
     pairs = np.stack([ours, theirs], axis=-1)
-    return pairs[~np.isnan(pairs).any(axis=1)]
+    pairs = pairs[~np.isnan(pairs).any(axis=1)]
+    return None if len(pairs) < 2 else bootstrap(pairs, rng=np.random.default_rng(0), statistic=statistic, level=LEVEL)
 
 
 def _look(result: Mapping[str, Any] | None, scheme: str, name: Sequence[str]) -> float:

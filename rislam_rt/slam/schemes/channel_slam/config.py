@@ -1,10 +1,11 @@
 """Configuration of Channel-SLAM by delays alone."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
+from annotated_types import Ge
 
-from rislam_rt.slam.input_checks import check_counts, check_inside
+from rislam_rt.ranges import Chance, Count, Positive, check_ranges
 from rislam_rt.slam.schemes.shared.delay_config import DelayConfig
 from rislam_rt.slam.schemes.shared.ranges import Odds
 
@@ -13,31 +14,25 @@ from rislam_rt.slam.schemes.shared.ranges import Odds
 class ChannelSlamConfig(DelayConfig):
     """Settings of Channel-SLAM, whose features are virtual transmitters: model and effort. SI units."""
 
-    max_paths: int = 32
+    max_paths: Count = 32
     """Largest number of virtual transmitters at a time; the paths that were confirmed first have them."""
-    outlier_probability: float = 0.01
+    outlier_probability: Chance = 0.01
     """Probability that a tracked range has nothing to do with its virtual transmitter, as after a swap of labels."""
-    gate: float = 9.0
+    gate: Positive = 9.0
     """Largest squared normalised innovation of a range that still continues a track (chi^2, 1 dof: 0.997)."""
-    range_acceleration: float = 0.03
+    range_acceleration: Positive = 0.03
     """Standard deviation of the drift of a track's range rate [m/s^2]."""
-    confirm_hits: int = 5
+    confirm_hits: Count = 5
     """Number of ranges that a track needs before a virtual transmitter is born of it."""
-    max_misses: int = 5
+    max_misses: Annotated[int, Ge(0)] = 5
     """Number of cycles without a range after which a track, and its virtual transmitter, is given up."""
-    strain_limit: float = 4.0
+    strain_limit: Positive = 4.0
     """Running mean of a path's squared normalised innovation above which its virtual transmitter starts anew."""
-    shown_std: float = 0.5
+    shown_std: Positive = 0.5
     """Standard deviation [m] below which a virtual transmitter is shown on the map."""
 
     def __post_init__(self) -> None:
-        name = "channel_slam"
-        self.check(name)
-        check_counts(name, self, ("max_paths", "confirm_hits"))
-        check_counts(name, self, ("max_misses",), 0)
-        positive = ("gate", "range_acceleration", "strain_limit", "shown_std")
-        check_inside(name, self, positive, np.inf, "a positive number")
-        check_inside(name, self, ("outlier_probability",), 1.0, "a number in (0, 1)")
+        check_ranges("channel_slam", self)
 
     @property
     def odds(self) -> Odds:

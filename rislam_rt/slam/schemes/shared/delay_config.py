@@ -1,54 +1,44 @@
 """Configuration that all filters by delay alone share."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge, Lt
 
 from rislam_rt.arrays import Floats
-from rislam_rt.errors import ConfigError
-from rislam_rt.slam.input_checks import check_counts, check_inside, check_named, check_not_negative
+from rislam_rt.ranges import Chance, Count, NotNegative, Positive
 
 
 @dataclass(frozen=True, slots=True)
 class DelayConfig:
     """Settings of the agent, the features and their ranges in the rival filters by delay alone. SI units."""
 
-    sigma_a: float = 0.01
+    sigma_a: Positive = 0.01
     """Standard deviation of the white acceleration [m/s^2]."""
-    height: str = "known"
+    height: Literal["known", "estimated"] = "known"
     """`known` keeps the height and the vertical velocity of the start, `estimated` filters them."""
-    specular_ratio: float | None = 0.35
+    specular_ratio: Positive | None = 0.35
     """Amplitude over that of free space of the same length, above which a component is a wall return; None: there are
     none."""
     planes: bool = True
     """Whether wall returns are features (images of the Tx, that move with it), or set aside."""
-    smallest_std: float = 0.003
+    smallest_std: Positive = 0.003
     """Smallest standard deviation of a range that is believed [m]."""
-    birth_turns: int = 6
+    birth_turns: Count = 6
     """Number of Gaussians of a new feature over its angle about the direction of motion, from horizon to horizon."""
-    wanderers: float = 0.5
+    wanderers: Annotated[float, Ge(0.0), Lt(1.0)] = 0.5
     """Probability that a new weak feature is no static point but one that wanders."""
-    drift_length_std: float = 0.003
+    drift_length_std: NotNegative = 0.003
     """Random walk [m] of a wandering feature's distance in one step."""
-    drift_angle_std: float = 0.01
+    drift_angle_std: NotNegative = 0.01
     """Random walk, in one step, of the cosine of a wandering feature's angle off the direction of motion."""
-    share_threshold: float = 1e-3
+    share_threshold: Chance = 1e-3
     """Share below which a Gaussian of a feature is dropped."""
-    course_stride: int = 40
+    course_stride: Count = 40
     """Number of cycles from one past state of the agent that is kept to the next."""
-    num_samples: int = 32
+    num_samples: Count = 32
     """Number of equally likely positions handed to the phase design."""
-
-    def check(self, name: str) -> None:
-        """Check the settings that filters by delay alone share, of the section `name`; ConfigError for a bad one."""
-        check_counts(name, self, ("birth_turns", "course_stride", "num_samples"))
-        check_inside(name, self, ("sigma_a", "smallest_std"), np.inf, "a positive number")
-        check_inside(name, self, ("specular_ratio",), np.inf, "a positive number, or none")
-        check_inside(name, self, ("share_threshold",), 1.0, "a number in (0, 1)")
-        check_not_negative(name, self, ("drift_length_std", "drift_angle_std"))
-        check_named(name, self, {"height": ("known", "estimated")})
-        if not 0.0 <= self.wanderers < 1.0:
-            raise ConfigError(f"{name}.wanderers: {self.wanderers} received; give a share below 1")
 
     @property
     def axes(self) -> Floats:
