@@ -36,7 +36,7 @@ PROBABILITIES = ("rare", "cleared", "shown", "square", "upright", "born", "compa
 LOGARITHMS = ("DISMISSAL", "FAR_STRONGER")
 """Numbers that are logarithms: what they are the logarithm of is halved and doubled."""
 LABELS = (
-    "TX", "NONE", "UNTOLD", "OTHER", "PANEL", "UNUSED", "REMOVED", "NEW", "KNOWN", "OVER", "UNKNOWN", "UP", "VERTICAL",
+    "TX", "NONE", "UNTOLD", "OTHER", "PANEL", "UNUSED", "REMOVED", "NEW", "KNOWN", "OVER", "UNKNOWN", "UP",
     "TURN", "HEAD", "POSE", "ONE", "TWO", "FIRST", "COLUMNS", "AXES", "DIAGONAL", "DIGITS", "WALL",
     "KNOWN_WALL", "WALL_KNOWN", "POINT", "OVER_RX", "OVER_TX", "OVER_SAME", "TWO_WALLS", "BESIDE", "IMAGE",
     "TX_IMAGE", "BOTH_LEGS", "THEN_WALL", "WALL_THEN", "OTHER_LEG", "IS_WALL", "IS_IMAGE", "IS_FAR",

@@ -30,40 +30,32 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     trail = np.einsum("n,knj->kj", belief.weight, belief.trail)
     trail[:, 3] -= heading
     mean[6] -= heading[-1]
-    turns, key = config.heading != "known", _straight(step)
+    turns, straight = config.heading != "known", np.zeros(len(step))
     std = np.append(np.where(config.axes > 0.0, config.sigma_a, STILL), max(config.turn_std, STILL) * 10.0)[: 3 + turns]
-    head, accel = _motion(key, trail, mean, std, turns)
+    head, accel = _motion(step, trail, mean, std, turns)
     size, count, slim = len(mean), len(heading), POSE + len(mean) - HEAD
     back = np.eye(size)
-    back[:HEAD, :HEAD] = np.linalg.inv(last_pose_matrix(*key, turns)[:, :HEAD])
+    back[:HEAD, :HEAD] = np.linalg.inv(last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[:, :HEAD])
     whole = np.zeros((size + accel.size,) * 2)
     whole[:size, :size] = back @ covariance @ back.T
     prior = Quadratic(inverse(whole[:size, :size] + ROUNDING * np.eye(size)), np.zeros(size), head)
     slots = Quadratic(np.zeros((count, slim, slim)), np.zeros((count, slim)), np.zeros((count, slim)))
     precision = np.tile(std**-2.0, (count - 1, 1))
-    none, straight = np.zeros(accel.shape), np.zeros(len(step))
+    none = np.zeros(accel.shape)
     return Window(
-        head, accel, precision, precision, none, precision[:, 2], step, straight, straight, prior,
+        head, accel, precision, precision, none, precision[:, 2], step, straight, prior,
         np.zeros((size, size)), slots, whole, no_holds(),
     )  # fmt: skip
 
 
-def _straight(step: Floats) -> tuple[bytes, bytes, bytes]:
-    """Times (K - 1,) [s] of a window's steps, over which no velocity turns, along the room's axes (see
-    `window_gaussian.Window.design_key`)."""
-    return step.tobytes(), bytes(step.nbytes), bytes(step.nbytes)
-
-
-def _motion(
-    key: tuple[bytes, bytes, bytes], trail: Floats, mean: Floats, std: Floats, turns: bool
-) -> tuple[Floats, Floats]:
+def _motion(step: Floats, trail: Floats, mean: Floats, std: Floats, turns: bool) -> tuple[Floats, Floats]:
     """Gaussian view's smoothest motion along the particles' trail (K, 4) to now: window head (7 + 3F,), accelerations
     (K - 1, A)."""
     count, free, head = len(trail), len(std), mean.copy()
-    known = HEAD if free > TURN else HEAD - 1
+    straight, known = np.zeros(count - 1), HEAD if free > TURN else HEAD - 1
     weight = np.append(np.full(count - 1, 1.0 / FOLLOWED), 1.0 / MET)
-    design = weight[:, None, None] * pose_matrix(*key, turns)
-    speed = last_pose_matrix(*key, turns)[3:6] / MET
+    design = weight[:, None, None] * pose_matrix(step.tobytes(), straight.tobytes(), turns)
+    speed = last_pose_matrix(step.tobytes(), straight.tobytes(), turns)[3:6] / MET
     calm = np.eye(design.shape[2])[HEAD:] / np.tile(std, count - 1)[:, None]
     rows = np.concatenate([design.reshape(-1, design.shape[2]), speed, calm])
     values = np.concatenate([(weight[:, None] * trail[:, :free]).ravel(), mean[3:6] / MET, np.zeros(len(calm))])

@@ -28,7 +28,7 @@ from rislam_rt.slam.window.motion.motion_learning import log_manoeuvre
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
-from rislam_rt.slam.window.smoother.motion_basis import TURN, rotation
+from rislam_rt.slam.window.smoother.motion_basis import rotation
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -237,8 +237,8 @@ def _follow(
     reach = np.maximum(observed.seen[spare, 0], 0.5)
     # tracks are witnesses of the motion: none is presumed to know the one that is believed in
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * np.hypot(speed, CONSTANTS.walk)
-    if len(state.level) > TURN:  # what turns without a compass turns all that it sees
-        rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[TURN]))
+    if len(state.level) > 2:  # what turns without a compass turns all that it sees
+        rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
     found, fresh = tracks.start(found, observed, spare, rate, state.cycle)
     base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()

@@ -58,7 +58,7 @@ def init(
     return WindowState(
         0, config, window, empty_table(scene.num_panels), empty_log(), tracks.no_tracks(scene.num_panels),
         no_observations(),
-        motion_mode, motion.by_axis(motion_mode), True, True, float(scipy.special.logit(CONSTANTS.stay)),
+        motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
         attitude.first_levels(compass=not turns),
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
@@ -130,13 +130,11 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
     if state.config.motion == "told":
-        window = window_gaussian.extend(
-            window, dt, motion_learning.assumed_precision(state.config, dt, window.turns), facing=heading
-        )
+        window = window_gaussian.extend(window, dt, motion_learning.assumed_precision(state.config, dt, window.turns))
     else:
         precision = motion_learning.precisions(level)
         velocity_turn = coordinated_turn.velocity_turn(state, turn)
-        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level), velocity_turn, heading)
+        window = window_gaussian.extend(window, dt, precision, motion_learning.variances(level), velocity_turn)
     return state._replace(
         window=window, motion_mode=motion_mode, heading=np.append(headings, heading), passed=passed,
         coordinated_log_odds=odds,

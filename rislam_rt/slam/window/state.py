@@ -38,7 +38,7 @@ class WindowState(NamedTuple):
     """(2, L) probabilities of the motion modes in the step before the window's first, horizontal and vertical; (3, L)
     with the rate of turn, where the heading is not known."""
     level: Floats
-    """(A, L) filtered probabilities of the motion modes in the last step, for each axis."""
+    """(2, L) or (3, L) filtered probabilities of the motion modes in the last step."""
     is_level: bool
     """Whether the floor is held for level, on which the height does not change."""
     is_coordinated: bool

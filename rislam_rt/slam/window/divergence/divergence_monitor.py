@@ -113,8 +113,8 @@ def shifted(window: Window, by: Floats) -> Window:
     accel, dt = window.accel.copy(), window.step[-2:]
     # what one step gives to the velocity the next one takes back
     size = dt[0] * (0.5 * dt[0] + dt[1]) - 0.5 * dt[0] * dt[1]
-    accel[-2, :3] += rotation(-window.facing[-2]) @ by / size
-    accel[-1, :3] -= rotation(window.velocity_turn[-1] - window.facing[-1]) @ by / size * dt[0] / dt[1]
+    accel[-2, :3] += by / size
+    accel[-1, :3] -= rotation(window.velocity_turn[-1]) @ by / size * dt[0] / dt[1]
     return window._replace(accel=accel)
 
 

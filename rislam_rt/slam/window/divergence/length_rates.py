@@ -8,6 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
@@ -123,6 +124,8 @@ class Lengths(NamedTuple):
     """(E,) as in `Rates`."""
     owner: Integers
     """(E,) track or path of each direction."""
+    odd: Floats
+    """(T,) probability that each track or path runs over an odd number of walls, or from a point."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -138,7 +141,9 @@ def lengths(heard: Heard) -> Lengths:
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
+    forms, which = unique_forms(every)
+    odd = _odd(forms)
+    rows, which, flat, spread_of, owner = log.both_ends(rows, which, spacing)
     count = np.bincount(which)
 
     def total(value: Floats) -> Floats:
@@ -161,8 +166,16 @@ def lengths(heard: Heard) -> Lengths:
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
         length - np.vecdot(toward[which], place[since] - place[-1]), toward, 2.0 * apart, count,
-        2.0 * np.sqrt(doubt), owner,
+        2.0 * np.sqrt(doubt), owner, odd,
     )  # fmt: skip
+
+
+def _odd(forms: Integers) -> Floats:
+    """Probability (T,) that paths of forms (T, 6) run over an odd number of walls, or from a point: as many do as do
+    not, unless the map explains them."""
+    walls, known = (forms[:, 1:5] >= 0).sum(axis=1), forms[:, 0] != UNKNOWN
+    told = np.where(forms[:, 0] == TX, walls % 2.0, np.where(walls == 0, 1.0, 0.5))
+    return np.where(known, told, 0.5)
 
 
 def rates(found: Lengths) -> Rates:
@@ -213,12 +226,13 @@ def _rates(
     rate, variance, whole = (each[fine] for each in fits)
     bend, bend_variance = (np.tile(each[fine], 2) for each in bends) if bends else (None, None)
     turning = float(np.hypot(*heard.baseline) * np.abs(np.diff(heard.heading)).sum()) / unit
-    owner, parallax = np.unique(found.owner[fine], return_inverse=True)[1], found.parallax[fine]
-    owner = np.tile(owner, 2)
+    paths, owner = np.unique(found.owner[fine], return_inverse=True)
+    parallax, odd, each = found.parallax[fine], found.odd[paths][owner], np.bincount(owner)[owner]
+    owner, share = np.tile(owner, 2), np.append(odd, 1.0 - odd) / np.tile(each, 2)
     moved = rate if believed is None else rate - parallax[:, :2] @ believed
     return Rates(
         np.concatenate([toward[fine], toward[fine] + parallax]), np.append(rate, moved), np.tile(variance, 2),
-        np.tile(found.blur[fine], 2), np.tile(whole, 2), 1.0 / np.bincount(owner)[owner], owner,
+        np.tile(found.blur[fine], 2), np.tile(whole, 2), share, owner,
         np.repeat([0.0, turning], len(rate)), len(rate), bend, bend_variance, believed,
     )  # fmt: skip
 

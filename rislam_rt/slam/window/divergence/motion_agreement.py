@@ -13,7 +13,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion, length_rates
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
-from rislam_rt.slam.window.smoother.motion_basis import TURN, rotation
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import STILL
 from rislam_rt.slam.window.state import WindowState
@@ -143,9 +143,7 @@ def _acceleration_covariance(window: Window, steps: int) -> Floats:
     """Covariance (3, 3) [m^2/s^4] of the mean acceleration over the window's last `steps` but one."""
     free, size = window.accel.shape[1], len(window.covariance)
     rows = slice(size - (steps + 1) * free, size - free)
-    every = window.covariance[rows, rows].reshape(steps, free, steps, free)[:, :3, :, :3]
-    along = np.stack([rotation(each) for each in window.facing[-1 - steps : -1]])
-    return np.asarray(np.einsum("iab,ibjc,jdc->ad", along, every, along) / steps**2)
+    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:3, :3])
 
 
 def _latest(window: Window) -> tuple[int, float]:

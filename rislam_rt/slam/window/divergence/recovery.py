@@ -10,7 +10,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, UP
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -50,7 +50,7 @@ def restart(state: WindowState) -> WindowState:
     `walk` beside the Gaussian."""
     window = state.window
     mean, covariance = window_gaussian.now(window)
-    lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, UP]]
+    lively = np.sqrt(motion.expected_variance(state.level))[[0, 0, 1]]
     std = np.sqrt(np.concatenate([np.full(3, 1e-10), np.diag(covariance)[3:6] + lively**2, [covariance[6, 6]]]))
     # a height known at the start is filtered from then on, unless the motion is told
     away = CONSTANTS.walk * np.array(
@@ -62,7 +62,7 @@ def restart(state: WindowState) -> WindowState:
     return state._replace(
         window=fresh, landmarks=empty_table(state.scene.num_panels)._replace(next_ident=state.landmarks.next_ident),
         log=empty_log(), tracks=tracks.no_tracks(state.scene.num_panels), visibility=no_observations(),
-        motion_mode=motion.by_group(state.level), is_level=True,
+        motion_mode=state.level, is_level=True,
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
@@ -74,7 +74,7 @@ def after_jump(state: WindowState, by: Floats) -> WindowState:
     until the next cycle."""
     passed = np.concatenate([state.passed, window_gaussian.poses(state.window)[:-1, :3]])
     return state._replace(
-        window=divergence_monitor.after_jump(state.window, by), motion_mode=motion.by_group(state.level),
+        window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level,
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], codes=state.codes[-1:],
         passed=passed, lost_log_odds=0.0,

@@ -13,7 +13,7 @@ import scipy
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.motion_basis import UP, horizontal
+from rislam_rt.slam.window.smoother.motion_basis import horizontal
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.state import WindowState
 
@@ -62,19 +62,19 @@ def _log_likelihoods(state: WindowState, turn: Floats) -> Floats:
     """Log likelihoods (2, K, L) of the motion modes in the window's first K steps, over which the body turned by `turn`
     (K,) [rad]: did the agent go where it faces, and did it not."""
     window, count = state.window, len(turn)
-    spread = window_gaussian.step_covariances(window, count)[:, :UP, :UP]
+    spread = window_gaussian.step_covariances(window, count)[:, :2, :2]
     shift = _asked_for(window, np.stack([turn, np.zeros(count)]))
-    found = motion.log_likelihood(window.accel[:count, :UP], spread, window.solved[:count, :UP], shift)
+    found = motion.log_likelihood(window.accel[:count, :2], spread, window.solved[:count, 0], shift)
     found[..., motion.is_level_only()] = -np.inf
     return found
 
 
 def _asked_for(window: Window, angle: Floats) -> Floats:
-    """Accelerations (..., K, 2) [m/s^2], along and across, beyond those of the window's first K steps that other turns
-    (..., K) [rad] of the velocity ask for, if the agent moves the same; 0 over steps that take no time."""
+    """Accelerations (..., K, 2) [m/s^2] beyond those of the window's first K steps that other turns (..., K) [rad] of
+    the velocity ask for, if the agent moves the same; 0 over steps that take no time."""
     count = angle.shape[-1]
     step, own = window.step[:count], window.velocity_turn[:count]
-    speed = np.exp(-1j * window.facing[:count]) * _velocities(window)[:count]
+    speed = _velocities(window)[:count]
     by = (np.exp(1j * own) - np.exp(1j * angle)) * speed / np.where(step > 0.0, step, np.inf)
     return np.stack([by.real, by.imag], axis=-1)
 
@@ -82,7 +82,7 @@ def _asked_for(window: Window, angle: Floats) -> Floats:
 def _velocities(window: Window) -> Complexes:
     """Horizontal velocities (K,) [m/s] of the window's poses, as complex numbers."""
     accel = window.accel[:, 0] + 1j * window.accel[:, 1]
-    speed, _ = horizontal(*window.design_key)
+    speed, _ = horizontal(window.step.tobytes(), window.velocity_turn.tobytes())
     return np.asarray(speed @ np.append(complex(*window.head[3:5]), accel))
 
 

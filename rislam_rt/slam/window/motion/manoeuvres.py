@@ -19,7 +19,6 @@ from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
-from rislam_rt.slam.window.smoother.motion_basis import UP, rotation
 from rislam_rt.slam.window.solver_limits import LASTED, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
@@ -38,7 +37,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     if told is None:
         return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps
-    lively = (state.level[[0, UP]] @ motion.transition(CONSTANTS.stay))[:, -1]
+    lively = (state.level[:2] @ motion.transition(CONSTANTS.stay))[:, -1]
     # a floor is held for level until another is held for true
     climbs = np.array([0.0, CONSTANTS.log_upright + CONSTANTS.log_born if state.is_level else 0.0])
     best, accel, steps = 0.0, np.zeros(3), 0
@@ -52,7 +51,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     # the newest pose is not measured yet: its step goes on as the ones before
     last = slice(-steps - 1, None)
     trial = solve_livelier(window, steps + 1, upwards=bool(accel[2]))
-    trial.accel[last, :3] = window.accel[last, :3] + [rotation(-each) @ accel for each in window.facing[last]]
+    trial.accel[last, :3] = window.accel[last, :3] + accel
     for until in (state.window.num_poses - 2 - steps, state.window.num_poses):
         # which tracks follow hangs on the motion, and the motion on them
         state = with_rates(_with_scatter_relearnt(state._replace(window=trial), until))

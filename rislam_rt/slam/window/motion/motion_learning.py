@@ -1,14 +1,10 @@
 """Learning how the agent moves: each step's motion-mode probabilities, and the prior of its acceleration that follows.
 
-Axes are learnt in groups, a chain of motion modes each (see `smoother.motion`). Where the agent faces it may manoeuvre
-alone: between two walls a calm way across is measured, which tells of the way along beforehand, but not against what is
-heard of that (see `manoeuvre_segments`).
-
-The height is asked once more: each step's likelihood is that of its own acceleration, the other steps' priors being
-what they are, and one datum that tells of forty steps at once counts forty times. Next to nothing measures the height
-while no ceiling is known; noise of no weight made an agent climb. So the vertical chain's priors stand against those of
-an uneven floor and of a level one, on which the height does not change, by the marginal likelihood of all steps
-together.
+Axes are learnt in groups, a chain of motion modes each (see `smoother.motion`). The height is asked once more: each
+step's likelihood is that of its own acceleration, the other steps' priors being what they are, and one datum that tells
+of forty steps at once counts forty times. Next to nothing measures the height while no ceiling is known; noise of no
+weight made an agent climb. So the vertical chain's priors stand against those of an uneven floor and of a level one, on
+which the height does not change, by the marginal likelihood of all steps together.
 """
 
 from typing import NamedTuple
@@ -22,10 +18,17 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse, log_evidence
 from rislam_rt.slam.window.smoother.manoeuvre_segments import manoeuvring_share
-from rislam_rt.slam.window.smoother.motion_basis import TURN, UP
+from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, step_covariances
 from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
 from rislam_rt.slam.window.state import WindowState
+
+UP = 1
+"""Index of the vertical axis's group among `GROUPS`."""
+GROUPS = (np.array([0, 1]), np.array([2]), np.array([TURN]))
+"""Axes that share one chain of motion modes: the two horizontal ones, the vertical one, and the rate of turn."""
+COLUMNS = np.array([0, 0, 1, 2])
+"""Index into `GROUPS` of each axis."""
 
 
 class VerticalInformation(NamedTuple):
@@ -39,23 +42,23 @@ class VerticalInformation(NamedTuple):
 
 def learn_motion(state: WindowState, lively: tuple[float, float] = (0.0, 0.0)) -> WindowState:
     """Re-estimate every step's motion-mode probabilities by forward-backward smoothing, and the prior precision of its
-    acceleration from them; `lively` are the log odds of a manoeuvre in the last step, horizontally and upwards, by
-    which components were associated."""
+    acceleration from them; `lively` are the log odds of a manoeuvre in the last step, across and upwards, by which
+    components were associated."""
     window = state.window
     if not len(window.accel) or state.config.motion == "told":
         return state
     told = vertical_information(window)
     likely = likelihoods(window, len(window.accel), told)
-    likely[: motion.VERTICAL + 1, -1, -1] += lively
+    likely[: UP + 1, -1, -1] += lively
     posterior, level = motion.smooth(state.motion_mode, likely, CONSTANTS.stay)
     share, still = manoeuvre_share(
-        told, motion.expected_precision(posterior[motion.VERTICAL]), was_level=state.is_level, lively=lively[1]
+        told, motion.expected_precision(posterior[UP]), was_level=state.is_level, lively=lively[UP]
     )
-    nearer = nearer_floor(np.append(posterior[motion.VERTICAL], level[motion.VERTICAL, None], axis=0), share)
-    posterior[motion.VERTICAL], level[motion.VERTICAL] = nearer[:-1], nearer[-1]
+    nearer = nearer_floor(np.append(posterior[UP], level[UP, None], axis=0), share)
+    posterior[UP], level[UP] = nearer[:-1], nearer[-1]
     joint = manoeuvring_share(window, motion.expected_precision(posterior[0]), state.motion_mode[0], lively[0])
-    posterior, level = motion.by_axis(posterior), motion.by_axis(level)
-    posterior[:UP], level[:UP] = livelier_by(posterior[:UP], joint), livelier_by(level[:UP], joint[:, -1])
+    posterior[0] = livelier_by(posterior[0], joint)
+    level[0] = livelier_by(level[0], joint[-1:])
     before = window.precision.copy()
     before[:, 2] = window.uneven
     # all steps at once, each as if the others were settled: damped, or they would take turns
@@ -76,12 +79,12 @@ def likelihoods(window: Window, count: int, told: VerticalInformation) -> Floats
     covariance = inverse(told.information + np.diag(window.uneven))
     mean, variance = (covariance @ told.slope)[:count, None], covariance.diagonal()[:count, None, None]
     found = np.stack([
-        motion.log_likelihood(mean, variance, window.uneven[:count, None])
-        if number == motion.VERTICAL
+        motion.log_likelihood(mean, variance, window.uneven[:count])
+        if number == UP
         else motion.log_likelihood(
-            window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group]
+            window.accel[:count, group], block[:, group[:, None], group], window.solved[:count, group[0]]
         )
-        for number, group in enumerate(motion.GROUPS[: block.shape[1] - 1])
+        for number, group in enumerate(GROUPS[: block.shape[1] - 1])
     ])  # fmt: skip
     found[0, :, motion.is_level_only()] = -np.inf
     return found
@@ -135,14 +138,16 @@ def nearer_floor(level: Floats, share: float) -> Floats:
 
 
 def precisions(levels: Floats) -> Floats:
-    """Prior precisions (..., A) of accelerations along A axes, from motion-mode probabilities (A, ..., L)."""
-    return np.stack([motion.prior_precision(level, axis == TURN) for axis, level in enumerate(levels)], axis=-1)
+    """Prior precisions (..., A) of accelerations along A axes, from motion-mode probabilities (N, ..., L) of N groups
+    of axes."""
+    each = [motion.prior_precision(level, group == 2) for group, level in enumerate(levels)]
+    return np.stack([each[group] for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
 def variances(levels: Floats) -> Floats:
-    """Variances (..., A) of accelerations along A axes, from motion-mode probabilities (A, ..., L) (see
-    `now_with_excess`)."""
-    return np.moveaxis(motion.expected_variance(levels), 0, -1)
+    """Variances (..., A) of accelerations along A axes, from motion-mode probabilities (N, ..., L) of N groups of axes
+    (see `now_with_excess`)."""
+    return np.stack([motion.expected_variance(levels[group]) for group in COLUMNS[: len(levels) + 1]], axis=-1)
 
 
 def assumed_precision(config: SlamConfig, dt: float, turns: bool) -> Floats:
@@ -161,8 +166,8 @@ def log_manoeuvre(state: WindowState) -> float:
     learnt, rare = float(scipy.special.logit(min(level[-1], 1.0 - 1e-12))), float(scipy.special.logit(CONSTANTS.rare))
     if not len(window.accel):
         return max(learnt, rare)
-    block = window.covariance[-free:, -free:][:UP, :UP]
-    told = motion.log_likelihood(window.accel[-1:, :UP], block[None], window.solved[-1:, :UP])[0]
+    block = window.covariance[-free:, -free:][:2, :2]
+    told = motion.log_likelihood(window.accel[-1:, :2], block[None], window.solved[-1:, 0])[0]
     calm = np.logaddexp.reduce(np.log(level[:-1] / level[:-1].sum()) + told[:-1])
     return max(learnt, rare + float(told[-1] - calm))
 
@@ -170,7 +175,7 @@ def log_manoeuvre(state: WindowState) -> float:
 def livelier(precision: Floats, steps: int = LATELY, *, upwards: bool = False) -> Floats:
     """Prior precisions (K - 1, A) of the window's accelerations, those of the last `steps` lowered to the liveliest
     motion mode: all but the vertical ones, or these alone."""
-    found, lively = precision.copy(), (np.arange(precision.shape[1]) == UP) == upwards
+    found, lively = precision.copy(), (COLUMNS[: precision.shape[1]] == UP) == upwards
     found[-steps:, lively] = np.minimum(found[-steps:, lively], CONSTANTS.liveliest**-2.0)
     return found
 

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.length_rates import MEASURED
@@ -39,8 +38,7 @@ class _Histories(NamedTuple):
     weight: Floats
     """(N,) [1/m^2] one over the variance that a length is expected to have."""
     toward: Floats
-    """(N, 3) derivative of the length by the position: the direction of arrival in the room's axes, times -2, as far as
-    it tells of the motion."""
+    """(N, 3) derivative of the length by the position: the direction of arrival in the room's axes, times -2."""
     left: Floats
     """(N,) [m] length less what the estimated way since the track's first component makes of it."""
     ends: Integers
@@ -106,9 +104,9 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     weight, time = log.std[rows, 0] ** -2.0, clock[slot]
     mass = total(weight)
     time = time - (total(weight * time) / mass)[which]
-    ray, toward, doubt = _directions(state, ends, slot, time)
+    toward, doubt = _directions(state, ends, slot, time)
     moved, joined = np.diff(place[slot], axis=0), np.diff(which) == 0
-    follow = np.append(0.0, np.cumsum(np.where(joined, np.vecdot(0.5 * (ray[1:] + ray[:-1]), moved), 0.0)))
+    follow = np.append(0.0, np.cumsum(np.where(joined, np.vecdot(0.5 * (toward[1:] + toward[:-1]), moved), 0.0)))
     way = np.append(0.0, np.cumsum(np.where(joined, np.linalg.norm(moved, axis=1), 0.0)))
     span = clock[spans[:, 1]] - clock[spans[:, 0]]
     last = np.append(first[1:], len(slot)) - 1
@@ -117,7 +115,9 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     turned = np.append(0.0, np.cumsum(np.abs(np.diff(state.heading))))
     turning = baseline * (turned[spans[:, 1]] - turned[spans[:, 0]]) / span
     length = log.seen[rows, 0]
-    own = doubt * speed**2 + turning**2 + STILL**2
+    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
+    apart = 2.0 * baseline * mass / np.maximum(total(weight * length), 1e-9)
+    own = (apart**2 + doubt) * speed**2 + turning**2 + STILL**2
     weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
     return _Histories(
         which, slot, time, length, weight, toward, length - (follow - follow[first][which]), spans, span, speed, own,
@@ -125,20 +125,12 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     )  # fmt: skip
 
 
-def _directions(state: WindowState, ends: ArrayEnds, slot: Integers, time: Floats) -> tuple[Floats, Floats, Floats]:
-    """Derivatives (N, 3) of the lengths by the position, from directions of arrival that are smoothed by a line over
-    time for each track; the same as they tell of the position; and the variance (T,) of their error along a way of one
-    metre.
-
-    What comes over one wall or from a point tells of the way as seen midway between Tx and Rx, what comes over two
-    walls as seen from the Rx: half of the baseline lies between, and as much to either side errs.
-    """
-    which, turn = ends.which, rotation_z(state.heading[slot])[:, :2, :2]
-    flat = (turn @ ends.cosines[..., None])[..., 0]
-    baseline = (state.scene.body.rx_offset - state.scene.body.tx_offset)[:2]
-    apart = (turn @ baseline) / (2.0 * state.log.seen[ends.row, :1])
-    apart -= np.vecdot(apart, flat)[:, None] * flat
-    flat = flat + apart
+def _directions(state: WindowState, ends: ArrayEnds, slot: Integers, time: Floats) -> tuple[Floats, Floats]:
+    """Directions of arrival (N, 3) in the room's axes, times -2, smoothed by a line over time for each track, and the
+    variance (T,) of their error along a way of one metre."""
+    which, seen, angle = ends.which, ends.cosines, state.heading[slot]
+    cos, sin = np.cos(angle), np.sin(angle)
+    flat = np.stack([cos * seen[:, 0] - sin * seen[:, 1], sin * seen[:, 0] + cos * seen[:, 1]], axis=1)
     weight = ends.std.mean(axis=1) ** -2.0
     s, sx, sxx = (np.bincount(which, weight * time**power) for power in range(3))
     sy, sxy = (np.stack([np.bincount(which, weight * x * side) for side in flat.T]) for x in (1.0, time))
@@ -146,19 +138,7 @@ def _directions(state: WindowState, ends: ArrayEnds, slot: Integers, time: Float
     smooth = ((sy - rate * sx) / s)[:, which].T + rate[:, which].T * time[:, None]
     smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1.0)
     up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
-    noise, axes = (1.0 / s)[which, None], rotation_z(state.heading[-1])[:2, :2]
-    telling = attenuated(smooth @ axes, noise + (apart @ axes) ** 2) @ axes.T
-    count = np.bincount(which)
-    doubt = 4.0 / s + 4.0 * np.bincount(which, np.vecdot(apart, apart)) / count
-    ray, telling = (-2.0 * np.concatenate([flat, up[:, None]], axis=1) for flat in (smooth, telling))
-    return ray, telling, doubt
-
-
-def attenuated(value: Floats, variance: Floats) -> Floats:
-    """Values (...,) whose squares are those expected of the true ones, from measured ones of a variance (...,): what a
-    direction tells of the motion goes by its square, and an error's square would tell as well, that there is none
-    (corrected scores of a regression whose regressors err; Fuller 1987, chapter 3)."""
-    return np.copysign(np.sqrt(np.maximum(value**2 - variance, 0.0)), value)
+    return -2.0 * np.concatenate([smooth, up[:, None]], axis=1), 4.0 / s
 
 
 def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:

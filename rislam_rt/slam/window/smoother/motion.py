@@ -13,15 +13,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.smoother.motion_basis import TURN, UP
 from rislam_rt.slam.window.solver_limits import MODES
-
-VERTICAL = 1
-"""Index of the vertical axis's group among `GROUPS`."""
-GROUPS = (np.array([0, 1]), np.array([UP]), np.array([TURN]))
-"""Axes that share one chain of motion modes: the two horizontal ones, the vertical one, and the rate of turn."""
-COLUMNS = np.array([0, 0, 1, 2])
-"""Index into `GROUPS` of each axis."""
 
 
 def ladder() -> Floats:
@@ -71,24 +63,15 @@ def transition_over(stay: float, steps: int) -> Floats:
     return np.asarray(np.linalg.matrix_power(transition(stay), steps))
 
 
-def by_axis(groups: Floats) -> Floats:
-    """Motion-mode probabilities (A, ..., L) of each axis, from those (N, ..., L) of the groups."""
-    return groups[COLUMNS[: len(groups) + 1]]
-
-
-def by_group(axes: Floats) -> Floats:
-    """Motion-mode probabilities (N, L) of the groups, from those (A, L) of each axis: of both horizontal ones, those
-    where the agent faces."""
-    return axes[[group[0] for group in GROUPS[: len(axes) - 1]]]
-
-
-def log_likelihood(accel: Floats, covariance: Floats, precision: Floats, shift: Floats | None = None) -> Floats:
+def log_likelihood(accel: Floats, spread: Floats, precision: Floats, shift: Floats | None = None) -> Floats:
     """Log likelihoods (..., K, L) of the motion modes in K steps, from posterior means (K, A) and covariances (K, A, A)
-    of the accelerations and the prior precisions (K, A) within these; or of accelerations that are larger than those
-    by a `shift` (..., K, A)."""
+    of the accelerations and the prior precisions (K,) within these; or of accelerations that are larger than those by
+    a `shift` (..., K, A)."""
+    spread, vector = principal_axes(spread)
+    along = (np.swapaxes(vector, 1, 2) @ accel[..., None])[..., 0] / spread
     # N(m; 0, C + s^2 I) through the cavity's information C^-1, which may be singular
-    value, vector, along = principal_axes(accel, covariance, precision)
-    variance: Floats = ladder() ** 2
+    value = np.maximum(1.0 / spread - precision[:, None], 0.0)
+    variance = ladder() ** 2
     total = 1.0 + value[:, None] * variance[:, None]
     if shift is None:
         gain = (along**2)[:, None] * variance[:, None] / total
@@ -99,21 +82,17 @@ def log_likelihood(accel: Floats, covariance: Floats, precision: Floats, shift: 
     return np.asarray(0.5 * (gain - np.log(total)).sum(axis=-1) - less[..., None])
 
 
-def principal_axes(accel: Floats, covariance: Floats, precision: Floats) -> tuple[Floats, Floats, Floats]:
-    """What is told of accelerations of one or two numbers without their prior of precisions (K, A), from posterior
-    means (K, A) and covariances (K, A, A): the information (K, A) along its principal axes, these axes (K, A, A) as
-    columns, and the product of information and mean along them (K, A)."""
-    if covariance.shape[-1] == 1:
-        alone = 1.0 / covariance[..., 0]
-        return np.maximum(alone - precision, 0.0), np.ones(covariance.shape), alone * accel
-    inner = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
-    one, two, both = inner[..., 0, 0] - precision[:, 0], inner[..., 1, 1] - precision[:, 1], inner[..., 0, 1]
+def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
+    """Variances (K, A) along the principal axes, and these axes (K, A, A) as columns, of covariances (K, A, A) of one
+    or two numbers."""
+    if spread.shape[-1] == 1:
+        return spread[..., 0], np.ones(spread.shape)
+    one, two, both = spread[..., 0, 0], spread[..., 1, 1], spread[..., 0, 1]
     angle = 0.5 * np.arctan2(2.0 * both, one - two)
-    middle, wide = 0.5 * (one + two), np.hypot(0.5 * (one - two), both)
+    large = 0.5 * (one + two) + np.hypot(0.5 * (one - two), both)
     cos, sin = np.cos(angle), np.sin(angle)
-    vector = np.stack([cos, -sin, sin, cos], axis=-1).reshape(*one.shape, 2, 2)
-    pull = (np.swapaxes(vector, 1, 2) @ (inner @ accel[..., None]))[..., 0]
-    return np.maximum(np.stack([middle + wide, middle - wide], axis=-1), 0.0), vector, pull
+    vector = np.stack([cos, -sin, sin, cos], axis=-1)
+    return np.stack([large, (one * two - both**2) / large], axis=-1), vector.reshape(*one.shape, 2, 2)
 
 
 def forward(before: Floats, log_like: Floats, stay: float) -> Floats:

@@ -13,22 +13,21 @@ from rislam_rt.arrays import Booleans, Complexes, Floats
 
 HEAD = 7
 """Number of the window's unknowns before the features: first position, its velocity, compass offset."""
-UP, TURN = 2, 3
-"""Indices of the vertical axis and of the rate of turn among the axes: where the agent faces and across that first."""
+TURN = 3
+"""Index of the rate of turn among the axes, after the three of the room."""
 POSE = 4
 """Number of a pose's unknowns that measurements depend on: position, compass offset."""
 
 
 @lru_cache(maxsize=4)
-def pose_matrix(steps: bytes, velocity_turn: bytes, facing: bytes, turns: bool) -> Floats:
+def pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     """Matrix (K, A, 7 + (K - 1) A) that gives K poses along A axes from the head's numbers before the features and then
     the accelerations of all steps, for times [s] of the steps and turns [rad] of the velocity over them, as bytes."""
     step, free = np.frombuffer(steps), 3 + turns
-    count, (_, reach) = len(step) + 1, horizontal(steps, velocity_turn, facing)
+    count, (_, reach) = len(step) + 1, horizontal(steps, velocity_turn)
     found = np.zeros((count, free, HEAD + len(step) * free))
     speed, accel = found[:, :, 3:6], found[:, :, HEAD:].reshape(count, free, len(step), free)
-    level = np.zeros(len(step)).tobytes()
-    straight = horizontal(steps, level, level)[1].real
+    straight = horizontal(steps, np.zeros(len(step)).tobytes())[1].real
     for axis, to, way in (
         (0, 0, reach.real),
         (0, 1, -reach.imag),
@@ -51,7 +50,7 @@ def _after(count: int) -> Booleans:
 
 
 @lru_cache(maxsize=8)
-def horizontal(steps: bytes, velocity_turn: bytes, facing: bytes) -> tuple[Complexes, Complexes]:
+def horizontal(steps: bytes, velocity_turn: bytes) -> tuple[Complexes, Complexes]:
     """Horizontal velocities and displacements (K, K), as complex factors of the first velocity and of the accelerations
     of steps with times and turns (K - 1,) [s, rad], as bytes."""
     step = np.frombuffer(steps)
@@ -59,8 +58,7 @@ def horizontal(steps: bytes, velocity_turn: bytes, facing: bytes) -> tuple[Compl
     heading = np.concatenate([[0.0], np.cumsum(np.frombuffer(velocity_turn))])
     speed = np.zeros((count, count), dtype=np.complex128)
     speed[:, 0] = np.exp(1j * heading)
-    along = np.frombuffer(facing) - heading[1:] + heading[:, None]
-    speed[:, 1:] = np.where(_after(count), step * np.exp(1j * along), 0.0)
+    speed[:, 1:] = np.where(_after(count), step * np.exp(1j * (heading[:, None] - heading[1:])), 0.0)
     reach = np.zeros((count, count), dtype=np.complex128)
     reach[1:] = np.cumsum(0.5 * step[:, None] * (speed[1:] + speed[:-1]), axis=0)
     return speed, reach
@@ -72,14 +70,13 @@ def rotation(angle: float) -> Floats:
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-def step_transition(dt: float, angle: float, facing: float, free: int) -> Floats:
+def step_transition(dt: float, angle: float, free: int) -> Floats:
     """Transition matrix (7, 7 + A) from pose, velocity and compass offset, and a step's accelerations, to those `dt`
     [s] later, the velocity turning by a turn [rad]."""
     found = np.eye(HEAD, HEAD + free)
-    turn = rotation(angle)
+    axes, turn = np.arange(3), rotation(angle)
     found[:3, 3:6], found[3:6, 3:6] = 0.5 * dt * (np.eye(3) + turn), turn
-    along = rotation(facing)
-    found[:3, HEAD : HEAD + 3], found[3:6, HEAD : HEAD + 3] = 0.5 * dt**2 * along, dt * along
+    found[axes, HEAD + axes], found[3 + axes, HEAD + axes] = 0.5 * dt**2, dt
     if free > TURN:
         found[6, HEAD + TURN] = dt
     return found
@@ -98,13 +95,13 @@ def step_back(found: Floats) -> Floats:
 
 
 @lru_cache(maxsize=4)
-def last_pose_matrix(steps: bytes, velocity_turn: bytes, facing: bytes, turns: bool) -> Floats:
+def last_pose_matrix(steps: bytes, velocity_turn: bytes, turns: bool) -> Floats:
     """Matrix (7, 7 + (K - 1) A) that gives the last pose, velocity and compass offset from the first ones and all
     accelerations."""
     step, free = np.frombuffer(steps), 3 + turns
     design = np.eye(HEAD, HEAD + len(step) * free)
-    design[[0, 1, 2, 6][:free]] = pose_matrix(steps, velocity_turn, facing, turns)[-1]
-    speed = horizontal(steps, velocity_turn, facing)[0][-1]
+    design[[0, 1, 2, 6][:free]] = pose_matrix(steps, velocity_turn, turns)[-1]
+    speed = horizontal(steps, velocity_turn)[0][-1]
     whole = np.stack([[speed.real, -speed.imag], [speed.imag, speed.real]])
     design[3:5, 3:5] = whole[:, :, 0]
     for axis in range(2):

@@ -33,16 +33,14 @@ class RateFactor(NamedTuple):
         own = (flat @ (off.ravel() @ flat)).reshape(off.shape)
         return self.gradient + (self.single @ off[..., None])[..., 0] - own
 
-    def first_step(
-        self, dt: float, angle: float, facing: float, velocity: Floats, accel: Floats
-    ) -> tuple[Floats, Floats]:
+    def first_step(self, dt: float, angle: float, velocity: Floats, accel: Floats) -> tuple[Floats, Floats]:
         """Hessian (6, 6) and gradient (6,) of the first step's cost by the velocity after it and its acceleration.
 
         The step takes `dt` [s], from a velocity (3,) [m/s] that turns by `angle` [rad], with an acceleration (3,)
-        [m/s^2] along axes turned by `facing` [rad].
+        [m/s^2].
         """
-        before, turn, along = np.eye(3), rotation(angle), rotation(facing)
-        off = 0.5 * dt * (before + turn) @ velocity + 0.5 * dt**2 * along @ accel - (self.middle[1] - self.middle[0])
-        design = np.concatenate([0.5 * dt * (before + turn.T), -0.5 * dt**2 * turn.T @ along], axis=1)
+        before, turn = np.eye(3), rotation(angle)
+        off = 0.5 * dt * (before + turn) @ velocity + 0.5 * dt**2 * accel - (self.middle[1] - self.middle[0])
+        design = np.concatenate([0.5 * dt * (before + turn.T), -0.5 * dt**2 * turn.T], axis=1)
         slope = self.step_gradient + self.step_hessian @ off
         return design.T @ self.step_hessian @ design, design.T @ slope

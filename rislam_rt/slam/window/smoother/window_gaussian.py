@@ -57,8 +57,7 @@ class Window(NamedTuple):
     head: Floats
     """(7 + 3F,) first position, its velocity, compass offset, and features."""
     accel: Floats
-    """(K - 1, A) [m/s^2] over the steps between the poses, where each is `facing`, across that, and upwards; of `TURN`,
-    rates [rad/s]."""
+    """(K - 1, A) [m/s^2] over the steps between the poses, along the room's axes; of `TURN`, rates [rad/s]."""
     precision: Floats
     """(K - 1, A) [s^4/m^2] of each acceleration's prior (see `motion`), in the next solution..."""
     solved: Floats
@@ -72,8 +71,6 @@ class Window(NamedTuple):
     """(K - 1,) [s] times between the poses."""
     velocity_turn: Floats
     """(K - 1,) [rad] by how much the velocity turns over each step, beside the acceleration."""
-    facing: Floats
-    """(K - 1,) [rad] direction in the room of the first horizontal axis along which each step's acceleration counts."""
     prior: Quadratic
     """Quadratic on the head: what is known beforehand and from poses that left the window."""
     noise: Floats
@@ -99,11 +96,6 @@ class Window(NamedTuple):
         return self.head[HEAD:].reshape(-1, 3)
 
     @property
-    def design_key(self) -> tuple[bytes, bytes, bytes]:
-        """Times of the steps, turns of the velocity, and axes of the accelerations, as `motion_basis` takes them."""
-        return self.step.tobytes(), self.velocity_turn.tobytes(), self.facing.tobytes()
-
-    @property
     def turns(self) -> bool:
         """Whether each step of the window has a rate of turn, the heading being estimated: A is then 4, and else 3."""
         return self.accel.shape[1] > TURN
@@ -116,9 +108,9 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     information = np.diag(np.maximum(std, 1e-6) ** -2.0)
     prior = Quadratic(information, np.zeros(HEAD), head)
     slots = Quadratic(np.zeros((1, POSE, POSE)), np.zeros((1, POSE)), np.concatenate([position, [0.0]])[None])
-    none, alone = np.zeros((0, 3 + turns)), np.zeros(0)
+    none = np.zeros((0, 3 + turns))
     return Window(
-        head, none, none, none, none, alone, alone, alone, alone, prior, np.zeros((HEAD, HEAD)), slots,
+        head, none, none, none, none, np.zeros(0), np.zeros(0), np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
         np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
     )  # fmt: skip
 
@@ -140,7 +132,7 @@ def begin_with(
 def pose_design(window: Window) -> Floats:
     """Matrix (K, A, 7 + (K - 1) A) that gives the window's poses from its unknowns but the features (see
     `motion_basis.pose_matrix`)."""
-    return pose_matrix(*window.design_key, window.turns)
+    return pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns)
 
 
 def poses(window: Window) -> Floats:
@@ -161,10 +153,7 @@ def mapped(design: Floats, rows: Floats) -> Floats:
 def _carried(window: Window, rows: Floats) -> Floats:
     """Last pose, velocity and compass offset (7, ...) of the sliding window, mapped linearly from rows (D, ...) of all
     its unknowns."""
-    return mapped(
-        last_pose_matrix(*window.design_key, window.turns),
-        rows,
-    )
+    return mapped(last_pose_matrix(window.step.tobytes(), window.velocity_turn.tobytes(), window.turns), rows)
 
 
 def mean_now(window: Window) -> Floats:
@@ -246,11 +235,10 @@ def _surplus(precision: Floats, variance: Floats) -> Floats:
 
 
 def extend(
-    window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0, velocity_turn: float = 0.0,
-    facing: float = 0.0,
-) -> Window:  # fmt: skip
+    window: Window, dt: float, precision: Floats, variance: Floats | float = 0.0, velocity_turn: float = 0.0
+) -> Window:
     """Append a pose to the sliding window, `dt` [s] after the last, with prior precisions (A,) of the step's
-    acceleration, its `variance` (A,), its `velocity_turn` [rad] and the direction of its first axis, `facing` [rad]."""
+    acceleration, its `variance` (A,) and its `velocity_turn` [rad]."""
     free = len(precision)
     slots = Quadratic(*(np.concatenate([field, np.zeros((1, *field.shape[1:]))]) for field in window.slots))
     covariance = np.zeros((len(window.covariance) + free,) * 2)
@@ -262,8 +250,8 @@ def extend(
         solved=np.concatenate([window.solved, precision[None]]),
         variance=np.concatenate([window.variance, np.zeros((1, free)) + variance]),
         uneven=np.append(window.uneven, precision[2]),
-        step=np.append(window.step, dt), velocity_turn=np.append(window.velocity_turn, velocity_turn),
-        facing=np.append(window.facing, facing), slots=slots, covariance=covariance, rates=None,
+        step=np.append(window.step, dt), velocity_turn=np.append(window.velocity_turn, velocity_turn), slots=slots,
+        covariance=covariance, rates=None,
     )  # fmt: skip
 
 
@@ -278,7 +266,7 @@ def slide(window: Window) -> Window:
     # the next pose and the acceleration in between, instead of the oldest pose
     dt, angle, accel = float(window.step[0]), float(window.velocity_turn[0]), window.accel[0]
     change = np.eye(size, size + free)
-    carry = step_transition(dt, angle, float(window.facing[0]), free)
+    carry = step_transition(dt, angle, free)
     back = step_back(carry)
     change[:HEAD, :HEAD], change[:HEAD, size:] = back[:, :HEAD], back[:, HEAD:]
     wide, steep = change.T @ hessian @ change, change.T @ gradient
@@ -286,7 +274,7 @@ def slide(window: Window) -> Window:
     steep[size:] += window.precision[0] * accel
     if window.rates:
         at = np.concatenate([[3, 4, 5], size + np.arange(3)])
-        information, pull = window.rates.first_step(dt, angle, float(window.facing[0]), window.head[3:6], accel[:3])
+        information, pull = window.rates.first_step(dt, angle, window.head[3:6], accel[:3])
         wide[np.ix_(at, at)] += information
         steep[at] += pull
     gain = np.asarray(np.linalg.solve(wide[size:, size:], wide[size:, :size])).T
@@ -304,7 +292,7 @@ def slide(window: Window) -> Window:
     return window._replace(
         head=head, accel=window.accel[1:], precision=window.precision[1:], solved=window.solved[1:],
         variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:],
-        velocity_turn=window.velocity_turn[1:], facing=window.facing[1:], prior=prior,
+        velocity_turn=window.velocity_turn[1:], prior=prior,
         noise=eliminated_noise(shaken, size, gain), slots=Quadratic(*(field[1:] for field in window.slots)),
         covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
     )  # fmt: skip

@@ -231,7 +231,7 @@ def test_tracks_speak_against_a_birth_that_turns_the_motion(turned, clear):
     place = 0.1 * velocity * np.arange(count)[:, None]
     before = _moving(velocity, 0.05, count)
     state = SimpleNamespace(
-        window=before, log=_log(place, 0.0), heading=np.zeros(count), level=np.zeros((3, 3)),
+        window=before, log=_log(place, 0.0), heading=np.zeros(count), level=np.zeros((2, 3)),
         scene=SimpleNamespace(body=SimpleNamespace(tx_offset=np.zeros(3), rx_offset=np.zeros(3)), radio=RadioConfig()),
     )  # fmt: skip
     ratio = motion_agreement.log_agreement(state, _moving(velocity + turned * np.eye(3)[0], 0.002, count))

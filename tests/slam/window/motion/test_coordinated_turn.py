@@ -85,12 +85,8 @@ def test_the_likelihood_of_shifted_accelerations_is_that_of_the_gaussians():
     """By completing the square in room axes, with the prior's mean at the shift, instead of in principal axes."""
     rng, count = np.random.default_rng(3), 5
     root = rng.standard_normal((count, 2, 2))
-    told, pull, precision = (
-        root @ np.swapaxes(root, 1, 2),
-        rng.standard_normal((count, 2)),
-        rng.uniform(1, 9, (count, 2)),
-    )
-    spread = np.linalg.inv(told + precision[:, None] * np.eye(2))
+    told, pull, precision = root @ np.swapaxes(root, 1, 2), rng.standard_normal((count, 2)), rng.uniform(1, 9, count)
+    spread = np.linalg.inv(told + precision[:, None, None] * np.eye(2))
     accel, shift = (spread @ pull[..., None])[..., 0], rng.standard_normal((3, count, 2))
     found = motion.log_likelihood(accel, spread, precision, shift)
     for (case, row), by in zip(np.ndindex(3, count), shift.reshape(-1, 2), strict=True):

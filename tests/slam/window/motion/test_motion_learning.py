@@ -48,7 +48,7 @@ def test_one_datum_does_not_make_an_agent_climb():
     size = len(window.head)
     single = motion.log_likelihood(
         window.accel[:, 2:3], window.covariance[size + 2 :: 3, size + 2 :: 3].diagonal()[:, None, None],
-        window.solved[:, 2:3],
+        window.solved[:, 2],
     )  # fmt: skip
     # what forty steps together seemed to tell, and the most that a datum three deviations off can
     assert (single[:, -1] - single[:, 0]).sum() > 10.0 > 0.5 * 3.0**2

@@ -3,12 +3,11 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from rislam_rt.model import RadioConfig
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.motion.track_rates import attenuated, rate_factor, with_rates
+from rislam_rt.slam.window.motion.track_rates import rate_factor, with_rates
 from rislam_rt.slam.window.smoother import window_gaussian
 
 TRUE, TOLD, COUNT, STEP = np.array([0.2, -0.1, 0.0]), np.array([0.22, -0.08, 0.0]), 12, 0.1
@@ -84,27 +83,6 @@ def test_a_lone_path_of_another_kind_is_held_for_that():
     rate[1:] += [0.4, -0.4, 0.4]
     mean, _ = _solved(_state(_log(rate)))
     np.testing.assert_allclose(mean[3:5], TOLD[:2], atol=2e-3)
-
-
-def test_what_a_direction_errs_by_tells_of_no_way_along_the_walls():
-    """Between two walls an agent moves along them at a speed that it is not told, and hears each along a direction that
-    errs by 0.05: its square would tell that the agent stands still."""
-    log = _log(np.zeros(4))
-    log = log._replace(seen=np.column_stack([log.seen[:, 0], 0.05 + 0.0 * log.cycle, (-1.0) ** log.track]))
-    log.std[:, 1:] = 0.05 * np.sqrt(COUNT)
-    found = rate_factor(_state(log))
-    information = found.single.sum(axis=0)
-    assert information[0, 0] < 1e-9 * information[1, 1]
-    sure = rate_factor(_state(log._replace(std=np.full(log.std.shape, 1e-3)))).single.sum(axis=0)
-    assert sure[0, 0] > 1e-3 * sure[1, 1]
-
-
-def test_squares_of_attenuated_values_are_those_of_the_true_ones():
-    rng = np.random.default_rng(3)
-    seen = 0.3 + 0.05 * rng.standard_normal(40000)
-    assert np.mean(attenuated(seen, 0.05**2) ** 2) == pytest.approx(0.3**2, abs=4.0 * 2.0 * 0.3 * 0.05 / 200.0)
-    np.testing.assert_array_equal(attenuated(np.array([-0.04, 0.04, -0.5]), 0.05**2)[:2], 0.0)
-    assert attenuated(np.array([-0.5]), 0.05**2)[0] < -0.49
 
 
 def test_the_state_takes_the_factor_into_its_window():
