@@ -225,8 +225,12 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
     one for all, and those (S, E) of their ways to agree, with the variances (S, E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     # a direction errs in all of the motion, what the positions have taken out of the lengths included
-    speed = velocity if found.believed is None else velocity + found.believed
-    variance = found.variance + found.blur**2 * np.vecdot(speed, speed)[:, None]
+    along, rise = (np.zeros(2), 0.0) if found.believed is None else (found.believed[:2], found.believed[2])
+    speed, climb_speed = velocity + along, rise + climb
+    # what errs across errs upwards, too, the more the lower a path arrives
+    slope = found.toward[:, :2] / np.minimum(found.toward[:, 2:], -2.0 * np.sqrt(found.blur)[:, None] - 1e-6)
+    across = speed[:, None] - np.multiply.outer(climb_speed, slope).reshape(-1, *slope.shape)
+    variance = found.variance + found.blur**2 * np.vecdot(across, across)
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     either_way = variance + found.turning**2
     likely = 0.5 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
@@ -234,9 +238,8 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
     other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
-        wide = (
-            variance + found.turning.max(initial=0.0) ** 2 + 4.0 / 3.0 * (np.vecdot(speed, speed)[:, None] + climb**2)
-        )
+        square_speed, turning = np.vecdot(speed, speed)[:, None] + climb_speed**2, found.turning.max(initial=0.0)
+        wide = variance + turning**2 + 4.0 / 3.0 * square_speed
         still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
     return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, either_way

@@ -17,8 +17,8 @@ MEASURED = 6
 
 
 class _PlainRates(NamedTuple):
-    """Rates of the path lengths of T tracks or explained paths, E in all: each over an odd number of walls, or a point,
-    and over two walls."""
+    """Rates of the path lengths of T tracks or explained paths, E in all: of each were it over a wall, by a point, and
+    over two walls at right angles."""
 
     toward: Floats
     """(E, 3) derivative of the length by the position: the rate is its product with the velocity."""
@@ -27,7 +27,7 @@ class _PlainRates(NamedTuple):
     variance: Floats
     """(E,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(E,) error of the rate by the direction's, as a share of the speed."""
+    """(E,) error of the rate by the direction's, as a share of the speed, and to second order by the baseline."""
     whole: Floats
     """(E,) rate of the measured length itself; `rate` may be that of what the positions leave of it."""
     share: Floats
@@ -43,7 +43,7 @@ class _PlainRates(NamedTuple):
     bend_variance: Floats | None = None
     """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
     believed: Floats | None = None
-    """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
+    """(3,) motion of the agent beside the one that is asked for; None where what is no path of a thing at
     rest may have any rate."""
 
 
@@ -113,19 +113,18 @@ class Lengths(NamedTuple):
     length: Floats
     """(N,) [m] measured..."""
     left: Floats
-    """(N,) [m] ...and what the positions leave of it."""
+    """(3, N) [m] ...and what the positions leave of it, were it over a wall, by a point, or over two walls at right
+    angles."""
     toward: Floats
-    """(E, 3) derivative of the length by the position, of returns over an odd number of walls and of points."""
-    parallax: Floats
-    """(E, 2) by how much that of returns over two walls, the direction of arrival times -2, is more."""
+    """(3, E, 3) derivative of the length by the position, likewise."""
     number: Integers
     """(E,) number of components."""
     blur: Floats
     """(E,) as in `Rates`."""
     owner: Integers
     """(E,) track or path of each direction."""
-    odd: Floats
-    """(T,) probability that each track or path runs over an odd number of walls, or from a point."""
+    share: Floats
+    """(T, 3) probability that each track or path is of these kinds, if it follows the positions."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -142,7 +141,7 @@ def lengths(heard: Heard) -> Lengths:
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
     forms, which = unique_forms(every)
-    odd = _odd(forms)
+    share = _kinds(forms)
     rows, which, flat, spread_of, owner = log.both_ends(rows, which, spacing)
     count = np.bincount(which)
 
@@ -156,26 +155,32 @@ def lengths(heard: Heard) -> Lengths:
     toward /= count[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = np.concatenate([toward, up[:, None]], axis=1)
-    # a point, or a wall's normal, is seen from midway between the two ends
-    far = np.maximum(total(weight * length) / total(weight), 1e-3)
+    # a wall's image is seen along its normal from the Tx, whose way to it the wall halves
+    mass = total(weight)
+    far = np.maximum(total(weight * length) / mass, 1e-3)
     across = total(cos * baseline[0] - sin * baseline[1]), total(sin * baseline[0] + cos * baseline[1])
-    apart = np.stack([*across, np.zeros(len(far))], axis=1) / (count * far)[:, None]
-    apart -= np.vecdot(apart, toward)[:, None] * toward
-    toward = -2.0 * (toward + apart)
+    ray, apart = toward, np.stack([*across, np.zeros(len(far))], axis=1) / (count * far)[:, None]
+    normal = (ray + apart) / np.linalg.norm(ray + apart, axis=1)[:, None]
+    wall = -2.0 * np.vecdot(ray, normal)[:, None] * normal
+    moved = place[since] - (np.stack([total(weight * each) for each in place[since].T]) / mass).T[which]
+    follow = np.vecdot(wall[which], moved)
+    bend = [2.0 * np.linalg.norm(0.5 * far[which, None] * each[which] - moved, axis=1) for each in (normal, ray)]
     doubt = total((spread_of**2).mean(axis=1)) / count**2
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
-        length - np.vecdot(toward[which], place[since] - place[-1]), toward, 2.0 * apart, count,
-        2.0 * np.sqrt(doubt), owner, odd,
+        length - np.stack([follow, *bend]), np.stack([wall, wall, -2.0 * ray]), count,
+        np.hypot(2.0 * np.sqrt(doubt), np.vecdot(apart, apart)), owner, share,
     )  # fmt: skip
 
 
-def _odd(forms: Integers) -> Floats:
-    """Probability (T,) that paths of forms (T, 6) run over an odd number of walls, or from a point: as many do as do
-    not, unless the map explains them."""
-    walls, known = (forms[:, 1:5] >= 0).sum(axis=1), forms[:, 0] != UNKNOWN
-    told = np.where(forms[:, 0] == TX, walls % 2.0, np.where(walls == 0, 1.0, 0.5))
-    return np.where(known, told, 0.5)
+def _kinds(forms: Integers) -> Floats:
+    """Probabilities (T, 3) that paths of forms (T, 6) are over a wall, by a point, or over two walls at right angles,
+    if they are any of these: as many are over two walls as are not, unless the map explains them."""
+    walls, found = (forms[:, 1:5] >= 0).sum(axis=1), np.tile([0.25, 0.25, 0.5], (len(forms), 1))
+    of_walls, of_point = forms[:, 0] == TX, forms[:, 0] >= 0
+    for kind, told in enumerate((of_walls & (walls == 1), of_point & (walls == 0), of_walls & (walls == 2))):
+        found[told] = np.eye(3)[kind]
+    return found
 
 
 def rates(found: Lengths) -> Rates:
@@ -183,10 +188,10 @@ def rates(found: Lengths) -> Rates:
     positions leave of the lengths' change."""
     place, time = found.heard.place, found.heard.step * max(len(found.heard.place) - 1, 1)
     velocity = (place[-1] - place[0]) / time
-    (rate,), variance, fine = _slopes(found, found.time, found.left)
-    rate = rate + found.toward @ velocity
+    every, variance, fine = _slopes(found, found.time, *found.left)
+    rate = np.stack(every) + found.toward @ velocity
     bends = _bends(found, float(velocity @ velocity))
-    return _rates(found, fine, (rate, variance, rate), time, np.zeros(2), bends)
+    return _rates(found, fine, (rate, variance, rate[0]), time, np.zeros(3), bends)
 
 
 def accelerations(found: Lengths, steps: int) -> Rates:
@@ -195,11 +200,11 @@ def accelerations(found: Lengths, steps: int) -> Rates:
     follows the positions as they are."""
     place, step = found.heard.place, found.heard.step
     by = 0.5 * np.maximum(found.time + steps * step, 0.0) ** 2
-    (rate, whole), variance, fine = _slopes(found, by, found.left, found.length)
+    (*rate, whole), variance, fine = _slopes(found, by, *found.left, found.length)
     way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
     way -= way.mean()
-    believed = way @ place[:, :2] / (way @ way)
-    return _rates(found, fine, (rate, variance, whole), 0.5 * (steps * step) ** 2, believed)
+    believed = way @ place / (way @ way)
+    return _rates(found, fine, (np.stack(rate), variance, whole), 0.5 * (steps * step) ** 2, believed)
 
 
 def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], Floats, Booleans]:
@@ -218,22 +223,19 @@ def _rates(
     found: Lengths, fine: Booleans, fits: tuple[Floats, Floats, Floats], unit: float, believed: Floats,
     bends: tuple[Floats, Floats] | None = None,
 ) -> Rates:  # fmt: skip
-    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates, the variances, and the rates of measured
-    lengths, over a `unit` [s or s^2]."""
-    toward, heard = found.toward, found.heard
-    ray = toward + found.parallax
+    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates (3, E), the variances, and the rates of
+    measured lengths, over a `unit` [s or s^2]."""
+    heard, ray = found.heard, found.toward[-1]
     fine = fine & (np.vecdot(ray[:, :2], ray[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
-    rate, variance, whole = (each[fine] for each in fits)
-    bend, bend_variance = (np.tile(each[fine], 2) for each in bends) if bends else (None, None)
     turning = float(np.hypot(*heard.baseline) * np.abs(np.diff(heard.heading)).sum()) / unit
     paths, owner = np.unique(found.owner[fine], return_inverse=True)
-    parallax, odd, each = found.parallax[fine], found.odd[paths][owner], np.bincount(owner)[owner]
-    owner, share = np.tile(owner, 2), np.append(odd, 1.0 - odd) / np.tile(each, 2)
-    moved = rate if believed is None else rate - parallax[:, :2] @ believed
+    share = (found.share[paths][owner] / np.bincount(owner)[owner, None]).T.ravel()
+    rate, variance, whole = fits
+    variance, blur, whole = (np.tile(each[fine], 3) for each in (variance, found.blur, whole))
+    bend, bend_variance = (np.tile(each[fine], 3) for each in bends) if bends else (None, None)
     return Rates(
-        np.concatenate([toward[fine], toward[fine] + parallax]), np.append(rate, moved), np.tile(variance, 2),
-        np.tile(found.blur[fine], 2), np.tile(whole, 2), share, owner,
-        np.repeat([0.0, turning], len(rate)), len(rate), bend, bend_variance, believed,
+        found.toward[:, fine].reshape(-1, 3), rate[:, fine].ravel(), variance, blur, whole, share, np.tile(owner, 3),
+        np.repeat([0.0, 0.0, turning], len(owner)), len(owner), bend, bend_variance, believed,
     )  # fmt: skip
 
 

@@ -128,17 +128,20 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
 
 
 def test_a_baseline_shows_walls_and_points_from_midway_and_corners_from_the_rx():
-    """Lengths by geometry, half a metre from Tx to Rx: each rate is that of one of the two ways, to second order."""
+    """Lengths by geometry, half a metre from Tx to Rx: each changes as its kind does, points to second order in the
+    baseline, and as no other kind does."""
     step, count, baseline, heading = 0.1, 8, np.array([0.4, -0.3]), 0.7
-    place = step * np.arange(count)[:, None] * np.array([0.2, 0.1, 0.0])
+    velocity = np.array([0.2, 0.1, 0.0])
+    place = step * np.arange(count)[:, None] * velocity
     room = np.append([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]] @ baseline, 0.0)
-    log = _log(place, heading, room)
-    heard = Heard(log, np.full(count, heading), place, step, baseline, 0.5)
-    found, velocity = rates(lengths(heard)), np.array([0.2, 0.1, 0.0])
-    wall, corner, point = (found.rate[:3] - (found.toward @ velocity).reshape(2, 3)).T
-    apart = 2.0 * np.linalg.norm(baseline) / 4.0 * np.linalg.norm(velocity)  # what the shortest length makes of it
-    assert np.abs([wall[0], corner[1], point[0]]).max() < 0.12 * apart
-    assert min(abs(wall[1]), abs(corner[0]), abs(point[1])) > 0.15 * apart
+    heard = Heard(_log(place, heading, room), np.full(count, heading), place, step, baseline, 0.5)
+    found = accelerations(lengths(heard), 5)
+    off = np.abs(found.rate).reshape(3, 3) * 0.5 * 0.5**2  # [m] in half a second; of a wall, a corner and a point
+    # what the baseline makes of the shortest length's
+    apart = 0.5 * np.linalg.norm(baseline) / 4.0 * 2.0 * np.linalg.norm(velocity)
+    assert max(off[0, 0], off[2, 1]) < 2e-3 * apart
+    assert off[1, 2] < 0.1 * apart
+    assert min(off[2, 0], off[0, 1], off[2, 2]) > 0.1 * apart
 
 
 @pytest.mark.parametrize("steps", [5, 10])
@@ -161,7 +164,7 @@ def test_a_climb_is_told_by_the_rates_of_all_lengths():
     """Two ways: Laplace's evidence at the likeliest climb, against the integral over all climbs."""
     rng = np.random.default_rng(5)
     for climb in (0.4, -0.9):
-        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(2))
+        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(3))
         log_odds, told = egomotion.weigh_climb(found, 1e-8, 0.0)
         assert told == pytest.approx(climb, abs=4.0 * 0.01 / np.sqrt(np.sum(found.toward[4:, 2] ** 2)))
         every = np.linspace(-3.0, 3.0, 60001)[:, None]
@@ -176,7 +179,7 @@ def test_a_climb_is_told_by_the_rates_of_all_lengths():
 def test_no_climb_is_told_by_the_rates_of_a_level_motion():
     """Posterior odds above 1 at prior odds of 1 in 10 come up in less than 1 of 10 runs (Markov's inequality)."""
     rng = np.random.default_rng(6)
-    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(2)) for _ in range(200)]
+    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(3)) for _ in range(200)]
     wrong = sum(egomotion.weigh_climb(found, 1e-8, np.log(0.1))[0] > 0.0 for found in every)
     assert wrong < 20
 
@@ -185,7 +188,7 @@ def test_what_is_at_rest_changes_its_length_by_no_more_than_twice_the_agents_spe
     """Two tracks of many agree on a motion; were the others' rates just any, two would be chance."""
     toward = -2.0 * np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]])
     rate = np.array([-1.6, -0.96, 0.0])
-    rest = lone_rates(toward, rate, np.full(3, 0.02**2))._replace(believed=np.zeros(2))
+    rest = lone_rates(toward, rate, np.full(3, 0.02**2))._replace(believed=np.zeros(3))
     free = rest._replace(believed=None)
     bounded, any_rate = (_weigh_change(each, 1e-4)[0] for each in (rest, free))
     assert bounded > any_rate + 3.0
