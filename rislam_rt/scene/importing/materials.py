@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from typing import Any, get_args
 
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.input_messages import did_you_mean, nearest
+from rislam_rt.model.itu import itu_parameters
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.schema import ItuMaterial
 
@@ -34,6 +35,9 @@ WORDS = {
     "medium_dry_ground": ("ground", "soil", "grass"),
 }
 """Words of a material's or node's name and the ITU-R P.2040 material that they stand for, the first that is found."""
+
+BOARDS = ("floorboard", "plywood", "chipboard")
+"""Materials of timber, for which wood stands in at a carrier for which ITU-R P.2040 does not specify them."""
 
 
 def parse_material(text: str) -> dict[str, Any]:
@@ -82,22 +86,34 @@ def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
 class MaterialAssignment:
     """Assignment of materials to the walls of an imported room, which keeps account of those it had to assume."""
 
-    def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any]) -> None:
-        self.choices, self.rest = choices, rest
+    def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any], carrier: float) -> None:
+        self.choices, self.rest, self.carrier = choices, rest, carrier
         self.used: set[str] = set()
         self.assumed: set[str] = set()
+        self.replaced: dict[str, str] = {}
 
     def material(self, wall: str, node: str, material: str) -> dict[str, Any]:
-        """Material of an imported wall: the user's, else by a word in its material's or node's name, else `rest`."""
+        """Material of an imported wall: the user's, else by a word in its material's or node's name, else `rest`; what
+        is not specified at the carrier [Hz] is replaced."""
         chosen = self.by_hand(wall, material, node)
         if chosen is not None:
             return chosen
         for name in (material, node):
             found = itu_by_word(name)
             if found is not None:
-                return {"itu": found, "thickness_m": THICKNESS[found]}
+                return self._at_carrier(found)
         self.assumed.add(material or wall)
         return self.rest
+
+    def _at_carrier(self, itu: str) -> dict[str, Any]:
+        """Material of an import by its name; where it is not specified at the carrier wood for boards, else `rest`."""
+        try:
+            itu_parameters(itu, self.carrier)
+        except SceneError:
+            other = {"itu": "wood", "thickness_m": THICKNESS[itu]} if itu in BOARDS else self.rest
+            self.replaced[itu] = ", ".join(f"{value}" for value in other.values())
+            return other
+        return {"itu": itu, "thickness_m": THICKNESS[itu]}
 
     def by_hand(self, *names: str) -> dict[str, Any] | None:
         """Material of an import that the user gave for any of the names; None if there is none."""
@@ -108,12 +124,17 @@ class MaterialAssignment:
         return None
 
     def remarks(self) -> list[str]:
-        """Remark on the walls of an import whose material was assumed, on one line; none if there are none."""
+        """Remarks on the walls of an import whose material was assumed or replaced, a line each; none without any."""
+        ghz = self.carrier / 1e9
+        remarks = [
+            f"'{itu}' is not specified at {ghz:g} GHz, taken as {other} (--material NAME=...)"
+            for itu, other in self.replaced.items()
+        ]
         if not self.assumed:
-            return []
+            return remarks
         names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
         more = f" and {len(names) - 8} more" if len(names) > 8 else ""
-        return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
+        return [*remarks, f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def check_used(self, names: Iterable[str]) -> None:
         """Check that every material that the user gave for an import has been used; `names`: some that could have been
