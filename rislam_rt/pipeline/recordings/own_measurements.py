@@ -16,6 +16,7 @@ from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.replay import Answers, replay
+from rislam_rt.pipeline.run_datasets import dataset_checksum
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import read_dataset
@@ -122,6 +123,11 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
         except StoreError:
             what = "not a readable NetCDF file" if file.exists() else "no such file"
             raise ConfigError(f"{file}: {what}; give one as a run folder's measurements_<scheme>.nc") from None
+        if "checksum" in data.attrs and str(data.attrs["checksum"]) != dataset_checksum(data):
+            raise ConfigError(
+                f"{file}: changed since it was written (its checksum does not fit); run again, or take the attribute "
+                "'checksum' out of a file of your own"
+            )
         try:
             made = _check_inputs(dataset_to_inputs(data), str(file))
             if not len(made.time):

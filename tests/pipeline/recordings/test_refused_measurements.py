@@ -9,10 +9,12 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.recordings.inputs import inputs_to_dataset
 from rislam_rt.pipeline.recordings.own_measurements import inputs_of, read_inputs
+from rislam_rt.pipeline.run_datasets import seal_dataset
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.slam import StartPrior
+from rislam_rt.storage.netcdf import read_dataset, write_dataset
 from rislam_rt.studies.unseen import Inputs
 
 Table = dict[str, list[float]]
@@ -160,3 +162,20 @@ def test_a_file_without_cycles_is_refused(recorded: tuple[Inputs, np.ndarray], t
     with pytest.raises(ConfigError) as found:
         read_inputs(tmp_path / "mine.nc", None, build_radio(load_spec(find_pipeline("trace_then_slam")).radio))
     assert str(found.value) == f"{tmp_path / 'mine.nc'}: no cycles; give at least one"
+
+
+def test_a_recording_changed_since_it_was_written_is_refused(
+    recorded: tuple[Inputs, np.ndarray], tmp_path: Path
+) -> None:
+    """As `run` and `report` refuse it; a file without a checksum is a user's own."""
+    radio = build_radio(load_spec(find_pipeline("trace_then_slam")).radio)
+    write_dataset(seal_dataset(inputs_to_dataset(recorded[0])), tmp_path / "run.nc")
+    assert len(read_inputs(tmp_path / "run.nc", None, radio).time) == len(recorded[0].time)
+    changed = read_dataset(tmp_path / "run.nc")
+    changed["amplitude"] = changed.amplitude * 1.01
+    write_dataset(changed, tmp_path / "changed.nc")
+    with pytest.raises(ConfigError, match="changed.nc: changed since it was written"):
+        read_inputs(tmp_path / "changed.nc", None, radio)
+    del changed.attrs["checksum"]
+    write_dataset(changed, tmp_path / "own.nc")
+    assert len(read_inputs(tmp_path / "own.nc", None, radio).time) == len(recorded[0].time)
