@@ -71,6 +71,13 @@ def _entry(word: str) -> str:
     return word
 
 
+def parse_number(text: str) -> float:
+    """Number in a user's file or on the command line; a `ValueError` for `1_5`, which Python takes for 15."""
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
+
+
 LEAST_LIKE = 0.75
 """Least similarity (share of letters in common) of two spellings of one word; `num_particles` and `num_samples` have
 0.67."""
