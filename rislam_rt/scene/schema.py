@@ -356,7 +356,7 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
         return Fault(f"{place}: unknown key", _near_key(str(where[-1])) or "remove it or mend its name")
     if item["type"] == "list_type" and isinstance(item["input"], dict) and len(where) == 1:
         return Fault(f"{place}: one table received", f"there may be several: write [[{place}]], with two brackets")
-    message = expected_input(item)
+    message = _list_of(item) or expected_input(item)
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
@@ -368,6 +368,14 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
         if message.startswith(("give ", "did "))
         else Fault(f"{received}, {message}", "mend it")
     )
+
+
+def _list_of(item: Any) -> str:
+    """What to give where a lone number stands for a list of so many: the number for each; empty for another fault."""
+    key, lone = str(item["loc"][-1]), isinstance(item["input"], (int, float)) and item["type"] == "list_type"
+    fields = [section.model_fields[key] for section in SECTIONS.values() if key in section.model_fields] if lone else []
+    count = max((getattr(part, "min_length", 0) for field in fields for part in field.metadata), default=0)
+    return f"give {counted(count, 'number')}, {key} = {[item['input']] * count}" if count else ""
 
 
 SECTIONS: dict[str, type[SceneSection]] = {

@@ -50,6 +50,11 @@ def test_every_bad_field_is_a_line(damaged: Damage) -> None:
     assert str(caught.value).endswith("(and 2 more)")
 
 
+def test_a_lone_number_for_a_list_is_told_a_list_that_works(damaged: Damage) -> None:
+    folder = damaged("spacing_m = [", "spacing_m = 0.015 # [")
+    assert "spacing_m: 0.015 received; give 2 numbers, spacing_m = [0.015, 0.015]" in refusal(folder)
+
+
 def test_mesh_behind_a_link(room: Path) -> None:
     inside, outside = room / "meshes/floor.ply", room.parent / "outside.ply"
     inside.rename(outside)
