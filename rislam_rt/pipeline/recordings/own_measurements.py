@@ -28,10 +28,8 @@ from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.run_datasets import dataset_checksum
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.slam import StartPrior
-from rislam_rt.storage.netcdf import read_dataset
+from rislam_rt.storage.netcdf import NETCDF, read_dataset
 
-NETCDF = (".nc", ".h5", ".hdf5")
-"""Suffixes of files that are read as NetCDF, which is HDF5; all others are CSV."""
 LONGEST_STEP = 10.0
 """[s] Median time between cycles from which on the times are warned of, as milliseconds given as seconds would be."""
 SHORTEST_STEP = 1e-3
