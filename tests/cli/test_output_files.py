@@ -150,6 +150,21 @@ def test_a_folder_in_a_files_place_is_known_before_anything_is_worked_out(run, t
     assert (code, out, err) == (2, "", "error: --out mine: is a folder; give the name of a file\n")
 
 
+def test_a_new_room_over_another_tells_which_files_remain(run, tmp_path):
+    assert run("new", "mine", "--template", "two_scatterers")[0] == 0
+    code, out, _ = run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--overwrite")
+    assert code == 0
+    left = {path.name for path in (tmp_path / "mine" / "meshes").iterdir()} - {
+        line.split('"')[1].removeprefix("meshes/")
+        for line in (tmp_path / "mine" / "scene.toml").read_text().splitlines()
+        if line.startswith("mesh =")
+    }
+    assert left
+    (line,) = (line for line in out.splitlines() if line.startswith("- of the room before remain, unused: "))
+    assert all(f"meshes/{name}" in line for name in left)
+    assert "remain" not in run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--overwrite")[1]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
