@@ -215,6 +215,11 @@ class AgentSection(SceneSection):
         unknown = set(self.columns or ()) - {"time", "x", "y", "z", "heading", "qx", "qy", "qz", "qw"}
         if unknown:
             raise ValueError(f"columns: '{min(unknown)[:20]}' is none of time, x, y, z, heading, qx, qy, qz, qw")
+        given_names = list((self.columns or {}).values())
+        twice = [what for what, name in (self.columns or {}).items() if given_names.count(name) > 1]
+        if twice:
+            both = " and ".join(map(repr, twice[:2]))
+            raise ValueError(f"columns: one column for {both}; give each quantity its own")
         return self
 
     def _check_stops(self, motion: str) -> None:
@@ -227,6 +232,9 @@ class AgentSection(SceneSection):
         if self.halt_s is not None and len(self.halt_s) != len(self.waypoints or ()):
             what = f"'halt_s' has {counted(len(self.halt_s), 'number')} for {len(self.waypoints or ())} waypoints"
             raise ValueError(f"{what}; give one for each, 0 where it does not halt")
+        if self.from_rest is False and any((self.halt_s or [])[:: max(1, len(self.halt_s or ()) - 1)]):
+            what = "'halt_s' halts at an end, where 'from_rest = false' has it in motion"
+            raise ValueError(f"{what}; give 0 there, or leave 'from_rest' out")
         if self.turn_deg_s is not None and self.heading_deg is not None:
             raise ValueError("'turn_deg_s' means nothing with the fixed 'heading_deg'; leave one of the two out")
         if self.turn_deg_s is not None and not any((self.halt_s or [])[1:-1]):

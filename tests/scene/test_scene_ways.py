@@ -165,6 +165,15 @@ def test_a_random_walk_keeps_clear_and_is_its_seeds(moved: Callable[..., Scene])
     ("motion", "says"),
     [
         ("waypoints = [[1.0, 1.0, 0.5], [2.0, 1.0, 0.5]]\ncycle_s = 0.1", "'waypoints' needs 'speed_m_s' beside it"),
+        (
+            "waypoints = [[1.0, 1, 1], [3.0, 1, 0.0]]\nspeed_m_s = 0.5\ncycle_s = 0.1",
+            "agent.waypoints[1]: [3.0, 1.0, 0.0] lies on a surface; keep 1 mm away",
+        ),
+        (
+            "waypoints = [[1.0, 1, 1], [3, 1, 1]]\nspeed_m_s = 0.5\ncycle_s = 0.1\nhalt_s = [0, 2]\nfrom_rest = false",
+            "'halt_s' halts at an end, where 'from_rest = false' has it in motion; give 0 there",
+        ),
+        ("trajectory = 'a.csv'\ncolumns = { x = 'y', y = 'y' }", "columns: one column for 'x' and 'y'; give each"),
         ("waypoints = [[1.0, 1.0, 0.5]]\nspeed_m_s = 1.0\ncycle_s = 0.1", "at least 2 items"),
         ("waypoints = [[1.0, 1.0, 0.5], [1.0, 1.0, 0.5]]\nspeed_m_s = 1.0\ncycle_s = 0.1", "are the same point"),
         ("waypoints = [[1.0, 1, 1], [3.0, 1, 1], [1.0, 1, 1]]\nspeed_m_s = 0.1\ncycle_s = 0.1", "turns back by 180"),
