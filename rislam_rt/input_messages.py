@@ -52,6 +52,10 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
     if item["type"] in ("too_short", "too_long"):
         most, number, given = re.findall("at (least|most) ([0-9]+).* not ([a-z0-9]+)", message)[0]
         return f"give at {most} {counted(int(number), 'item')}, not {given}"
+    if isinstance(item["input"], float) and item["input"] != item["input"]:
+        return "give a finite number"
+    if item["type"].startswith("int_") and str(item["input"]).strip("+-").isdigit():
+        return "give a whole number that 64 bits hold"
     kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
     if kind is not None:
         return f"give {kind}"

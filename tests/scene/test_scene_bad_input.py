@@ -86,7 +86,7 @@ _LIST = "property list uchar int vertex_indices\n"
     ("content", "says"),
     [
         (bytes(range(256)) * 40, "not a readable PLY"),
-        (ply_bytes(CORNERS, FACES)[:-1], ""),
+        (ply_bytes(CORNERS, FACES)[:-1], "not a readable PLY mesh (it ends after 293 of at least 294 bytes)"),
         (ply_bytes(CORNERS, FACES)[:150], "not a readable PLY"),
         (ply_bytes(CORNERS, FACES[:0]), "no faces"),
         (ply_bytes(CORNERS[:0], FACES[:0]), "no faces"),

@@ -195,12 +195,14 @@ def test_a_random_walk_keeps_clear_and_is_its_seeds(moved: Callable[..., Scene])
         ('trajectory = "a.tum"\nspeed_m_s = 1.0', "'speed_m_s' means nothing with 'trajectory'"),
         ('trajectory = "a.csv"\ncolumns = { speed = "v" }', "'speed' is none of time, x"),
         ('trajectory = "a.csv"\nvelocity = [0.1, 0.0, 0.0]', "'velocity' and 'trajectory' given; give one of"),
+        ('trajectory = "way.tum"\ncycles = 9', "'way.tum'"),
+        ('trajectory = "bad.tum"', "agent.trajectory: 'bad.tum': line 1 of the trajectory is not eight finite numbers"),
         ('trajectory = "way.tum"\ncolumns = { x = "v" }', "is no CSV file, and agent.columns is given"),
     ],
 )
 def test_a_bad_motion_is_one_line(moved: Callable[..., Scene], motion: str, says: str) -> None:
     with pytest.raises(SceneError) as caught:
-        moved(motion, way_tum="0 1 1 1 0 0 0 1\n")
+        moved(motion, way_tum="0 1 1 1 0 0 0 1\n", bad_tum="0 1\n")
     assert says in str(caught.value)
 
 

@@ -40,9 +40,9 @@ BOARDS = ("floorboard", "plywood", "chipboard")
 """Materials of timber, for which wood stands in at a carrier for which ITU-R P.2040 does not specify them."""
 
 
-def parse_material(text: str) -> dict[str, Any]:
+def parse_material(text: str, option: str = "--material") -> dict[str, Any]:
     """Parse a material written as `itu:concrete`, `itu:concrete:0.2` (thickness [m]) or `reflection:0.8` into a table
-    of the scene file.
+    of the scene file; `option` names it in errors.
 
     Raises
     ------
@@ -61,9 +61,9 @@ def parse_material(text: str) -> dict[str, Any]:
         pass
     if kind == "itu" and name not in known:
         mend = did_you_mean(nearest(name.lower(), known)) or f"give one of {', '.join(known)}"
-        raise ConfigError(f"--material: '{name[:40]}' is no ITU material; {mend}")
+        raise ConfigError(f"{option}: '{name[:40]}' is no ITU material; {mend}")
     wanted = "give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
-    raise ConfigError(f"--material: '{text[:60]}' received; {wanted}")
+    raise ConfigError(f"{option}: '{text[:60]}' received; {wanted}")
 
 
 def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:

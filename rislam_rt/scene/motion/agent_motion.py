@@ -51,8 +51,11 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
             content = read_inside(folder, agent.trajectory, MAX_TUM_BYTES)
             return _recorded_motion(agent, content, body), content
         except Fault as fault:
+            name = agent.trajectory[:80]
+            if name not in fault.message:
+                fault = Fault(f"'{name}': {fault.message}", fault.mend)
             fault.key = "trajectory"
-            raise
+            raise fault from None
     if agent.waypoints is not None:
         _check_waypoints(agent.waypoints, triangles)
         return _waypoint_motion(agent, body), b""
