@@ -90,7 +90,8 @@ def command(
         x, y, z = parse_point("--origin", origin).tolist()
         options = ImportOptions(
             units=units, up=up, origin=(x, y, z), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
-            max_walls=max_walls, fill=fill, materials=parse_choices(material or []), rest=parse_material(rest, "--rest"),
+            max_walls=max_walls, fill=fill, materials=parse_choices(material or []),
+            rest=parse_material(rest, "--rest"),
         )  # fmt: skip
         remarks = (
             import_room(source, scene, options, height=height, overwrite=overwrite)

@@ -215,11 +215,6 @@ class AgentSection(SceneSection):
         unknown = set(self.columns or ()) - {"time", "x", "y", "z", "heading", "qx", "qy", "qz", "qw"}
         if unknown:
             raise ValueError(f"columns: '{min(unknown)[:20]}' is none of time, x, y, z, heading, qx, qy, qz, qw")
-        given_names = list((self.columns or {}).values())
-        twice = [what for what, name in (self.columns or {}).items() if given_names.count(name) > 1]
-        if twice:
-            both = " and ".join(map(repr, twice[:2]))
-            raise ValueError(f"columns: one column for {both}; give each quantity its own")
         return self
 
     def _check_stops(self, motion: str) -> None:
@@ -233,8 +228,7 @@ class AgentSection(SceneSection):
             what = f"'halt_s' has {counted(len(self.halt_s), 'number')} for {len(self.waypoints or ())} waypoints"
             raise ValueError(f"{what}; give one for each, 0 where it does not halt")
         if self.from_rest is False and any((self.halt_s or [])[:: max(1, len(self.halt_s or ()) - 1)]):
-            what = "'halt_s' halts at an end, where 'from_rest = false' has it in motion"
-            raise ValueError(f"{what}; give 0 there, or leave 'from_rest' out")
+            raise ValueError("'halt_s' halts at an end, and 'from_rest = false' moves there; give 0, or leave that out")
         if self.turn_deg_s is not None and self.heading_deg is not None:
             raise ValueError("'turn_deg_s' means nothing with the fixed 'heading_deg'; leave one of the two out")
         if self.turn_deg_s is not None and not any((self.halt_s or [])[1:-1]):
@@ -371,17 +365,15 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
         what, _, mend = item["msg"].removeprefix("Value error, ").partition("; ")
         return Fault(f"{place}: {what}", mend or "mend this field")
     received = f"{place}: {_short(repr(item['input']), 60)} received"
-    return (
-        Fault(received, message)
-        if message.startswith(("give ", "did "))
-        else Fault(f"{received}, {message}", "mend it")
-    )
+    if message.startswith(("give ", "did ")):
+        return Fault(received, message)
+    return Fault(f"{received}, {message}", "mend it")
 
 
 def _list_of(item: Any) -> str:
     """What to give where a lone number stands for a list of so many: the number for each; empty for another fault."""
     key, lone = str(item["loc"][-1]), isinstance(item["input"], (int, float)) and item["type"] == "list_type"
-    fields = [section.model_fields[key] for section in SECTIONS.values() if key in section.model_fields] if lone else []
+    fields = [section.model_fields[key] for section in SECTIONS.values() if lone and key in section.model_fields]
     count = max((getattr(part, "min_length", 0) for field in fields for part in field.metadata), default=0)
     return f"give {counted(count, 'number')}, {key} = {[item['input']] * count}" if count else ""
 

@@ -171,9 +171,12 @@ def test_a_random_walk_keeps_clear_and_is_its_seeds(moved: Callable[..., Scene])
         ),
         (
             "waypoints = [[1.0, 1, 1], [3, 1, 1]]\nspeed_m_s = 0.5\ncycle_s = 0.1\nhalt_s = [0, 2]\nfrom_rest = false",
-            "'halt_s' halts at an end, where 'from_rest = false' has it in motion; give 0 there",
+            "'halt_s' halts at an end, and 'from_rest = false' moves there; give 0, or leave that out",
         ),
-        ("trajectory = 'a.csv'\ncolumns = { x = 'y', y = 'y' }", "columns: one column for 'x' and 'y'; give each"),
+        (
+            "trajectory = 'way.csv'\ncolumns = { x = 'y', y = 'y' }",
+            "column 'y' of the trajectory is named for 'x' and 'y'; give each",
+        ),
         ("waypoints = [[1.0, 1.0, 0.5]]\nspeed_m_s = 1.0\ncycle_s = 0.1", "at least 2 items"),
         ("waypoints = [[1.0, 1.0, 0.5], [1.0, 1.0, 0.5]]\nspeed_m_s = 1.0\ncycle_s = 0.1", "are the same point"),
         ("waypoints = [[1.0, 1, 1], [3.0, 1, 1], [1.0, 1, 1]]\nspeed_m_s = 0.1\ncycle_s = 0.1", "turns back by 180"),
@@ -202,7 +205,7 @@ def test_a_random_walk_keeps_clear_and_is_its_seeds(moved: Callable[..., Scene])
 )
 def test_a_bad_motion_is_one_line(moved: Callable[..., Scene], motion: str, says: str) -> None:
     with pytest.raises(SceneError) as caught:
-        moved(motion, way_tum="0 1 1 1 0 0 0 1\n", bad_tum="0 1\n")
+        moved(motion, way_tum="0 1 1 1 0 0 0 1\n", bad_tum="0 1\n", way_csv=CSV)
     assert says in str(caught.value)
 
 
