@@ -372,8 +372,8 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
 
 def _list_of(item: Any) -> str:
     """What to give where a lone number stands for a list of so many: the number for each; empty for another fault."""
-    key, lone = str(item["loc"][-1]), isinstance(item["input"], (int, float)) and item["type"] == "list_type"
-    fields = [section.model_fields[key] for section in SECTIONS.values() if lone and key in section.model_fields]
+    key = str(item["loc"][-1]) if item["type"] == "list_type" and isinstance(item["input"], (int, float)) else ""
+    fields = [section.model_fields[key] for section in SECTIONS.values() if key in section.model_fields]
     count = max((getattr(part, "min_length", 0) for field in fields for part in field.metadata), default=0)
     return f"give {counted(count, 'number')}, {key} = {[item['input']] * count}" if count else ""
 
