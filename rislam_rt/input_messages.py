@@ -52,6 +52,10 @@ def expected_input(item: Mapping[str, Any], typed: bool = False) -> str:
     if item["type"] in ("too_short", "too_long"):
         most, number, given = re.findall("at (least|most) ([0-9]+).* not ([a-z0-9]+)", message)[0]
         return f"give at {most} {counted(int(number), 'item')}, not {given}"
+    if isinstance(item["input"], float) and item["input"] != item["input"]:
+        return "give a finite number"
+    if item["type"].startswith("int_") and str(item["input"]).strip("+-").isdigit():
+        return "give a whole number that 64 bits hold"
     kind = next((text for begins, text in KINDS.items() if item["type"].startswith(begins)), None)
     if kind is not None:
         return f"give {kind}"
@@ -69,6 +73,13 @@ def _entry(word: str) -> str:
     except ValueError:
         return toml_value(word)
     return word
+
+
+def parse_number(text: str) -> float:
+    """Number in a user's file or on the command line; a `ValueError` for `1_5`, which Python takes for 15."""
+    if "_" in text:
+        raise ValueError(text)
+    return float(text)
 
 
 LEAST_LIKE = 0.75

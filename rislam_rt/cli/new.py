@@ -1,5 +1,6 @@
 """The command `rislam-rt new SCENE`: makes a scene folder from a built-in or random room, a file or a floor plan."""
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -70,9 +71,11 @@ def command(
     from rislam_rt.scene import new_scene, write_scene
 
     _one_origin(source, floorplan, seed, template)
+    before = _named_files(scene) if overwrite else set()
     if source is not None and (source.suffix.lower() == ".xml" or str(source).startswith("sionna:")):
         own = {"--units": units, "--up": up, "--origin": origin != "0,0,0", "--material": material}
         _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
+        _tell_left(scene, before)
         return
     if within:
         raise ConfigError("--within: only XML scenes are cut to a window; leave it out")
@@ -87,7 +90,8 @@ def command(
         x, y, z = parse_point("--origin", origin).tolist()
         options = ImportOptions(
             units=units, up=up, origin=(x, y, z), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
-            max_walls=max_walls, fill=fill, materials=parse_choices(material or []), rest=parse_material(rest),
+            max_walls=max_walls, fill=fill, materials=parse_choices(material or []),
+            rest=parse_material(rest, "--rest"),
         )  # fmt: skip
         remarks = (
             import_room(source, scene, options, height=height, overwrite=overwrite)
@@ -96,6 +100,7 @@ def command(
         )
         for remark in remarks:
             typer.echo(f"- {remark}")
+        _tell_left(scene, before)
         typer.echo(f"{scene}: made from '{source or 'a floor plan'}'; edit its scene.toml")
         return
     if seed is not None:
@@ -103,9 +108,35 @@ def command(
 
         room = draw_room(seed)
         write_scene(room.scene, scene, overwrite=overwrite)
+        _tell_left(scene, before)
         typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
         return
-    typer.echo(f"{new_scene(template, scene, overwrite=overwrite)}: made from '{template}'; edit its scene.toml")
+    folder = new_scene(template, scene, overwrite=overwrite)
+    _tell_left(scene, before)
+    typer.echo(f"{folder}: made from '{template}'; edit its scene.toml")
+
+
+def _named_files(folder: Path) -> set[str]:
+    """Files that the scene file in a folder names, of which `new --overwrite` tells those that remain; none where it
+    cannot be read."""
+    from rislam_rt.toml import parse_toml
+
+    try:
+        table = parse_toml((folder / "scene.toml").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return set()
+    parts = [part for value in table.values() for part in (value if isinstance(value, list) else [value])]
+    named = [part.get(key) for part in parts if isinstance(part, dict) for key in ("mesh", "trajectory")]
+    return {name for name in named if isinstance(name, str)}
+
+
+def _tell_left(folder: Path, before: set[str]) -> None:
+    """Part of `rislam-rt new --overwrite`: say which files of the room that was there before remain, as no file is
+    deleted."""
+    left = sorted(name for name in before - _named_files(folder) if os.path.isfile(folder / name))
+    if left:
+        more = f" and {len(left) - 8} more" if len(left) > 8 else ""
+        typer.echo(f"- of the room before remain, unused: {', '.join(left[:8])}{more}; delete what you do not need")
 
 
 def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:

@@ -111,9 +111,10 @@ def parse_point(option: str, text: str) -> "Floats":
     import numpy as np
 
     from rislam_rt.errors import ConfigError
+    from rislam_rt.input_messages import parse_number
 
     try:
-        values = np.array([float(part) for part in text.split(",")])
+        values = np.array([parse_number(part) for part in text.split(",")])
     except ValueError:
         values = np.zeros(0)
     if values.shape == (3,) and (np.abs(values) > FARTHEST).any():

@@ -64,6 +64,20 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
     return file
 
 
+def check_ending(option: str, file: Path | None, endings: Sequence[str]) -> None:
+    """Check that an output file's name has one of the endings of its format, or none.
+
+    Raises
+    ------
+    ConfigError
+        It has that of another.
+    """
+    from rislam_rt.errors import ConfigError
+
+    if file is not None and file.suffix and file.suffix.lower() not in endings:
+        raise ConfigError(f"{option} {file}: not of that ending; give a name that ends in {' or '.join(endings)}")
+
+
 def page_files(name: str, *, figure: bool = False) -> tuple[str, ...]:
     """Names of the output files of a study: page, table, data, and the figure if there is one."""
     return (f"{name}.md", f"{name}.csv", f"{name}.json", *([f"figures/{name}.png"] if figure else []))

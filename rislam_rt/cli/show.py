@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file, settings_of
-from rislam_rt.cli.output_files import OUTPUT, check_output
+from rislam_rt.cli.output_files import OUTPUT, check_ending, check_output
 
 if TYPE_CHECKING:
     from rislam_rt.model import Scene
@@ -42,6 +42,7 @@ def command(
     from rislam_rt.report.terminal_tables import print_scene
     from rislam_rt.scene.scene_folder import safe_name
 
+    check_ending("--html", html, (".html", ".htm"))
     settings = settings_of(pipeline, set_ or ()) if html is not None else None
     if out is not None:
         from rislam_rt.report.style import picture_kind

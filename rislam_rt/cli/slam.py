@@ -73,7 +73,7 @@ def command(
     inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
     for line in input_warnings(inputs):
         warn(f"{measurements}: {line}")
-    true = None if truth is None else _true_positions(truth, len(inputs.time))
+    true = None if truth is None else _true_positions(truth, inputs.time + inputs.since)
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
     answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed))
@@ -116,21 +116,29 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
     return Body(*ends)
 
 
-def _true_positions(file: Path, cycles: int) -> "Floats":
-    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM or CSV file of `--truth`, one a cycle."""
+def _true_positions(file: Path, cycles: "Floats") -> "Floats":
+    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM or CSV file of `--truth`, one at each of the cycles'
+    times (K,) [s]."""
+    import numpy as np
+
     from rislam_rt.errors import ConfigError
     from rislam_rt.scene.findings import Fault
     from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
 
     try:
         content = file.read_bytes()
-        position = parse_csv(content, {}).position if file.suffix.lower() == ".csv" else parse_tum(content)[1]
+        time, position = (parse_csv(content, {}) if file.suffix.lower() == ".csv" else parse_tum(content))[:2]
     except OSError as error:
         raise ConfigError(f"--truth {file}: cannot be read ({error.strerror}); give a TUM or CSV file") from None
     except Fault as fault:
         raise ConfigError(fault.at(f"--truth {file}", "").line) from None
-    if len(position) != cycles:
-        raise ConfigError(f"--truth {file}: {len(position)} poses for {cycles} cycles; give one a cycle")
+    if len(position) != len(cycles):
+        raise ConfigError(f"--truth {file}: {len(position)} poses for {len(cycles)} cycles; give one a cycle")
+    apart = np.abs(time - cycles)
+    if len(cycles) > 1 and apart.max() > 0.5 * float(np.median(np.diff(cycles))):
+        pose = int(np.argmax(apart))
+        what = f"pose {pose} is at {time[pose]:.10g} s, its cycle at {cycles[pose]:.10g} s"
+        raise ConfigError(f"--truth {file}: {what}, more than half a cycle apart; give both by one clock")
     return position
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder
-from rislam_rt.cli.output_files import OUTPUT, check_output, write_json
+from rislam_rt.cli.output_files import OUTPUT, check_ending, check_output, write_json
 
 if TYPE_CHECKING:
     from rislam_rt.model import Paths, RadioConfig, Scene
@@ -72,7 +72,9 @@ def command(
     from rislam_rt.report.terminal_tables import path_table, print_paths
     from rislam_rt.scene.scene_folder import safe_name
     from rislam_rt.scene.write import write_files
+    from rislam_rt.storage.netcdf import NETCDF
 
+    check_ending("--out", out, NETCDF)
     beyond = [word for word in set_ or () if not signals and not word.startswith("radio.")]
     if beyond:
         raise ConfigError(f"--set {beyond[0][:60]}: without --signals radio.* alone; add it, or leave this out")

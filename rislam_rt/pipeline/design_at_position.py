@@ -9,6 +9,8 @@ from rislam_rt.design import DESIGNERS, Design, DesignProblem, panel_columns, pr
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.channels import build_channel
+from rislam_rt.scene.check.mesh_queries import touching
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE
 
 
 class DesignsAt(NamedTuple):
@@ -32,12 +34,13 @@ def design_at(
     Raises
     ------
     ConfigError
-        The scene has no panel, or no path over it is visible from there.
+        The scene has no panel, no path over it is visible from there, or agent, Tx or Rx lies on it or on its host.
     """
     if scene.ris is None:
         raise ConfigError(f"design: scene '{scene.name}' has no panel; give a scene with a [ris] section")
     agent = scene.agent
     here = Trajectory(np.zeros(1), point[None], np.zeros((1, 3)), agent.heading[:1], agent.body)
+    _check_off_panels(scene, np.stack([point, here.tx[0], here.rx[0]]))
     paths = build_channel(channel, scene, radio, depth).paths(here)
     problem = problem_from_paths(paths, here.tx[0], here.rx[0], radio, scene.ris.spec.levels)
     target = panel_columns(paths, 0)[0]
@@ -47,6 +50,23 @@ def design_at(
     }
     gains = {name: _panel_gains(scene, problem, design) for name, design in designs.items()}
     return DesignsAt(designs, paths.label(int(target)), bool(paths.kind[target] == PathKind.RIS), gains)
+
+
+def _check_off_panels(scene: Scene, points: Floats) -> None:
+    """Raise an error if agent, Tx or Rx, points (3, 3) [m], lie on a RIS panel or on the wall that it hangs on."""
+    for panel in scene.panels:
+        spec = panel.spec
+        offset = points - panel.center
+        away = np.linalg.norm(offset[:, None] - spec.offsets().reshape(-1, 3), axis=-1).min(axis=1)
+        beside = away <= 0.5 * np.linalg.norm(spec.spacing) + MIN_CLEARANCE
+        if (beside & (np.abs(offset @ spec.normal) < MIN_CLEARANCE)).any():
+            raise ConfigError(f"--at: {points[0].tolist()} lies on the panel '{panel.name}'; move it off")
+        host = next((one for one in scene.reflectors if one.name == panel.host), None)
+        if host is not None and len(touching(points, host.triangles, MIN_CLEARANCE)[0]):
+            raise ConfigError(
+                f"--at: {points[0].tolist()} lies on '{host.name}', which holds the panel '{panel.name}'; keep "
+                f"{1e3 * MIN_CLEARANCE:g} mm away"
+            )
 
 
 def _panel_gains(scene: Scene, problem: DesignProblem, design: Design) -> dict[str, float]:

@@ -131,7 +131,7 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
     """Seal a run's data set by attributes: `about`, schema version, number of cycles, checksum of its content."""
     found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["time"]))
-    return found.assign_attrs(checksum=_checksum(found))
+    return found.assign_attrs(checksum=dataset_checksum(found))
 
 
 def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
@@ -142,14 +142,14 @@ def check_dataset(data: "xr.Dataset", path: Path, **about: str | int) -> None:
     ResultError
         It has not. One line.
     """
-    expected = {"schema": SCHEMA, "cycles": data.sizes.get("time"), **about, "checksum": _checksum(data)}
+    expected = {"schema": SCHEMA, "cycles": data.sizes.get("time"), **about, "checksum": dataset_checksum(data)}
     for name, value in expected.items():
         found = data.attrs.get(name)
         if found is None or str(found) != str(value):
             raise ResultError(f"{path}: {name} is {str(found)[:70]} and should be {str(value)[:70]}; run again")
 
 
-def _checksum(data: "xr.Dataset") -> str:
+def dataset_checksum(data: "xr.Dataset") -> str:
     """SHA-256 over a run's data set: names, shapes, types, values and attributes; not over how the file packs them."""
     digest = hashlib.sha256()
     for name in sorted(map(str, data.variables)):

@@ -4,6 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, phasor
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model.delay_spread import delay_spread_remark
 from rislam_rt.model.ris import DataSheet, RisCode, RisSpec
 
 TANG_GAIN = 8.0
@@ -103,7 +104,4 @@ def delay_spread_warnings(spec: RisSpec, center: Floats, tx: Floats, rx: Floats,
     spread = float(np.max(delay_spread(spec, center, tx, rx), initial=0.0))
     if spread * bandwidth <= 1.0:
         return ()
-    return (
-        f"ris: delays over the panel spread by up to {spread * 1e9:.3g} ns, more than 1 / B = "
-        f"{1e9 / bandwidth:.3g} ns; take a smaller panel or a smaller bandwidth",
-    )
+    return ("ris: " + "; ".join(delay_spread_remark(spread, bandwidth)),)

@@ -133,7 +133,7 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
                 found.append(build(section))
             except Fault as fault:
                 of_mesh = f"{kind}[{number}].mesh ({section.name})"
-                field = f"{panel_key(number, len(sections))}.up" if kind == "ris" else of_mesh
+                field = panel_key(number, len(sections)) if kind == "ris" else of_mesh
                 findings.append(fault.at(str(file), field))
         return found
 
@@ -202,17 +202,24 @@ def build_panel(section: RisSection) -> RisPanel:
         Its directions have no length, or are not at right angles.
     """
     normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
-    if not normal.any() or not up.any():
-        raise Fault("ris.normal or ris.up has no length", "give two directions")
+    for key, direction in (("normal", normal), ("up", up)):
+        if not direction.any():
+            raise _of_key(key, Fault(f"{getattr(section, key)} has no length", "give a direction"))
     if abs(normal @ up) > 1e-6:
         angle = np.degrees(np.arccos(np.clip(normal @ up, -1.0, 1.0)))
-        raise Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it")
+        raise _of_key("up", Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it"))
     up = unit(up - (normal @ up) * normal)
     spec = RisSpec(
         section.rows, section.cols, np.array(section.spacing_m), normal, up, section.levels, section.element,
         section.amplitude,
     )  # fmt: skip
     return RisPanel(spec, np.array(section.center), section.host, section.name)
+
+
+def _of_key(key: str, fault: Fault) -> Fault:
+    """Fault of one key of a table of the scene to load."""
+    fault.key = key
+    return fault
 
 
 def _digest(content: bytes, contents: dict[str, bytes]) -> str:

@@ -141,6 +141,10 @@ def _own_ply(content: bytes) -> Mesh | None:
     num_vertices, num_faces = int(header[1]), int(header[3])
     real = np.dtype("<f8" if header[2] == b"double" else "<f4")
     body = header.end() + num_vertices * 3 * real.itemsize
+    least = body + num_faces * _PLY_FACE.itemsize  # a triangle's; other faces are longer
+    if len(content) < least:
+        what = f"it ends after {len(content)} of at least {least} bytes"
+        raise Fault(f"not a readable PLY mesh ({what})", "copy or export the mesh again")
     if len(content) != body + num_faces * _PLY_FACE.itemsize:
         return None
     vertices = np.frombuffer(content, real, num_vertices * 3, header.end()).reshape(-1, 3)

@@ -227,6 +227,8 @@ class AgentSection(SceneSection):
         if self.halt_s is not None and len(self.halt_s) != len(self.waypoints or ()):
             what = f"'halt_s' has {counted(len(self.halt_s), 'number')} for {len(self.waypoints or ())} waypoints"
             raise ValueError(f"{what}; give one for each, 0 where it does not halt")
+        if self.from_rest is False and any((self.halt_s or [])[:: max(1, len(self.halt_s or ()) - 1)]):
+            raise ValueError("'halt_s' halts at an end, and 'from_rest = false' moves there; give 0, or leave that out")
         if self.turn_deg_s is not None and self.heading_deg is not None:
             raise ValueError("'turn_deg_s' means nothing with the fixed 'heading_deg'; leave one of the two out")
         if self.turn_deg_s is not None and not any((self.halt_s or [])[1:-1]):
@@ -356,18 +358,24 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
         return Fault(f"{place}: unknown key", _near_key(str(where[-1])) or "remove it or mend its name")
     if item["type"] == "list_type" and isinstance(item["input"], dict) and len(where) == 1:
         return Fault(f"{place}: one table received", f"there may be several: write [[{place}]], with two brackets")
-    message = expected_input(item)
+    message = _list_of(item) or expected_input(item)
     if item["type"] == "string_pattern_mismatch":
         message = "give letters and digits of any script, '_', '-' and '.' only, and not dots alone"
     if isinstance(item["input"], dict):
         what, _, mend = item["msg"].removeprefix("Value error, ").partition("; ")
         return Fault(f"{place}: {what}", mend or "mend this field")
     received = f"{place}: {_short(repr(item['input']), 60)} received"
-    return (
-        Fault(received, message)
-        if message.startswith(("give ", "did "))
-        else Fault(f"{received}, {message}", "mend it")
-    )
+    if message.startswith(("give ", "did ")):
+        return Fault(received, message)
+    return Fault(f"{received}, {message}", "mend it")
+
+
+def _list_of(item: Any) -> str:
+    """What to give where a lone number stands for a list of so many: the number for each; empty for another fault."""
+    key = str(item["loc"][-1]) if item["type"] == "list_type" and isinstance(item["input"], (int, float)) else ""
+    fields = [section.model_fields[key] for section in SECTIONS.values() if key in section.model_fields]
+    count = max((getattr(part, "min_length", 0) for field in fields for part in field.metadata), default=0)
+    return f"give {counted(count, 'number')}, {key} = {[item['input']] * count}" if count else ""
 
 
 SECTIONS: dict[str, type[SceneSection]] = {

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 Entry = tuple[tuple[str, ...], str, str]
 """Dimensions, unit and meaning of a NetCDF variable."""
+NETCDF = (".nc", ".h5", ".hdf5")
+"""Suffixes of NetCDF files, which are HDF5."""
 
 
 def variables(values: Mapping[str, Any], table: Mapping[str, Entry], prefix: str = "") -> dict[str, Any]:

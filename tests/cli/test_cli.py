@@ -39,6 +39,8 @@ def test_new_room_from_corners(run):
         ["design", SCENE, "--at", "1,2"],
         ["design", SCENE, "--at", "1,2,nan"],
         ["design", SCENE, "--at", "1,2,30"],
+        ["design", SCENE, "--at", "3,3,3"],
+        ["design", SCENE, "--at", "1,1,3"],
         ["run", "nowhere.toml"],
         ["run", PIPELINE, "--scene", "nowhere"],
         ["run", PIPELINE, "--scene", SCENE, "--set", "scene=office"],

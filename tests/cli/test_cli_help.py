@@ -134,3 +134,20 @@ def test_wrong_usage_is_said_in_plain_words(run, arguments, says):
     assert (code, out) == (2, "")
     assert says in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("config", "--set", 'schemes=["no_ris","no_ris"]'), "--set: schemes: each at most once; leave"),
+        (("config", "--set", f"seed={10**23}"), "give a whole number that 64 bits hold"),
+        (("config", "--set", "radio.carrier_ghz=nan"), "received; give a finite number"),
+        (("new", "x", "--floorplan", "0,0 4,0 4,3", "--rest", "itu:cheese"), "error: --rest: 'cheese' is no ITU"),
+        (("new", "x", "--from", ""), "error: .: is a folder; give a file: .glb"),
+        (("run", "trace_then_slam", "--set", "cycles=2", "--out", "/proc/x"), "error: --out /proc/x: cannot be"),
+    ],
+)
+def test_a_line_names_what_was_typed(run, words, said):
+    code, _, err = run(*words)
+    assert code in (2, 4)
+    assert said in err

@@ -150,6 +150,35 @@ def test_a_folder_in_a_files_place_is_known_before_anything_is_worked_out(run, t
     assert (code, out, err) == (2, "", "error: --out mine: is a folder; give the name of a file\n")
 
 
+def test_a_new_room_over_another_tells_which_files_remain(run, tmp_path):
+    assert run("new", "mine", "--template", "two_scatterers")[0] == 0
+    code, out, _ = run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--overwrite")
+    assert code == 0
+    left = {path.name for path in (tmp_path / "mine" / "meshes").iterdir()} - {
+        line.split('"')[1].removeprefix("meshes/")
+        for line in (tmp_path / "mine" / "scene.toml").read_text().splitlines()
+        if line.startswith("mesh =")
+    }
+    assert left
+    (line,) = (line for line in out.splitlines() if line.startswith("- of the room before remain, unused: "))
+    assert all(f"meshes/{name}" in line for name in left)
+    assert "remain" not in run("new", "mine", "--floorplan", "0,0 4,0 4,3 0,3", "--overwrite")[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("trace", "empty_box", "--out", "x.csv"), "--out x.csv: not of that ending; give a name that ends in .nc"),
+        (("show", "empty_box", "--html", "x.png"), "--html x.png: not of that ending; give a name that ends in .html"),
+    ],
+)
+def test_a_file_is_not_written_under_the_ending_of_another_format(run, tmp_path, words, said):
+    code, _, err = run(*words)
+    assert code == 2
+    assert said in err
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_link_stays_a_link(run, tmp_path):
     words = ("config", "--explain", "slam.sigma_a", "--json")
     (tmp_path / "there").mkdir()

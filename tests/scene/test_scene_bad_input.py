@@ -50,6 +50,11 @@ def test_every_bad_field_is_a_line(damaged: Damage) -> None:
     assert str(caught.value).endswith("(and 2 more)")
 
 
+def test_a_lone_number_for_a_list_is_told_a_list_that_works(damaged: Damage) -> None:
+    folder = damaged("spacing_m = [", "spacing_m = 0.015 # [")
+    assert "spacing_m: 0.015 received; give 2 numbers, spacing_m = [0.015, 0.015]" in refusal(folder)
+
+
 def test_mesh_behind_a_link(room: Path) -> None:
     inside, outside = room / "meshes/floor.ply", room.parent / "outside.ply"
     inside.rename(outside)
@@ -81,7 +86,7 @@ _LIST = "property list uchar int vertex_indices\n"
     ("content", "says"),
     [
         (bytes(range(256)) * 40, "not a readable PLY"),
-        (ply_bytes(CORNERS, FACES)[:-1], ""),
+        (ply_bytes(CORNERS, FACES)[:-1], "not a readable PLY mesh (it ends after 293 of at least 294 bytes)"),
         (ply_bytes(CORNERS, FACES)[:150], "not a readable PLY"),
         (ply_bytes(CORNERS, FACES[:0]), "no faces"),
         (ply_bytes(CORNERS[:0], FACES[:0]), "no faces"),

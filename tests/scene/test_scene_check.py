@@ -228,6 +228,19 @@ def test_no_remark_on_what_is_sound(paper: Scene, change: Change) -> None:
     assert complaints(change(paper)) == {}
 
 
+def test_boxes_face_to_face_are_one_note(paper: Scene) -> None:
+    """A staircase of four boxes: its faces that meet, each within the higher one's or beyond it, are seen by nobody."""
+    room = paper
+    for step in range(4):
+        low, high = [2 + 0.3 * step, 3 + 0.2 * step, 0], [2.3 + 0.3 * step, 4 + 0.2 * step, 0.2 * (step + 1)]
+        room = furnished(room, f"step{step}", block(low, high))
+    assert complaints(room) == {}
+    (note,) = (f for f in check_scene(room) if "plane of" in f.message)
+    assert note.message.endswith("0 mm apart, and 6 other pairs likewise")  # four on the floor, three of steps
+    hung = furnished(room, "plate", grid([2.3, 3.2, 0.1], [0, 0.5, 0], [0, 0, 0.3], 1, 1))  # beyond the first step
+    assert "'plate'" in " ".join(complaints(hung).values())
+
+
 def test_room_of_a_larger_building_is_no_object(paper: Scene) -> None:
     """Two closed rooms, one a thousandth of the scene's box: its landmark says that it is lived in."""
     far = block([40.0, 40.0, 0.0], [60.0, 60.0, 20.0])

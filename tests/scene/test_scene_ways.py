@@ -165,6 +165,18 @@ def test_a_random_walk_keeps_clear_and_is_its_seeds(moved: Callable[..., Scene])
     ("motion", "says"),
     [
         ("waypoints = [[1.0, 1.0, 0.5], [2.0, 1.0, 0.5]]\ncycle_s = 0.1", "'waypoints' needs 'speed_m_s' beside it"),
+        (
+            "waypoints = [[1.0, 1, 1], [3.0, 1, 0.0]]\nspeed_m_s = 0.5\ncycle_s = 0.1",
+            "agent.waypoints[1]: [3.0, 1.0, 0.0] lies on a surface; keep 1 mm away",
+        ),
+        (
+            "waypoints = [[1.0, 1, 1], [3, 1, 1]]\nspeed_m_s = 0.5\ncycle_s = 0.1\nhalt_s = [0, 2]\nfrom_rest = false",
+            "'halt_s' halts at an end, and 'from_rest = false' moves there; give 0, or leave that out",
+        ),
+        (
+            "trajectory = 'way.csv'\ncolumns = { x = 'y', y = 'y' }",
+            "column 'y' of the trajectory is named for 'x' and 'y'; give each",
+        ),
         ("waypoints = [[1.0, 1.0, 0.5]]\nspeed_m_s = 1.0\ncycle_s = 0.1", "at least 2 items"),
         ("waypoints = [[1.0, 1.0, 0.5], [1.0, 1.0, 0.5]]\nspeed_m_s = 1.0\ncycle_s = 0.1", "are the same point"),
         ("waypoints = [[1.0, 1, 1], [3.0, 1, 1], [1.0, 1, 1]]\nspeed_m_s = 0.1\ncycle_s = 0.1", "turns back by 180"),
@@ -186,12 +198,14 @@ def test_a_random_walk_keeps_clear_and_is_its_seeds(moved: Callable[..., Scene])
         ('trajectory = "a.tum"\nspeed_m_s = 1.0', "'speed_m_s' means nothing with 'trajectory'"),
         ('trajectory = "a.csv"\ncolumns = { speed = "v" }', "'speed' is none of time, x"),
         ('trajectory = "a.csv"\nvelocity = [0.1, 0.0, 0.0]', "'velocity' and 'trajectory' given; give one of"),
+        ('trajectory = "way.tum"\ncycles = 9', "'way.tum'"),
+        ('trajectory = "bad.tum"', "agent.trajectory: 'bad.tum': line 1 of the trajectory is not eight finite numbers"),
         ('trajectory = "way.tum"\ncolumns = { x = "v" }', "is no CSV file, and agent.columns is given"),
     ],
 )
 def test_a_bad_motion_is_one_line(moved: Callable[..., Scene], motion: str, says: str) -> None:
     with pytest.raises(SceneError) as caught:
-        moved(motion, way_tum="0 1 1 1 0 0 0 1\n")
+        moved(motion, way_tum="0 1 1 1 0 0 0 1\n", bad_tum="0 1\n", way_csv=CSV)
     assert says in str(caught.value)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, RisSpec, SchemeResult
 from rislam_rt.model.ris import join_sheets
 from rislam_rt.pipeline.run_datasets import AXES, names_of
@@ -159,11 +160,14 @@ def _panel(data: "xr.Dataset") -> tuple[DataSheet | None, tuple[RisCode | None, 
 
 
 def _measurements(data: "xr.Dataset") -> tuple[Measurement, ...]:
-    """Measurements of a NetCDF recording, one a cycle, without the padding."""
+    """Measurements of a NetCDF recording, one a cycle, without the padding; an error names the cycle, from 0."""
     fields = {name: name for name in (*PARTS, "from_panel")} | {"which_panel": "panel"}
     table = {field: data[name].to_numpy() for name, field in fields.items() if name in data}
     held = table["tau"] != PADDING
-    return tuple(
-        Measurement(**{name: value[cycle, held[cycle]] for name, value in table.items()})
-        for cycle in range(data.sizes["time"])
-    )
+    made = []
+    for cycle in range(data.sizes["time"]):
+        try:
+            made.append(Measurement(**{name: value[cycle, held[cycle]] for name, value in table.items()}))
+        except RislamError as error:
+            raise ConfigError(f"cycle {cycle}: {str(error).removeprefix('Measurement.')}") from None
+    return tuple(made)

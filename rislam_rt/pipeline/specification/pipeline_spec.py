@@ -263,7 +263,7 @@ class PipelineSpec(Section):
     @model_validator(mode="after")
     def _each_scheme_once(self) -> "PipelineSpec":
         if len(set(self.schemes)) < len(self.schemes):
-            raise ValueError("schemes: each at most once")
+            raise ValueError("schemes: each at most once; leave the repeated one out")
         return self
 
     @model_validator(mode="after")

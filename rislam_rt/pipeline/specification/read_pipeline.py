@@ -201,7 +201,8 @@ def _place(item: Any) -> str:
 
 def _line(path: Path, item: Any, changed: Sequence[str], model: type[BaseModel]) -> str:
     """Line for one validation error of a pipeline: the file, or the command line that set the key, and the message."""
-    source = _source(path, _place(item), changed, item["type"] == "extra_forbidden")
+    said = str(item["msg"]).removeprefix("Value error, ").partition(":")[0]  # of a whole table, it begins with the key
+    source = _source(path, _place(item) or said, changed, item["type"] == "extra_forbidden")
     return f"{source}: {_remark(item, model, source == '--set')}"
 
 

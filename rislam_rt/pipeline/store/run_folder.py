@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rislam_rt.errors import ConfigError, ResultError, RislamError
+from rislam_rt.errors import ConfigError, ResultError, RislamError, StoreError
 from rislam_rt.model import SchemeResult, SlamResult, Trajectory
 from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
@@ -186,7 +186,10 @@ def open_run(folder: Path, identity: RunIdentity) -> Iterator[RunFolder]:
         The disk refused.
     """
     find_run(folder, identity)
-    made = make_folders(folder)
+    try:
+        made = make_folders(folder)
+    except StoreError as error:
+        raise StoreError(f"--out {error}") from None
     try:
         with hold_run(folder):
             about = find_run(folder, identity)

@@ -9,6 +9,7 @@ from rislam_rt.arrays import cross
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
+from rislam_rt.model.delay_spread import delay_spread_remark
 from rislam_rt.scene.check.mesh_queries import ray_hits, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding, panel_key
@@ -47,9 +48,7 @@ def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
         yield from _beyond_room(room, panel, key)
         spread = _delay_spread(room, panel)
         if spread * radio.bandwidth > 1.0:
-            limit = f"1 / B = {1e9 / radio.bandwidth:g} ns"
-            message = f"delays over the panel spread by up to {spread * 1e9:.2f} ns, more than {limit}"
-            yield room.warning(f"{key}.rows", message, "take a smaller panel or a smaller bandwidth")
+            yield room.warning(f"{key}.rows", *delay_spread_remark(spread, radio.bandwidth))
 
 
 def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:

@@ -10,7 +10,8 @@ from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_planes
-from rislam_rt.scene.check.mesh_queries import winding
+from rislam_rt.input_messages import counted
+from rislam_rt.scene.check.mesh_queries import touching, winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
@@ -59,33 +60,55 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
-    """Scene check: a finding for each pair of meshes that overlap in one plane; a note where nobody sees it."""
+    """Scene check: a finding for each pair of meshes that overlap in one plane; one note for all where nobody sees
+    it."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
     limit = tracer_gap(room.bounds)
     worst: dict[tuple[int, int, bool], CoplanarPair] = {}
     for pair in stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs:
-        upper, lower = parts.reflector(pair.upper), parts.reflector(pair.lower)
-        key = upper, lower, _is_seen(room, room.triangles[parts.owner == pair.upper], upper)
+        key = parts.reflector(pair.upper), parts.reflector(pair.lower), _is_seen(room, parts, pair, limit)
         if key not in worst or worst[key].gap < pair.gap:
             worst[key] = pair
+    hidden = sum(not seen for _, _, seen in worst)
     for (upper, lower, seen), pair in worst.items():
-        names = room.scene.reflectors[upper].name, room.scene.reflectors[lower].name
-        message = f"'{names[0]}' lies in the plane of '{names[1]}', {pair.gap * 1e3:.3g} mm apart"
-        mend = (
-            f"where they overlap '{names[0]}' reflects; leave one out, or part them by more than {limit * 1e3:.2g} mm"
-        )
-        yield (room.warning if seen else room.note)(f"reflector[{upper}].mesh ({names[0]})", message, mend)
+        names, field = [room.scene.reflectors[number].name for number in (upper, lower)], f"reflector[{upper}].mesh"
+        field, apart = f"{field} ({names[0]})", f"{round(pair.gap * 1e3, 2):g} mm apart"
+        message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
+        if seen:
+            mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm"
+            yield room.warning(field, message, f"where they overlap '{names[0]}' reflects; {mend}")
+        elif hidden:
+            message += f", and {counted(hidden - 1, 'other pair')} likewise" if hidden > 1 else ""
+            yield room.note(field, message, "nobody sees the faces where they meet; leave them")
+            hidden = 0
 
 
-def _is_seen(room: TriangleArray, wall: Floats, reflector: int) -> bool:
-    """Scene check: whether a wall of triangles (T, 3, 3) has a side in the room, as the foot of a crate has not."""
-    normal, _ = triangle_planes(wall)
-    middle = wall.mean(axis=1)
-    sides = np.concatenate([middle + MIN_CLEARANCE * normal, middle - MIN_CLEARANCE * normal])
-    inside = np.delete(sides, room.outside(sides), axis=0)
-    own = room.triangles[room.owner == reflector]
-    return any(abs(winding(point, own)) < 0.5 for point in inside[:: max(1, len(inside) // 8)])
+def _is_seen(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: float) -> bool:
+    """Scene check: whether two walls that overlap have a side in the room where they do, as the foot of a crate, or two
+    crates face to face, have not."""
+    wall, other = (room.triangles[parts.owner == number] for number in (pair.upper, pair.lower))
+    points = np.einsum("lc,tci->tli", _lattice(6), wall)
+    normal = np.broadcast_to(triangle_planes(wall)[0][:, None], points.shape).reshape(-1, 3)
+    points = points.reshape(-1, 3)
+    common = np.unique(touching(points, other, limit)[0])
+    common = common if len(common) else np.arange(len(points))
+    upper, lower = (room.triangles[room.owner == parts.reflector(number)] for number in (pair.upper, pair.lower))
+    for row in common[:: max(1, len(common) // 8)]:
+        sides = points[row] + MIN_CLEARANCE * np.outer([1.0, -1.0], normal[row])
+        own = [abs(winding(side, upper)) >= 0.5 for side in sides]
+        for number in np.delete([0, 1], room.outside(sides)):
+            # what is inside the other, too, only if this is on its outside: a poster is inside the shell of a room
+            behind = own[1 - number] and abs(winding(sides[number], lower)) >= 0.5
+            if not own[number] and not behind:
+                return True
+    return False
+
+
+def _lattice(count: int) -> Floats:
+    """Weights (L, 3) of a triangle's corners for points spread over it, the middles of its parts, in a scene check."""
+    u, v = (np.stack(np.meshgrid(*2 * [np.arange(count)])).reshape(2, -1) + 1.0 / 3.0) / count
+    return np.stack([u, v, 1.0 - u - v], axis=-1)[u + v < 1.0]
 
 
 def _flattest(triangles: Floats, part: PlanarRegions) -> float:

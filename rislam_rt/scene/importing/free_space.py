@@ -148,8 +148,9 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
     """Whether each group of triangles (T, 3, 3) is visible from any station (S, 3) in the free space, past all
     `triangles` (A, 3, 3).
 
-    Looked at are points spread over each group, from some twenty stations far from each other and what is freely above
-    and below them: a wall of which but a crack is seen may count as unseen.
+    Looked at are points spread over each group, and, for the sides of things that stand close to a wall, where an agent
+    can be before it; from some twenty stations far from each other and what is freely above and below them: a wall of
+    which but a crack is seen may count as unseen.
     """
     eyes = _eyes(_far_apart(stations, _EYES), triangles)
     seen = np.zeros(len(groups), dtype=np.bool_)
@@ -162,9 +163,23 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
             blocked, _ = crossings(np.broadcast_to(eye, ends.shape), ends, triangles)
             looks += len(ends) - len(np.unique(blocked))
             if looks >= ENOUGH:
-                seen[number] = True
                 break
+        seen[number] = looks >= ENOUGH or _stood_before(points, normal, eyes, triangles) >= ENOUGH
     return seen
+
+
+def _stood_before(points: Floats, normal: Floats, eyes: Floats, triangles: Floats) -> int:
+    """Number of places right before an imported room's surface, at points (P, 3) with normals (P, 3), in which an agent
+    can be: `CLEARANCES[-1]` off all surfaces, seen from free space at eyes (E, 3), and about as closed as the first."""
+    before = np.concatenate([points + CLEARANCES[-1] * normal, points - CLEARANCES[-1] * normal])
+    before = before[distance_to_triangles(before, triangles) >= CLEARANCES[-1] - OFF_SURFACE]
+    met = np.zeros(len(before), dtype=np.bool_)
+    for eye in eyes:
+        blocked, _ = crossings(np.broadcast_to(eye, before.shape), before, triangles)
+        met |= ~np.isin(np.arange(len(before)), blocked)
+    directions = sphere_directions(_RAYS)
+    share = np.array([(ray_hits(p, directions, triangles) >= 0).mean() for p in (eyes[0], *before[met])])
+    return int(np.sum(share[1:] >= CLOSED * share[0]))
 
 
 def _far_apart(stations: Floats, count: int) -> Floats:

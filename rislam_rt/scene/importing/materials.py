@@ -5,8 +5,9 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from typing import Any, get_args
 
-from rislam_rt.errors import ConfigError
+from rislam_rt.errors import ConfigError, SceneError
 from rislam_rt.input_messages import did_you_mean, nearest
+from rislam_rt.model.itu import itu_parameters
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.schema import ItuMaterial
 
@@ -35,10 +36,13 @@ WORDS = {
 }
 """Words of a material's or node's name and the ITU-R P.2040 material that they stand for, the first that is found."""
 
+BOARDS = ("floorboard", "plywood", "chipboard")
+"""Materials of timber, for which wood stands in at a carrier for which ITU-R P.2040 does not specify them."""
 
-def parse_material(text: str) -> dict[str, Any]:
+
+def parse_material(text: str, option: str = "--material") -> dict[str, Any]:
     """Parse a material written as `itu:concrete`, `itu:concrete:0.2` (thickness [m]) or `reflection:0.8` into a table
-    of the scene file.
+    of the scene file; `option` names it in errors.
 
     Raises
     ------
@@ -57,9 +61,9 @@ def parse_material(text: str) -> dict[str, Any]:
         pass
     if kind == "itu" and name not in known:
         mend = did_you_mean(nearest(name.lower(), known)) or f"give one of {', '.join(known)}"
-        raise ConfigError(f"--material: '{name[:40]}' is no ITU material; {mend}")
+        raise ConfigError(f"{option}: '{name[:40]}' is no ITU material; {mend}")
     wanted = "give itu:NAME, itu:NAME:THICKNESS_M or reflection:R with R in (0, 1]"
-    raise ConfigError(f"--material: '{text[:60]}' received; {wanted}")
+    raise ConfigError(f"{option}: '{text[:60]}' received; {wanted}")
 
 
 def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
@@ -82,22 +86,34 @@ def parse_choices(texts: list[str]) -> dict[str, dict[str, Any]]:
 class MaterialAssignment:
     """Assignment of materials to the walls of an imported room, which keeps account of those it had to assume."""
 
-    def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any]) -> None:
-        self.choices, self.rest = choices, rest
+    def __init__(self, choices: dict[str, dict[str, Any]], rest: dict[str, Any], carrier: float) -> None:
+        self.choices, self.rest, self.carrier = choices, rest, carrier
         self.used: set[str] = set()
         self.assumed: set[str] = set()
+        self.replaced: dict[str, str] = {}
 
     def material(self, wall: str, node: str, material: str) -> dict[str, Any]:
-        """Material of an imported wall: the user's, else by a word in its material's or node's name, else `rest`."""
+        """Material of an imported wall: the user's, else by a word in its material's or node's name, else `rest`; what
+        is not specified at the carrier [Hz] is replaced."""
         chosen = self.by_hand(wall, material, node)
         if chosen is not None:
             return chosen
         for name in (material, node):
             found = itu_by_word(name)
             if found is not None:
-                return {"itu": found, "thickness_m": THICKNESS[found]}
+                return self._at_carrier(found)
         self.assumed.add(material or wall)
         return self.rest
+
+    def _at_carrier(self, itu: str) -> dict[str, Any]:
+        """Material of an import by its name; where it is not specified at the carrier wood for boards, else `rest`."""
+        try:
+            itu_parameters(itu, self.carrier)
+        except SceneError:
+            other = {"itu": "wood", "thickness_m": THICKNESS[itu]} if itu in BOARDS else self.rest
+            self.replaced[itu] = ", ".join(f"{value}" for value in other.values())
+            return other
+        return {"itu": itu, "thickness_m": THICKNESS[itu]}
 
     def by_hand(self, *names: str) -> dict[str, Any] | None:
         """Material of an import that the user gave for any of the names; None if there is none."""
@@ -108,12 +124,17 @@ class MaterialAssignment:
         return None
 
     def remarks(self) -> list[str]:
-        """Remark on the walls of an import whose material was assumed, on one line; none if there are none."""
+        """Remarks on the walls of an import whose material was assumed or replaced, a line each; none without any."""
+        ghz = self.carrier / 1e9
+        remarks = [
+            f"'{itu}' is not specified at {ghz:g} GHz, taken as {other} (--material NAME=...)"
+            for itu, other in self.replaced.items()
+        ]
         if not self.assumed:
-            return []
+            return remarks
         names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
         more = f" and {len(names) - 8} more" if len(names) > 8 else ""
-        return [f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
+        return [*remarks, f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def check_used(self, names: Iterable[str]) -> None:
         """Check that every material that the user gave for an import has been used; `names`: some that could have been

@@ -56,7 +56,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
         raise Fault(what, "check --units, or lower --detail")
     surfaces, hidden = _visible_surfaces(found)
     unseen = _unseen(hidden, pieces, parts)
-    palette = MaterialAssignment(options.materials, options.rest)
+    palette = MaterialAssignment(options.materials, options.rest, 1e9 * options.carrier_ghz)
     reflectors = _reflectors(surfaces, pieces, parts, palette)
     occluders = _occluders(found, pieces, list(reflectors))
     palette.check_used([*reflectors, *sorted({p.material for p in parts if p.material})])

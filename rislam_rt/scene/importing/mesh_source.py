@@ -47,6 +47,8 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
     suffix = path.suffix.lower()
     if suffix not in MESH_FORMATS:
         known = ", ".join((*MESH_FORMATS, ".geojson", ".svg", ".xml"))
+        if path.is_dir():
+            raise Fault("is a folder", f"give a file: {known}")
         raise Fault(f"files of kind '{one_line(suffix)[:12]}' cannot be read", f"give one of {known}")
     content = read_content(path)
     notes: list[str] = []

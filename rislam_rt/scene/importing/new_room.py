@@ -104,6 +104,8 @@ def write_room(
         findings = check_scene(trial, RadioConfig(carrier=carrier, bandwidth=min(1e9, carrier)))
         errors = [finding for finding in findings if finding.severity == "error"]
     if errors:
-        raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", errors[0].mend)
+        by_hand = "give another with --material NAME=... or --rest, or --carrier-ghz in that range"
+        mend = by_hand if ".material." in errors[0].field else errors[0].mend
+        raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", mend)
     write_files(files, folder, overwrite=overwrite)
     return remarks + [f"{f.field}: {f.message}; {f.mend}" for f in findings if ".material." in f.field]

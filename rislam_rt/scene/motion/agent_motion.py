@@ -8,7 +8,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import GeometryError
+from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Body, Trajectory
+from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
@@ -49,9 +51,26 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
             content = read_inside(folder, agent.trajectory, MAX_TUM_BYTES)
             return _recorded_motion(agent, content, body), content
         except Fault as fault:
+            name = agent.trajectory[:80]
+            if name not in fault.message:
+                fault = Fault(f"'{name}': {fault.message}", fault.mend)
             fault.key = "trajectory"
-            raise
-    return (_waypoint_motion(agent, body) if agent.waypoints is not None else _walk(agent, triangles, body)), b""
+            raise fault from None
+    if agent.waypoints is not None:
+        _check_waypoints(agent.waypoints, triangles)
+        return _waypoint_motion(agent, body), b""
+    return _walk(agent, triangles, body), b""
+
+
+def _check_waypoints(waypoints: list[list[float]], triangles: Floats) -> None:
+    """Raise an error for a waypoint of the agent on a surface, triangles (T, 3, 3) [m]; the scene check looks at the
+    cycles, the first of which is at the first waypoint, and the last seldom at the last."""
+    away = distance_to_triangles(np.array(waypoints[1:], dtype=np.float64), triangles)
+    if away.min(initial=np.inf) < MIN_CLEARANCE:
+        number = int(np.argmin(away)) + 1
+        fault = Fault(f"{waypoints[number]} lies on a surface", f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
+        fault.key = f"waypoints[{number}]"
+        raise fault
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:

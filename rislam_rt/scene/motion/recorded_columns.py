@@ -47,6 +47,10 @@ def find_columns(header: Sequence[str], named: Mapping[str, str]) -> dict[str, P
     Fault
         A column is missing or stands there twice, or one that seems to hold the heading would not be read.
     """
+    twice = [what for what, name in named.items() if list(named.values()).count(name) > 1]
+    if twice:
+        both = " and ".join(f"'{what}'" for what in named if named[what] == named[twice[0]])
+        raise Fault(f"column '{named[twice[0]][:20]}' of the trajectory is named for {both}", "give each its own")
     found = {what: at for what in COLUMNS if (at := _find(what, header, named)) is not None}
     lacking = [part for part in QUATERNION if part not in found]
     if "heading" in found or not lacking:

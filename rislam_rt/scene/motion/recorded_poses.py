@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.input_messages import counted
+from rislam_rt.input_messages import counted, parse_number
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion.recorded_columns import QUATERNION, few_names, find_columns
 from rislam_rt.scene.schema import SMALLEST
@@ -137,7 +137,7 @@ def _in_radians(heading: Floats) -> Floats:
 def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[float]:
     """Numbers of one line of a recording; an error unless there are `count` finite ones."""
     try:
-        row = [float(word) for word in words]
+        row = [parse_number(word) for word in words]
     except ValueError:
         row = []
     if len(row) != count or not np.isfinite(row).all():

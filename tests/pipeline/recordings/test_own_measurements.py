@@ -261,7 +261,9 @@ def test_the_pages_example_in_python_runs(capsys: pytest.CaptureFixture[str]) ->
 
 def test_true_poses_may_be_a_csv_file(tmp_path: Path) -> None:
     (tmp_path / "poses.csv").write_text("time,x_mm,y_mm,z_mm\n0,1000,2000,500\n0.1,1010,2000,500\n")
-    assert _true_positions(tmp_path / "poses.csv", 2).tolist() == [[1.0, 2.0, 0.5], [1.01, 2.0, 0.5]]
+    assert _true_positions(tmp_path / "poses.csv", np.array([0.0, 0.1])).tolist() == [[1.0, 2.0, 0.5], [1.01, 2.0, 0.5]]
+    with pytest.raises(ConfigError, match="pose 0 is at 0 s, its cycle at 1000 s, more than half a cycle apart"):
+        _true_positions(tmp_path / "poses.csv", np.array([1000.0, 1000.1]))
 
 
 def test_a_start_or_a_body_in_millimetres_is_said(capsys: pytest.CaptureFixture[str]) -> None:

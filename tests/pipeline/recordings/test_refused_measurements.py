@@ -9,10 +9,12 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.recordings.inputs import inputs_to_dataset
 from rislam_rt.pipeline.recordings.own_measurements import inputs_of, read_inputs
+from rislam_rt.pipeline.run_datasets import seal_dataset
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.slam import StartPrior
+from rislam_rt.storage.netcdf import read_dataset, write_dataset
 from rislam_rt.studies.unseen import Inputs
 
 Table = dict[str, list[float]]
@@ -23,19 +25,19 @@ def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpe
     start, rows = StartPrior(np.zeros(3), np.zeros(3), 0.0), len(table["time_s"])
     level = {"cos_x": rows * [round(np.cos(0.7), 6) + 1e-7], "cos_y": rows * [round(np.sin(0.7), 6) + 1e-7]}
     inputs_of({**table, **level}, start, build_radio(spec.radio))
-    with pytest.raises(ConfigError, match=r"squares sum to 1\.13 received"):
+    with pytest.raises(ConfigError, match=r"cos_x, cos_y: squares that sum to 1\.13 in row 1 of the data"):
         inputs_of({**table, "cos_x": rows * [0.8], "cos_y": rows * [0.7]}, start, build_radio(spec.radio))
 
 
 @pytest.mark.parametrize(
     ("name", "values", "said"),
     [
-        ("delay_s", 33.0, "delays are in seconds"),
-        ("delay_s", -1e-9, "give none below 0"),
-        ("cos_x", 1.7, "direction cosines from -1 to 1"),
+        ("delay_s", 33.0, "delay_s: 33 in row 1 of the data; give numbers in seconds"),
+        ("delay_s", -1e-9, "delay_s: -1e-09 in row 1 of the data; give .*none below 0"),
+        ("cos_x", 1.7, "cos_x: 1.7 in row 1 of the data; give direction cosines from -1 to 1"),
         ("delay_std_s", -1e-10, "delay_std_s: -1e-10 in row 1 of the data"),
         ("delay_std_s", np.inf, "delay_std_s: no finite number in row 1 of the data"),
-        ("delay_std_s", 0.01, "delay_std_s: 0.01 in row 1 of the data; give positive numbers in seconds"),
+        ("delay_std_s", 0.01, "delay_std_s: 0.01 in row 1 of the data; give numbers in seconds, at least"),
         ("cos_x_std", 3.0, "cos_x_std: 3 in row 1 of the data; give .* not degrees"),
         ("cos_y_std", 0.0, "cos_y_std: 0 in row 1 of the data"),
         ("amplitude", -1.0, "amplitude: -1 in row 1 of the data; give positive numbers, not decibels"),
@@ -43,12 +45,14 @@ def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpe
         ("cos_x", "north", "not numbers"),
         ("speed", 1.0, "speed: unknown column; mend its name: the known ones are time_s"),
         ("delay", 1.0, "delay: unknown column; did you mean 'delay_s'"),
-        ("heading_rad", 45.0, "radians, not degrees"),
+        ("heading_rad", 45.0, "heading_rad: 45 in row 1 of the data; give at most a turn, in radians"),
         ("amplitude_std", 0.0, "amplitude_std: 0 in row 1 of the data"),
-        ("delay_s", np.inf, "delay_s: infinite"),
-        ("heading_rad", np.nan, "heading_rad: empty in cycle 0"),
-        ("panel_probability", 7.0, "not from 0 to 1"),
-        ("panel_probability", np.nan, "not from 0 to 1"),
+        ("delay_s", np.inf, "delay_s: infinite in row 1 of the data"),
+        ("heading_rad", np.nan, "heading_rad: no finite number in row 1 .* or leave the column out"),
+        ("heading_rad", np.inf, "heading_rad: no finite number in row 1 .* or leave the column out"),
+        ("panel_probability", 7.0, "panel_probability: 7 in row 1 of the data; give probabilities from 0 to 1"),
+        ("panel_probability", np.nan, "panel_probability: no finite number in row 1 of the data"),
+        ("amplitude", 1e300, "amplitude: 1e.300 in row 1 of the data is an SNR of inf dB"),
         ("snr_db", 30.0, "columns that say the same"),
         ("phi_r_rad", 0.1, "columns that say the same"),
     ],
@@ -77,7 +81,7 @@ def test_a_cosine_goes_with_a_cosine(table: Table, spec: PipelineSpec) -> None:
 def test_a_ray_from_below_is_not_taken_for_its_mirror_image(table: Table, spec: PipelineSpec) -> None:
     del table["cos_x"], table["cos_y"]
     table["theta_r_rad"], table["phi_r_rad"] = ([value] * len(table["time_s"]) for value in (3.0, 0.2))
-    with pytest.raises(ConfigError, match="outside 0 to pi/2"):
+    with pytest.raises(ConfigError, match="theta_r_rad: 3 in row 1 of the data; give 0 to pi/2"):
         inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
 
 
@@ -113,6 +117,15 @@ def test_a_column_given_twice_is_refused(tmp_path: Path, spec: PipelineSpec) -> 
             "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n1,0,1e-8,0,0,0.01\n1,0.2,1e-8,0,0,0.01\n",
             "heading_rad: row 2 of the data has another than its cycle's first row; give one heading a cycle",
         ),
+        (
+            "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n1,0,1e-8,0,0,0.01\n1,,1e-8,0,0,0.01\n",
+            "heading_rad: no finite number in row 2 of the data; give each row its cycle's heading, or leave the "
+            "column out (slam.heading=estimated)",
+        ),
+        (
+            "time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n1,0,1e-8,0,0,0.01\n1,0,1e-8,0,0,1_5\n",
+            "amplitude: '1_5' in row 2 of the data is no number; mend it",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_table_is_named(tmp_path: Path, spec: PipelineSpec, text: str, said: str) -> None:
@@ -136,7 +149,7 @@ def test_a_file_of_another_kind_names_what_it_lacks(tmp_path: Path, spec: Pipeli
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("tau", np.nan, "Measurement.tau: NaN at index"),
+        ("tau", np.nan, "cycle 0: tau: NaN at index"),
         ("time", np.nan, "time: not increasing, or not finite"),
         ("start_position", np.nan, "StartPrior.position: NaN at index"),
         ("from_panel", 7.0, "cycle 0: from_panel: not from 0 to 1"),
@@ -160,3 +173,20 @@ def test_a_file_without_cycles_is_refused(recorded: tuple[Inputs, np.ndarray], t
     with pytest.raises(ConfigError) as found:
         read_inputs(tmp_path / "mine.nc", None, build_radio(load_spec(find_pipeline("trace_then_slam")).radio))
     assert str(found.value) == f"{tmp_path / 'mine.nc'}: no cycles; give at least one"
+
+
+def test_a_recording_changed_since_it_was_written_is_refused(
+    recorded: tuple[Inputs, np.ndarray], tmp_path: Path
+) -> None:
+    """As `run` and `report` refuse it; a file without a checksum is a user's own."""
+    radio = build_radio(load_spec(find_pipeline("trace_then_slam")).radio)
+    write_dataset(seal_dataset(inputs_to_dataset(recorded[0])), tmp_path / "run.nc")
+    assert len(read_inputs(tmp_path / "run.nc", None, radio).time) == len(recorded[0].time)
+    changed = read_dataset(tmp_path / "run.nc")
+    changed["amplitude"] = changed.amplitude * 1.01
+    write_dataset(changed, tmp_path / "changed.nc")
+    with pytest.raises(ConfigError, match="changed since it was written"):
+        read_inputs(tmp_path / "changed.nc", None, radio)
+    del changed.attrs["checksum"]
+    write_dataset(changed, tmp_path / "own.nc")
+    assert len(read_inputs(tmp_path / "own.nc", None, radio).time) == len(recorded[0].time)

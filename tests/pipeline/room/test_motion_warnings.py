@@ -34,6 +34,17 @@ def test_a_speed_above_the_receivers_is_said_with_its_cycle(room):
     assert not said(replace(faster(room, 7, [0.6, 0.0, 0.0]), ris=None))
 
 
+def test_a_jump_has_one_speed_whatever_is_said_of_it(room):
+    """The scene check names the speed of the step; that of the cycles beside it, from both their steps, is lower."""
+    position = room.agent.position.copy()
+    position[7:] += np.array([0.0, 1.03, 0.0])
+    jumped = replace(room, agent=replace(room.agent, position=position))
+    step = np.linalg.norm(position[7] - position[6]) / np.diff(room.agent.time)[6]
+    line = said(jumped)[0]
+    assert f"0.5 m/s, and the agent moves at up to {step:.3g} m/s (cycle 6)" in line
+    assert line.endswith(f"give receiver.top_speed = {np.ceil(10.0 * step) / 10.0:g}")
+
+
 def test_an_acceleration_that_no_floor_gives_is_said_with_the_filters_liveliest(room):
     step = np.diff(room.agent.time)[6]
     jump = room.agent.velocity[7] + [0.0, 10.0 * step, 0.0]  # a little above 9.81 m/s^2 for one step, and back

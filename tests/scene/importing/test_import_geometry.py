@@ -123,3 +123,16 @@ def test_the_free_way_is_inside_and_what_is_behind_is_unseen() -> None:
     assert len(crossings(free.way[:1], free.way[1:], triangles)[0]) == 0
     assert free.enclosed == 1.0
     assert is_seen(free.stations, groups, triangles).tolist() == [True, False, True, False]
+
+
+def test_the_side_of_a_boiler_half_a_metre_from_the_wall_is_seen() -> None:
+    """An agent can stand in the gap; one on the far side of the wall, before the outer skin, is in no room."""
+    room, boiler = joined(list(box_walls(9.0, 5.0, 3.0).values())), block([7.8, 3.4, 0.0], [8.5, 4.1, 1.5])
+    skin = block([-0.3, -0.3, -0.3], [9.3, 5.3, 3.3])
+    sides = boiler.vertices[boiler.faces]
+    back = sides[(sides[:, :, 0] == 8.5).all(axis=1)]
+    groups = [back, room.vertices[room.faces], skin.vertices[skin.faces]]
+    triangles = np.concatenate([sides, *groups[1:]])
+    free = find_free(triangles)
+    assert free is not None
+    assert is_seen(free.stations, groups, triangles).tolist() == [True, True, False]

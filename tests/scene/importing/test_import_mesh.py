@@ -16,7 +16,7 @@ from rislam_rt.scene.check.mesh_queries import winding
 from rislam_rt.scene.importing import ImportOptions, import_room
 from rislam_rt.scene.importing.materials import THICKNESS, itu_by_word, parse_choices, parse_material
 from rislam_rt.scene.schema import ItuMaterial
-from rislam_rt.scene.shapes import joined
+from rislam_rt.scene.shapes import block, joined
 
 SHELL = {"floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west"}
 
@@ -146,6 +146,20 @@ def test_an_import_remarks_on_a_pane_of_half_a_wave(node_file: Path, carrier_ghz
     glass = parse_choices(["wall_north=itu:glass", "wall_east=itu:glass"])
     _, remarks = imported(node_file, materials=glass, carrier_ghz=carrier_ghz)
     assert sum("and 1 more): 6 mm of 'glass' reflect 0.04" in remark for remark in remarks) == faint
+
+
+def test_a_guessed_material_is_specified_at_the_carrier(tmp_path: Path) -> None:
+    """P.2040 knows floorboards from 50 GHz on: a floor of planks is wood below, and a remark names the option."""
+    mesh = block([0.0, 0.0, 0.0], [5.0, 4.0, 2.6])
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices] + ["o planks"]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces]
+    for carrier, itu in ((10.0, "wood"), (60.0, "floorboard")):
+        (tmp_path / itu).mkdir()
+        (tmp_path / itu / "planks.obj").write_text("\n".join(lines))
+        scene, remarks = imported(tmp_path / itu / "planks.obj", carrier_ghz=carrier)
+        assert {(r.material.itu, r.material.thickness) for r in scene.reflectors} == {(itu, 0.02)}
+        said = "'floorboard' is not specified at 10 GHz, taken as wood, 0.02 (--material NAME=...)"
+        assert (said in remarks) == (itu == "wood")
 
 
 def test_names_speak_of_materials() -> None:

@@ -64,7 +64,7 @@ def extrude(plan: FloorPlan, height: float, options: ImportOptions) -> RoomDraft
 
 def _named(entries: list[Entry], plan: FloorPlan, options: ImportOptions) -> RoomDraft:
     """Draft of a room from extruded meshes, each with a name of its own and a material."""
-    palette = MaterialAssignment(options.materials, options.rest)
+    palette = MaterialAssignment(options.materials, options.rest, 1e9 * options.carrier_ghz)
     names = numbered([plain_name(name) or "wall" for name, _, _ in entries])
     reflectors = {}
     for name, (_, mesh, own) in zip(names, entries, strict=True):
