@@ -18,7 +18,7 @@ MEASURED = 6
 
 class _PlainRates(NamedTuple):
     """Rates of the path lengths of T tracks or explained paths, E in all: of each were it over a wall, by a point, and
-    over two walls at right angles."""
+    over two walls at right angles, with an upright edge and with a level one."""
 
     toward: Floats
     """(E, 3) derivative of the length by the position: the rate is its product with the velocity."""
@@ -113,10 +113,10 @@ class Lengths(NamedTuple):
     length: Floats
     """(N,) [m] measured..."""
     left: Floats
-    """(3, N) [m] ...and what the positions leave of it, were it over a wall, by a point, or over two walls at right
-    angles."""
+    """(4, N) [m] ...and what the positions leave of it, were it over a wall, by a point, or over two walls at right
+    angles with an upright or a level edge."""
     toward: Floats
-    """(3, E, 3) derivative of the length by the position, likewise."""
+    """(4, E, 3) derivative of the length by the position, likewise."""
     number: Integers
     """(E,) number of components."""
     blur: Floats
@@ -124,7 +124,7 @@ class Lengths(NamedTuple):
     owner: Integers
     """(E,) track or path of each direction."""
     share: Floats
-    """(T, 3) probability that each track or path is of these kinds, if it follows the positions."""
+    """(T, 4) probability that each track or path is of these kinds, if it follows the positions."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -164,22 +164,27 @@ def lengths(heard: Heard) -> Lengths:
     wall = -2.0 * np.vecdot(ray, normal)[:, None] * normal
     moved = place[since] - (np.stack([total(weight * each) for each in place[since].T]) / mass).T[which]
     follow = np.vecdot(wall[which], moved)
-    bend = [2.0 * np.linalg.norm(0.5 * far[which, None] * each[which] - moved, axis=1) for each in (normal, ray)]
+    # two walls turn round by half a turn about their edge, upright or level, along which nothing moves
+    flat_ray, edge = ray * [1.0, 1.0, 0.0], np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1)
+    edge /= np.maximum(np.linalg.norm(edge, axis=1), 1e-9)[:, None]
+    beside = moved - np.vecdot(moved, edge[which])[:, None] * edge[which]
+    turned = ((normal, moved), (ray, moved * [1.0, 1.0, 0.0]), (ray, beside))
+    bend = [2.0 * np.linalg.norm(0.5 * far[which, None] * each[which] - by, axis=1) for each, by in turned]
     doubt = total((spread_of**2).mean(axis=1)) / count**2
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
-        length - np.stack([follow, *bend]), np.stack([wall, wall, -2.0 * ray]), count,
+        length - np.stack([follow, *bend]), np.stack([wall, wall, -2.0 * flat_ray, -2.0 * ray]), count,
         np.hypot(2.0 * np.sqrt(doubt), np.vecdot(apart, apart)), owner, share,
     )  # fmt: skip
 
 
 def _kinds(forms: Integers) -> Floats:
-    """Probabilities (T, 3) that paths of forms (T, 6) are over a wall, by a point, or over two walls at right angles,
-    if they are any of these: as many are over two walls as are not, unless the map explains them."""
-    walls, found = (forms[:, 1:5] >= 0).sum(axis=1), np.tile([0.25, 0.25, 0.5], (len(forms), 1))
+    """Probabilities (T, 4) that paths of forms (T, 6) are over a wall, by a point, or over two walls at right angles
+    with either edge, if they are any of these: as many are over two walls as are not, unless the map explains them."""
+    walls, found = (forms[:, 1:5] >= 0).sum(axis=1), np.full((len(forms), 4), 0.25)
     of_walls, of_point = forms[:, 0] == TX, forms[:, 0] >= 0
-    for kind, told in enumerate((of_walls & (walls == 1), of_point & (walls == 0), of_walls & (walls == 2))):
-        found[told] = np.eye(3)[kind]
+    found[of_walls & (walls == 1)], found[of_point & (walls == 0)] = np.eye(4)[:2]
+    found[of_walls & (walls == 2)] = [0.0, 0.0, 0.5, 0.5]
     return found
 
 
@@ -223,7 +228,7 @@ def _rates(
     found: Lengths, fine: Booleans, fits: tuple[Floats, Floats, Floats], unit: float, believed: Floats,
     bends: tuple[Floats, Floats] | None = None,
 ) -> Rates:  # fmt: skip
-    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates (3, E), the variances, and the rates of
+    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates (4, E), the variances, and the rates of
     measured lengths, over a `unit` [s or s^2]."""
     heard, ray = found.heard, found.toward[-1]
     fine = fine & (np.vecdot(ray[:, :2], ray[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
@@ -231,11 +236,11 @@ def _rates(
     paths, owner = np.unique(found.owner[fine], return_inverse=True)
     share = (found.share[paths][owner] / np.bincount(owner)[owner, None]).T.ravel()
     rate, variance, whole = fits
-    variance, blur, whole = (np.tile(each[fine], 3) for each in (variance, found.blur, whole))
-    bend, bend_variance = (np.tile(each[fine], 3) for each in bends) if bends else (None, None)
+    variance, blur, whole = (np.tile(each[fine], 4) for each in (variance, found.blur, whole))
+    bend, bend_variance = (np.tile(each[fine], 4) for each in bends) if bends else (None, None)
     return Rates(
-        found.toward[:, fine].reshape(-1, 3), rate[:, fine].ravel(), variance, blur, whole, share, np.tile(owner, 3),
-        np.repeat([0.0, 0.0, turning], len(owner)), len(owner), bend, bend_variance, believed,
+        found.toward[:, fine].reshape(-1, 3), rate[:, fine].ravel(), variance, blur, whole, share, np.tile(owner, 4),
+        np.repeat([0.0, 0.0, turning, turning], len(owner)), len(owner), bend, bend_variance, believed,
     )  # fmt: skip
 
 

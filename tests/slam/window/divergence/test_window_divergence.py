@@ -136,7 +136,7 @@ def test_a_baseline_shows_walls_and_points_from_midway_and_corners_from_the_rx()
     room = np.append([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]] @ baseline, 0.0)
     heard = Heard(_log(place, heading, room), np.full(count, heading), place, step, baseline, 0.5)
     found = accelerations(lengths(heard), 5)
-    off = np.abs(found.rate).reshape(3, 3) * 0.5 * 0.5**2  # [m] in half a second; of a wall, a corner and a point
+    off = np.abs(found.rate).reshape(4, 3) * 0.5 * 0.5**2  # [m] in half a second; of a wall, a corner and a point
     # what the baseline makes of the shortest length's
     apart = 0.5 * np.linalg.norm(baseline) / 4.0 * 2.0 * np.linalg.norm(velocity)
     assert max(off[0, 0], off[2, 1]) < 2e-3 * apart
