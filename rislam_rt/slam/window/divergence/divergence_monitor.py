@@ -15,7 +15,7 @@ from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import LossCause
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
-from rislam_rt.slam.window.divergence.length_rates import lone_rates
+from rislam_rt.slam.window.divergence.length_rates import Rates
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN, rotation
@@ -65,7 +65,7 @@ def jump(view: CycleAssociation, observed: Observations, use_vt: bool) -> Floats
     if len(row) < egomotion.FEWEST:
         return np.zeros(3)
     gap = heard[column, 0] - expected[row, 0]
-    found = lone_rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2))
+    found = Rates(view.expected.jacobian[lead[row], 0, :3], gap, np.full(len(row), CELL**2), np.zeros(len(row)), gap)
     by = egomotion.agreed_velocity(found)
     return by if float(by @ by) > CELL**2 else np.zeros(3)
 

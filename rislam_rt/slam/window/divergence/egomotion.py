@@ -93,7 +93,7 @@ def _log_manoeuvred(found: Rates, starts: Floats, told: Floats, near: Floats, ma
             every = _find_modes(found, starts, told, spread)
             best = int(np.argmax(every.evidence))
             likely, agreeing, _ = _likelihoods(found, every.velocity[best : best + 1], told[2])
-            agrees = agreeing[0] / found.each(likely[0])
+            agrees = agreeing.sum(axis=0)[0] / found.each(likely[0])
             # what is not the told velocity's own error
             accel = half * std**2 * np.linalg.solve(spread, every.velocity[best] - told[:2])
             wanted = found.toward[:, :2] @ accel
@@ -150,7 +150,7 @@ def _find_climb(found: Rates, climb: Floats, variance: float) -> tuple[Floats, F
     nowhere, up = np.zeros((1, 2)), found.toward[:, 2]
     for last in (False,) * 6 + (True,):
         either, likely, spread = _likelihoods(found, nowhere, climb)
-        weight = likely / spread / found.each(either)
+        weight = (likely / spread).sum(axis=0) / found.each(either)
         normal = (weight @ up**2 + 1.0 / variance)[:, None]
         if last:
             break
@@ -189,7 +189,7 @@ def _starts(found: Rates, told: Floats) -> Floats:
 def _agreed_by_two(found: Rates, told: Floats) -> tuple[Floats, Floats]:
     """Horizontal velocities (S, 2), the told one and all those on which two tracks agree, and their log likelihoods
     (S,)."""
-    first, second = _pairs(found.tried)
+    first, second = _pairs(len(found.rate))
     (along, across, _), aim = found.toward.T, found.rate - found.toward[:, 2] * told[2]
     det = along[first] * across[second] - across[first] * along[second]
     fine = np.abs(det) > 0.5
@@ -222,24 +222,20 @@ NEAR, MOST = 0.01, 8
 
 def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple[Floats, Floats, Floats]:
     """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2) and vertical ones (S, 1) or
-    one for all, and those (S, E) of their ways to agree, with the variances (S, E)."""
+    one for all, and those (2, S, E) of the two ways to agree, from each direction, with their variances (2, S, E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     # a direction errs in all of the motion, what the positions have taken out of the lengths included
-    along, rise = (np.zeros(2), 0.0) if found.believed is None else (found.believed[:2], found.believed[2])
-    speed, climb_speed = velocity + along, rise + climb
-    # what errs across errs upwards, too, the more the lower a path arrives
-    slope = found.toward[:, :2] / np.minimum(found.toward[:, 2:], -2.0 * np.sqrt(found.blur)[:, None] - 1e-6)
-    across = speed[:, None] - np.multiply.outer(climb_speed, slope).reshape(-1, *slope.shape)
-    variance = found.variance + found.blur**2 * np.vecdot(across, across)
+    speed = velocity if found.believed is None else velocity + found.believed
+    variance = found.variance + found.blur**2 * np.vecdot(speed, speed)[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
-    either_way = variance + found.turning**2
-    likely = 0.5 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
-    close = found.mixed(likely)
+    # every other one of them over more than one wall, where a turn of the body changes the length as well
+    either_way = variance + np.array([0.0, found.turning**2])[:, None, None]
+    likely = 0.25 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
+    close = found.mixed(likely.sum(axis=0))
     other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
-        square_speed, turning = np.vecdot(speed, speed)[:, None] + climb_speed**2, found.turning.max(initial=0.0)
-        wide = variance + turning**2 + 4.0 / 3.0 * square_speed
+        wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed)[:, None] + climb**2)
         still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
     return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, either_way
@@ -252,7 +248,7 @@ def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _M
     v, prior, squares = start, np.linalg.inv(spread), (flat[:, :, None] * flat[:, None, :]).reshape(-1, 4)
     for last in (False,) * 6 + (True,):
         either, likely, variance = _likelihoods(found, v, told[2])
-        weight = likely / variance / found.each(either)  # with which the tracks agree
+        weight = (likely / variance).sum(axis=0) / found.each(either)  # with which the tracks agree
         one, both, _, two = (weight @ squares + prior.ravel()).T  # the normal matrix's numbers
         det = one * two - both**2
         if last:

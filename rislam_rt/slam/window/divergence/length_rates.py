@@ -8,7 +8,6 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
@@ -17,69 +16,57 @@ MEASURED = 6
 
 
 class _PlainRates(NamedTuple):
-    """Rates of the path lengths of T tracks or explained paths, E in all: of each were it over a wall, by a point, and
-    over two walls at right angles, with an upright edge and with a level one."""
+    """Rates of the path lengths of T tracks or explained paths, E in all."""
 
     toward: Floats
-    """(E, 3) derivative of the length by the position: the rate is its product with the velocity."""
+    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
     rate: Floats
     """(E,) [m/s] rate at which the path length changes."""
     variance: Floats
     """(E,) [m^2/s^2] of the rate."""
     blur: Floats
-    """(E,) error of the rate by the direction's, as a share of the speed, and to second order by the baseline."""
+    """(E,) error of the rate by the baseline between Tx and Rx and by the direction's, as a share of the speed."""
     whole: Floats
     """(E,) rate of the measured length itself; `rate` may be that of what the positions leave of it."""
-    share: Floats
-    """(E,) probability beforehand of each of the ways in which a track or path may come."""
-    owner: Integers
-    """(E,) track or path of each way."""
-    turning: Floats
-    """(E,) [m/s] speed of Tx and Rx against each other, as the body turns; 0 where it changes no length."""
-    tried: int
-    """Number of the ways, the first of them, of which two give a first guess of the motion."""
+    turning: float = 0.0
+    """[m/s] speed of Tx and Rx against each other, as the body turns."""
     bend: Floats | None = None
     """(E,) [m/s^2] at which the rates change."""
     bend_variance: Floats | None = None
     """(E,) [m^2/s^4] of that change, with what it is for a point that an agent passes at constant speed."""
+    owner: Integers | None = None
+    """(E,) track or path of each direction; None where each has one."""
     believed: Floats | None = None
-    """(3,) motion of the agent beside the one that is asked for; None where what is no path of a thing at
+    """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
     rest may have any rate."""
 
 
 class Rates(_PlainRates):
-    """Rates at which the lengths of T tracks or explained paths change, by the E ways in which they may come."""
+    """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
+    an array hears some alike from two."""
 
     @cached_property
     def number(self) -> int:
         """Number T of the tracks and paths whose lengths have a rate."""
-        return int(self.owner.max(initial=-1)) + 1
+        return len(self.rate) if self.owner is None else int(self.owner.max(initial=-1)) + 1
 
     def each(self, value: Floats) -> Floats:
         """Values (..., E) by track or path: of those (..., T) given."""
-        return np.asarray(value[..., self.owner])
+        return value if self.owner is None else value[..., self.owner]
 
     def mixed(self, value: Floats) -> Floats:
-        """Sums (..., T) of values (..., E) over the ways in which a track or path may come."""
-        return np.asarray(value @ self._mixing)
+        """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
+        return value if self.owner is None else np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
 
     @cached_property
-    def _mixing(self) -> Floats:
-        """(E, T) 1 where a way is of a track or path."""
-        return np.asarray(self.owner[:, None] == np.arange(self.number), dtype=np.float64)
+    def share(self) -> Floats:
+        """(E,) probability of each direction beforehand: a half where there are two."""
+        return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
 
     @cached_property
     def kept(self) -> Floats:
         """(E,) densities of the rates were they of lengths that stay as they are."""
         return np.exp(-0.5 * self.whole**2 / self.variance) / np.sqrt(2.0 * np.pi * self.variance)
-
-
-def lone_rates(toward: Floats, rate: Floats, variance: Floats) -> Rates:
-    """Rates (T,) with variances (T,) of paths that come in one way each, along `toward` (T, 3)."""
-    count = len(rate)
-    return Rates(
-        toward, rate, variance, np.zeros(count), rate, np.ones(count), np.arange(count), np.zeros(count), count
-    )  # fmt: skip
 
 
 class Heard(NamedTuple):
@@ -93,8 +80,8 @@ class Heard(NamedTuple):
     """(K, 3) [m] its estimated positions."""
     step: float
     """[s] from pose to pose."""
-    baseline: Floats
-    """(2,) [m] from Tx to Rx, in the body's axes."""
+    baseline: float
+    """[m] from Tx to Rx."""
     spacing: float
     """[wavelengths] of the antennas."""
 
@@ -113,18 +100,15 @@ class Lengths(NamedTuple):
     length: Floats
     """(N,) [m] measured..."""
     left: Floats
-    """(4, N) [m] ...and what the positions leave of it, were it over a wall, by a point, or over two walls at right
-    angles with an upright or a level edge."""
+    """(N,) [m] ...and what the positions leave of it."""
     toward: Floats
-    """(4, E, 3) derivative of the length by the position, likewise."""
+    """(E, 3) direction of arrival in the room's axes, times -2."""
     number: Integers
     """(E,) number of components."""
     blur: Floats
     """(E,) as in `Rates`."""
-    owner: Integers
-    """(E,) track or path of each direction."""
-    share: Floats
-    """(T, 4) probability that each track or path is of these kinds, if it follows the positions."""
+    owner: Integers | None
+    """(E,) track or path of each direction; None where each has one."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -140,9 +124,7 @@ def lengths(heard: Heard) -> Lengths:
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    forms, which = unique_forms(every)
-    share = _kinds(forms)
-    rows, which, flat, spread_of, owner = log.both_ends(rows, which, spacing)
+    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
     count = np.bincount(which)
 
     def total(value: Floats) -> Floats:
@@ -154,38 +136,15 @@ def lengths(heard: Heard) -> Lengths:
     toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
     toward /= count[:, None]
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
-    toward = np.concatenate([toward, up[:, None]], axis=1)
-    # a wall's image is seen along its normal from the Tx, whose way to it the wall halves
-    mass = total(weight)
-    far = np.maximum(total(weight * length) / mass, 1e-3)
-    across = total(cos * baseline[0] - sin * baseline[1]), total(sin * baseline[0] + cos * baseline[1])
-    ray, apart = toward, np.stack([*across, np.zeros(len(far))], axis=1) / (count * far)[:, None]
-    normal = (ray + apart) / np.linalg.norm(ray + apart, axis=1)[:, None]
-    wall = -2.0 * np.vecdot(ray, normal)[:, None] * normal
-    moved = place[since] - (np.stack([total(weight * each) for each in place[since].T]) / mass).T[which]
-    follow = np.vecdot(wall[which], moved)
-    # two walls turn round by half a turn about their edge, upright or level, along which nothing moves
-    flat_ray, edge = ray * [1.0, 1.0, 0.0], np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1)
-    edge /= np.maximum(np.linalg.norm(edge, axis=1), 1e-9)[:, None]
-    beside = moved - np.vecdot(moved, edge[which])[:, None] * edge[which]
-    turned = ((normal, moved), (ray, moved * [1.0, 1.0, 0.0]), (ray, beside))
-    bend = [2.0 * np.linalg.norm(0.5 * far[which, None] * each[which] - by, axis=1) for each, by in turned]
+    toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
+    # seen from the two ends a point, or a wall's normal, lies in directions so much apart
+    blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
     doubt = total((spread_of**2).mean(axis=1)) / count**2
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
-        length - np.stack([follow, *bend]), np.stack([wall, wall, -2.0 * flat_ray, -2.0 * ray]), count,
-        np.hypot(2.0 * np.sqrt(doubt), np.vecdot(apart, apart)), owner, share,
+        length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
+        np.hypot(blur, 2.0 * np.sqrt(doubt)), owner if (np.diff(owner) < 1).any() else None,
     )  # fmt: skip
-
-
-def _kinds(forms: Integers) -> Floats:
-    """Probabilities (T, 4) that paths of forms (T, 6) are over a wall, by a point, or over two walls at right angles
-    with either edge, if they are any of these: as many are over two walls as are not, unless the map explains them."""
-    walls, found = (forms[:, 1:5] >= 0).sum(axis=1), np.full((len(forms), 4), 0.25)
-    of_walls, of_point = forms[:, 0] == TX, forms[:, 0] >= 0
-    found[of_walls & (walls == 1)], found[of_point & (walls == 0)] = np.eye(4)[:2]
-    found[of_walls & (walls == 2)] = [0.0, 0.0, 0.5, 0.5]
-    return found
 
 
 def rates(found: Lengths) -> Rates:
@@ -193,10 +152,10 @@ def rates(found: Lengths) -> Rates:
     positions leave of the lengths' change."""
     place, time = found.heard.place, found.heard.step * max(len(found.heard.place) - 1, 1)
     velocity = (place[-1] - place[0]) / time
-    every, variance, fine = _slopes(found, found.time, *found.left)
-    rate = np.stack(every) + found.toward @ velocity
+    (rate,), variance, fine = _slopes(found, found.time, found.left)
+    rate = rate + found.toward @ velocity
     bends = _bends(found, float(velocity @ velocity))
-    return _rates(found, fine, (rate, variance, rate[0]), time, np.zeros(3), bends)
+    return _rates(found, fine, (rate, variance, rate), time, np.zeros(2), bends)
 
 
 def accelerations(found: Lengths, steps: int) -> Rates:
@@ -205,11 +164,11 @@ def accelerations(found: Lengths, steps: int) -> Rates:
     follows the positions as they are."""
     place, step = found.heard.place, found.heard.step
     by = 0.5 * np.maximum(found.time + steps * step, 0.0) ** 2
-    (*rate, whole), variance, fine = _slopes(found, by, *found.left, found.length)
+    (rate, whole), variance, fine = _slopes(found, by, found.left, found.length)
     way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
     way -= way.mean()
-    believed = way @ place / (way @ way)
-    return _rates(found, fine, (np.stack(rate), variance, whole), 0.5 * (steps * step) ** 2, believed)
+    believed = way @ place[:, :2] / (way @ way)
+    return _rates(found, fine, (rate, variance, whole), 0.5 * (steps * step) ** 2, believed)
 
 
 def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], Floats, Booleans]:
@@ -228,19 +187,16 @@ def _rates(
     found: Lengths, fine: Booleans, fits: tuple[Floats, Floats, Floats], unit: float, believed: Floats,
     bends: tuple[Floats, Floats] | None = None,
 ) -> Rates:  # fmt: skip
-    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates (4, E), the variances, and the rates of
-    measured lengths, over a `unit` [s or s^2]."""
-    heard, ray = found.heard, found.toward[-1]
-    fine = fine & (np.vecdot(ray[:, :2], ray[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
-    turning = float(np.hypot(*heard.baseline) * np.abs(np.diff(heard.heading)).sum()) / unit
-    paths, owner = np.unique(found.owner[fine], return_inverse=True)
-    share = (found.share[paths][owner] / np.bincount(owner)[owner, None]).T.ravel()
-    rate, variance, whole = fits
-    variance, blur, whole = (np.tile(each[fine], 4) for each in (variance, found.blur, whole))
-    bend, bend_variance = (np.tile(each[fine], 4) for each in bends) if bends else (None, None)
+    """Rates of those lengths (E,) that are `fine`, from `fits`: their rates, the variances, and the rates of measured
+    lengths, over a `unit` [s or s^2]."""
+    toward, heard = found.toward, found.heard
+    fine = fine & (np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
+    rate, variance, whole = (each[fine] for each in fits)
+    bend, bend_variance = (each[fine] for each in bends) if bends else (None, None)
+    turning = heard.baseline * float(np.abs(np.diff(heard.heading)).sum()) / unit
+    owner = None if found.owner is None else np.unique(found.owner[fine], return_inverse=True)[1]
     return Rates(
-        found.toward[:, fine].reshape(-1, 3), rate[:, fine].ravel(), variance, blur, whole, share, np.tile(owner, 4),
-        np.repeat([0.0, 0.0, turning, turning], len(owner)), len(owner), bend, bend_variance, believed,
+        toward[fine], rate, variance, found.blur[fine], whole, turning, bend, bend_variance, owner, believed
     )  # fmt: skip
 
 

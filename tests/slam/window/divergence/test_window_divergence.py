@@ -10,7 +10,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
 from rislam_rt.slam.window.divergence import divergence_monitor, egomotion, motion_agreement
-from rislam_rt.slam.window.divergence.length_rates import Heard, accelerations, lengths, lone_rates, rates
+from rislam_rt.slam.window.divergence.length_rates import Heard, Rates, accelerations, lengths, rates
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
@@ -28,7 +28,7 @@ def _rates(velocity, rng, *, tracks=12, apart=4, error=0.01):
     toward *= -2.0 / np.linalg.norm(toward, axis=1)[:, None]
     rate = toward @ velocity + error * rng.standard_normal(tracks)
     rate[:apart] = rng.uniform(-2.0, 2.0, apart)
-    return lone_rates(toward, rate, np.full(tracks, error**2))
+    return Rates(toward, rate, np.full(tracks, error**2), np.zeros(tracks), rate)
 
 
 def _weigh_change(found, calm):
@@ -61,7 +61,7 @@ def test_what_goes_to_and_fro_between_opposite_walls_speaks_against_no_start():
     toward = -2.0 * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [-0.3, -0.95, 0.0], [0.0, 0.0, 1.0], [0.5, 0.8, 0.33]])
     rate = toward @ TOLD
     rate[:2], rate[4] = 0.0, 1.0
-    one = egomotion.weigh(lone_rates(toward, rate, np.full(5, 0.03**2)), TOLD, STD)
+    one = egomotion.weigh(Rates(toward, rate, np.full(5, 0.03**2), np.zeros(5), rate), TOLD, STD)
     assert one.log_odds < 0.0
 
 
@@ -112,8 +112,8 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     step, count = 0.1, 8
     time = step * np.arange(count)[:, None]
     place = np.array([0.2, -0.1, 0.0]) * time + 0.5 * bend * np.array([0.3, 1.0, 0.0]) * time**2
-    found = rates(lengths(Heard(_log(place, heading), np.full(count, heading), place, step, np.zeros(2), 0.5)))
-    assert found.number == 3
+    found = rates(lengths(Heard(_log(place, heading), np.full(count, heading), place, step, 0.0, 0.5)))
+    assert len(found.rate) == 3
     velocity = (place[-1] - place[0]) / (step * (count - 1))
     # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
     np.testing.assert_allclose(found.rate, found.toward @ velocity, atol=2e-3 * (1.0 + 2.0 * bend))
@@ -127,30 +127,13 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     assert found.bend_variance[0] == pytest.approx(spread, abs=(4.0 * velocity @ velocity / 2.0) ** 2)
 
 
-def test_a_baseline_shows_walls_and_points_from_midway_and_corners_from_the_rx():
-    """Lengths by geometry, half a metre from Tx to Rx: each changes as its kind does, points to second order in the
-    baseline, and as no other kind does."""
-    step, count, baseline, heading = 0.1, 8, np.array([0.4, -0.3]), 0.7
-    velocity = np.array([0.2, 0.1, 0.0])
-    place = step * np.arange(count)[:, None] * velocity
-    room = np.append([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]] @ baseline, 0.0)
-    heard = Heard(_log(place, heading, room), np.full(count, heading), place, step, baseline, 0.5)
-    found = accelerations(lengths(heard), 5)
-    off = np.abs(found.rate).reshape(4, 3) * 0.5 * 0.5**2  # [m] in half a second; of a wall, a corner and a point
-    # what the baseline makes of the shortest length's
-    apart = 0.5 * np.linalg.norm(baseline) / 4.0 * 2.0 * np.linalg.norm(velocity)
-    assert max(off[0, 0], off[2, 1]) < 2e-3 * apart
-    assert off[1, 2] < 0.1 * apart
-    assert min(off[2, 0], off[0, 1], off[2, 2]) > 0.1 * apart
-
-
 @pytest.mark.parametrize("steps", [5, 10])
 def test_an_acceleration_that_the_positions_leave_out_is_told_by_all_lengths(steps):
     """Of who is held for standing still, and was until so many steps ago."""
     step, count, accel = 0.1, 12, np.array([0.6, -0.3, 0.0])
     time = step * np.maximum(np.arange(count) - (count - 1 - steps), 0.0)
     place = 0.5 * time[:, None] ** 2 * accel
-    heard = Heard(_log(place, 0.2), np.full(count, 0.2), 0.0 * place, step, np.zeros(2), 0.5)
+    heard = Heard(_log(place, 0.2), np.full(count, 0.2), 0.0 * place, step, 0.0, 0.5)
     found = accelerations(lengths(heard), steps)
     np.testing.assert_allclose(found.rate, found.toward @ accel, atol=0.06)  # a point turns on the way
     log_odds, told = _weigh_change(found, 1e-6)
@@ -164,7 +147,7 @@ def test_a_climb_is_told_by_the_rates_of_all_lengths():
     """Two ways: Laplace's evidence at the likeliest climb, against the integral over all climbs."""
     rng = np.random.default_rng(5)
     for climb in (0.4, -0.9):
-        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(3))
+        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(2))
         log_odds, told = egomotion.weigh_climb(found, 1e-8, 0.0)
         assert told == pytest.approx(climb, abs=4.0 * 0.01 / np.sqrt(np.sum(found.toward[4:, 2] ** 2)))
         every = np.linspace(-3.0, 3.0, 60001)[:, None]
@@ -179,7 +162,7 @@ def test_a_climb_is_told_by_the_rates_of_all_lengths():
 def test_no_climb_is_told_by_the_rates_of_a_level_motion():
     """Posterior odds above 1 at prior odds of 1 in 10 come up in less than 1 of 10 runs (Markov's inequality)."""
     rng = np.random.default_rng(6)
-    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(3)) for _ in range(200)]
+    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(2)) for _ in range(200)]
     wrong = sum(egomotion.weigh_climb(found, 1e-8, np.log(0.1))[0] > 0.0 for found in every)
     assert wrong < 20
 
@@ -188,22 +171,20 @@ def test_what_is_at_rest_changes_its_length_by_no_more_than_twice_the_agents_spe
     """Two tracks of many agree on a motion; were the others' rates just any, two would be chance."""
     toward = -2.0 * np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]])
     rate = np.array([-1.6, -0.96, 0.0])
-    rest = lone_rates(toward, rate, np.full(3, 0.02**2))._replace(believed=np.zeros(3))
+    rest = Rates(toward, rate, np.full(3, 0.02**2), np.zeros(3), rate, believed=np.zeros(2))
     free = rest._replace(believed=None)
     bounded, any_rate = (_weigh_change(each, 1e-4)[0] for each in (rest, free))
     assert bounded > any_rate + 3.0
 
 
-def _log(place, heading, baseline=0.0):
-    """Measurements (3 tracks in each cycle) of a wall, a corner and a point from an agent's positions (K, 3), midway
-    between Tx and Rx, which a baseline (3,) [m] joins."""
+def _log(place, heading):
+    """Measurements (3 tracks in each cycle) of a wall, a corner and a point from an agent's positions (K, 3)."""
     normal, corner, point = np.array([0.6, 0.8, 0.0]), np.array([-3.0, 2.0, 0.0]), np.array([1.0, 4.0, 1.5])
-    tx, rx = place - 0.5 * baseline, place + 0.5 * baseline
-    away = [2.0 * (2.0 - tx @ normal)[:, None] * normal + tx - rx, 2.0 * corner - tx - rx, point - rx]
-    further, rows = [0.0, 0.0, np.linalg.norm(point - tx, axis=1)], []
+    away = [(2.0 - place @ normal)[:, None] * normal, corner - place, point - place]
+    rows = []
     for track, ray in enumerate(away):
-        near = np.linalg.norm(ray, axis=1)
-        length, unit = near + further[track], ray / near[:, None]
+        length = 2.0 * np.linalg.norm(ray, axis=1)
+        unit = 2.0 * ray / length[:, None]
         cosines = [np.cos(heading), np.sin(heading)] @ np.stack([unit[:, :2], unit[:, 1::-1] * [1, -1]], axis=1)
         rows += [(cycle, length[cycle], cosines[cycle], track) for cycle in range(len(place))]
     rows.sort(key=lambda row: row[0])
@@ -221,7 +202,7 @@ def test_a_body_that_turns_on_the_spot_is_not_held_for_one_that_moves():
     for _ in range(60):
         found = _rates(np.zeros(3), rng, tracks=28, apart=0, error=0.005)
         found.rate[:24] += 0.05 * rng.standard_normal(24)
-        every = (found, found._replace(turning=np.full(28, 0.05)))
+        every = (found, found._replace(turning=0.05))
         wrong += [egomotion.weigh(one, np.zeros(3), np.full(3, 5e-4)).log_odds > 0.0 for one in every]
     assert wrong[1] <= 3  # as of a start told right: 0.6 expected at most, 3 or fewer in 99.7 % of such samples
     assert wrong[0] > 30
@@ -299,9 +280,7 @@ def test_a_cycle_in_which_nothing_is_weighed_names_no_cause():
 def test_a_rate_whose_direction_is_not_told_counts_for_little():
     log = _log(0.1 * np.arange(8)[:, None] * np.array([0.2, -0.1, 0.0]), 0.0)
     vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.4))
-    found = [
-        rates(lengths(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, np.zeros(2), 0.5))).blur for one in (log, vague)
-    ]
+    found = [rates(lengths(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0, 0.5))).blur for one in (log, vague)]
     np.testing.assert_allclose(found[1], 2.0 * 0.4 / np.sqrt(8.0))
     assert (found[0] < 0.1).all()
 
