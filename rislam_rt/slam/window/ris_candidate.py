@@ -71,6 +71,7 @@ def find_candidate(
     places = np.concatenate([features[points], places])
     hits = np.append(landmarks.hits[points], tracks.hits[rows])
     odds = np.append(landmarks.log_ris[points, panel] - few, told[rows] + CONSTANTS.log_rare * behind)
+    # one measurement may be a false alarm: it has no images, and is none
     odds += log_images(np.linalg.norm(places - mean[:3], axis=1), np.where(hits > 1, odds, -np.inf))
     if not len(odds) or odds.max() <= DISMISSAL:
         return None
