@@ -62,10 +62,11 @@ def match_nearest(distance: Floats, limit: float) -> Integers:
     """One-to-one assignment of rows to columns of distances (N, M): column (N,) of each row, -1 for none within the
     limit.
 
-    The pairs with the least sum of distances, where one beyond ten limits costs no more than that.
+    The pairs with the least sum of distances, where a pair beyond the limit costs as much as one at it: it counts as
+    none, as in GOSPA of order 1, so that no exact pair is given up for one that is beyond the limit all the same.
     """
     partner = np.full(len(distance), -1)
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 10.0 * limit))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, limit))
     near = distance[rows, columns] <= limit
     partner[rows[near]] = columns[near]
     return partner

@@ -60,6 +60,17 @@ def test_pairs_are_one_to_one_and_of_heard_walls():
     assert match_planes(WALLS, normal, offset, np.array([False, True])).tolist() == [-1, -1]
 
 
+def test_an_exact_plane_is_not_given_up_for_one_beyond_the_limit():
+    """A ceiling at 2 m, a floor at 0; estimates 1 cm below the one, 1.2 m above it. If pairs counted beyond the limit,
+    the crossed pairs' 1.99 + 1.2 m would beat 0.01 + 3.2 m, and neither is near."""
+    level = np.tile([0.0, 0.0, 1.0], (2, 1))
+    walls = Surfaces(np.array([[1.0, 1.0, 2.0], [1.0, 1.0, 0.0]]), level, np.zeros((2, 3, 3)))
+    for order in ([0, 1], [1, 0]):
+        normal, offset = level, np.array([1.99, 3.2])[order]
+        assert match_planes(walls, normal, offset).tolist() == [order.index(0), -1]
+        assert ghost_planes(walls, normal, offset).tolist() == [bool(far) for far in order]
+
+
 def test_nothing_stands_for_nothing():
     empty = np.zeros((0, 3)), np.zeros(0)
     assert match_planes(WALLS, *empty).tolist() == [-1, -1]
