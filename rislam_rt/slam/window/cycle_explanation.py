@@ -17,6 +17,7 @@ from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.landmarks.duplicate_walls import images_of_pairs
 from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
@@ -28,7 +29,7 @@ from rislam_rt.slam.window.motion.motion_learning import log_manoeuvre
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
-from rislam_rt.slam.window.smoother.motion_basis import rotation
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, rotation
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -274,11 +275,14 @@ def _names(landmarks: WindowTable, forms: Integers) -> Integers:
 
 
 def remove_or_add_features(state: WindowState, left: Residuals, view: CycleAssociation) -> WindowState:
-    """Remove features that the evidence contradicts or, in a cycle without removals, let tracks give birth to
-    features."""
+    """Remove features that the evidence contradicts, or walls that two others explain, or, in a cycle without removals,
+    let tracks give birth to features."""
     fresh = True
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
         gone = features_to_remove(state.landmarks, left, state.log)
+        if not gone.any():
+            mean, covariance = window_gaussian.now(state.window)
+            gone = images_of_pairs(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks)
         state, fresh = remove_from_map(state, ~gone), not gone.any()
     return births(state, view) if fresh else state
 

@@ -75,15 +75,19 @@ def log_beside(table: Hypotheses, summary: TrackSummary, known: KnownFeatures, c
     track, found = table.trials.track, np.zeros(len(table.kind))
     length, cell = summary.mean[0][track, 0], float(scene.sensor.cell_length[0])
     aligned = landmarks.walls[np.abs(known.turn[landmarks.walls, 2, 2]) > ALIGNED_TURN]
-    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in aligned], dtype=np.int64).reshape(-1, 5)
-    heard, _ = recall_forms(context.visibility, forms, np.ones(len(aligned), dtype=np.int64), landmarks)
-    for wall, clear in zip(aligned, heard, strict=True):
+    for wall, clear in zip(aligned, _heard(context, aligned), strict=True):
         rise = float(np.linalg.norm(known.place[wall] - summary.middle))
         gap = np.hypot(length, rise) - length
         found += np.where((table.kind == WALL) & (gap < CLOSE * cell), np.log1p(-CONSTANTS.shown * clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall), np.log(clear), 0.0)
         found += np.where((table.kind == BESIDE) & (table.known == wall) & (gap > cell), CONSTANTS.log_lost, 0.0)
     return found
+
+
+def _heard(context: WindowState, walls: Integers) -> Floats:
+    """Probability (W,) that nothing occludes the returns of known walls, by which hypotheses are weighed."""
+    forms = np.array([[TX, NONE, NONE, wall, NONE] for wall in walls], dtype=np.int64).reshape(-1, 5)
+    return recall_forms(context.visibility, forms, np.ones(len(walls), dtype=np.int64), context.landmarks)[0]
 
 
 def log_shared(
@@ -169,13 +173,15 @@ def log_amplitudes(
 
 
 def log_opacity(
-    table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, use_vt: bool
-) -> Floats:
-    """Log prior (H,) of hypotheses by occlusion: against new features behind known walls, and against new walls in
-    front of known features.
+    table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures, context: WindowState
+) -> tuple[Floats, Floats]:
+    """Log priors (H,) of hypotheses by occlusion: of new features behind known walls, and of new walls that are wide
+    in front of known features (`log_wide_or_small`).
 
-    With wall returns a new wall that is heard over a known one stands where its path meets it.
+    A wall that is heard hides what is behind it but for a rare event; one that is not heard may have ended. With wall
+    returns a new wall that is heard over a known one stands where its path meets it.
     """
+    landmarks, use_vt = context.landmarks, context.scene.use_vt
     middle, walls, wall = summary.middle, landmarks.walls, table.trials.is_wall
     pair, tx = table.trials.is_pair[:, None], summary.mean[1][table.trials.track]
     image = (table.trials.turn[:, 0] @ tx[..., None])[..., 0] + fits.place
@@ -185,7 +191,7 @@ def log_opacity(
         rows, spot = bounces(table, fits.place, summary, known)
         foot[rows] = spot
     slack = CONSTANTS.depth + 2.0 * np.sqrt(np.trace(fits.held, axis1=1, axis2=2))
-    total, small = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
+    behind, before = np.zeros(len(foot)), np.zeros(len(foot), dtype=np.int64)
     span = fits.place - middle
     normal = span / np.maximum(np.linalg.norm(span, axis=1), 1e-6)[:, None]
     if len(walls):
@@ -193,13 +199,25 @@ def log_opacity(
         reach = np.linalg.norm(out, axis=1)
         feet = 0.5 * (known.place[walls] + middle)
         depth = foot @ (out / reach[:, None]).T - np.vecdot(feet, out) / reach
-        total += CONSTANTS.log_rare * (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-        before = normal @ feet.T - np.vecdot(foot, normal)[:, None]
-        small = (before > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+        opaque = np.log1p(-(1.0 - CONSTANTS.rare) * _heard(context, walls)) if use_vt else CONSTANTS.log_rare
+        behind += (opaque * (depth > np.minimum(slack, 1.0)[:, None])).sum(axis=1)
+        depth = normal @ feet.T - np.vecdot(foot, normal)[:, None]
+        before = (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
     if len(landmarks.points):
         depth = normal @ known.place[landmarks.points].T - np.vecdot(foot, normal)[:, None]
-        small = small + (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
-    return total + np.where(wall, CONSTANTS.log_rare, 0.0) * small
+        before = before + (depth > np.minimum(slack, 1.0)[:, None]).sum(axis=1)
+    return behind, np.where(wall, CONSTANTS.log_rare, 0.0) * before
+
+
+def log_wide_or_small(table: Hypotheses, log_wide: Floats) -> Floats:
+    """Log probability (H,) of what new walls hide and of where they are not heard, of which `log_wide` is that of wide
+    ones; 0 for other features.
+
+    A new wall is rarely small, a face of a piece of furniture: all else may then be beside it, and its own bounce may
+    miss it for good.
+    """
+    small = np.logaddexp(np.log1p(-CONSTANTS.rare) + log_wide, CONSTANTS.log_rare)
+    return np.where(table.trials.is_wall, small, log_wide)
 
 
 LEVEL_RISE = 0.9

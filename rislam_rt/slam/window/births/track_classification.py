@@ -28,6 +28,7 @@ from rislam_rt.slam.window.births.hypothesis_evidence import (
     log_place,
     log_shared,
     log_upright,
+    log_wide_or_small,
 )
 from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
 from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, with_images
@@ -123,9 +124,9 @@ def _weigh(
     evidence += log_kind(table, landmarks)
     # of what is heard too early, single returns may lie beyond the window
     evidence += np.where(table.trials.is_pair & (track < near), lonely[owner[track], table.pair], 0.0)
-    evidence += log_amplitudes(table, fits, summary, landmarks, scene) + log_opacity(
-        table, fits, summary, known, landmarks, scene.use_vt
-    )
+    behind, before = log_opacity(table, fits, summary, known, context)
+    wide = log_wide_or_small(table, before)
+    evidence += log_amplitudes(table, fits, summary, landmarks, scene) + behind + wide
     evidence += log_beside(table, summary, known, context)
     evidence -= np.log(np.bincount(owner[:near]))[owner[track]]
     best = np.full(len(track_rows), -np.inf)
@@ -139,8 +140,10 @@ def _weigh(
         free = log_possible(table, fits.place, fits.covariance, summary, known)
         likely = evidence + np.logaddexp(right, free)
         heard = context, table, track_rows, owner, likely
-        right += log_unheard(*heard, held.place, held.covariance, summary, anyhow=False)
-        free += log_unheard(*heard, fits.place, fits.covariance, summary, anyhow=True)
+        silent = log_unheard(*heard, held.place, held.covariance, summary, anyhow=False)
+        right += log_wide_or_small(table, before + silent) - wide
+        silent = log_unheard(*heard, fits.place, fits.covariance, summary, anyhow=True)
+        free += log_wide_or_small(table, before + silent) - wide
         evidence += np.logaddexp(right, free) - np.logaddexp(held.log_odds, 0.0)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     own = table._replace(trials=table.trials._replace(track=owner[track]))

@@ -129,6 +129,44 @@ def test_a_wall_comes_out_with_its_edge_only_where_the_level_wall_is_heard():
     assert np.allclose(np.exp(found[1.0]), [1.0 - CONSTANTS.shown * clear, clear])
 
 
+def test_a_wall_that_is_heard_hides_what_is_behind_it_and_one_that_is_not_may_have_ended():
+    middle = np.array([1.0, 1.0, 1.0])
+    landmarks = enter(empty_table(1), True, middle, 10, 5.0, unknown(1, 1))
+    known = known_features(np.array([[5.0, 1.0, 1.0]]), 1e-6 * np.eye(3), landmarks, middle)  # 2 m ahead
+    place = middle + np.array([[6.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    kind = np.array([WALL, WALL, POINT, POINT])  # walls 3 and 1.5 m ahead, points 3 and 1 m
+    trials = SimpleNamespace(
+        is_wall=kind == WALL,
+        is_pair=np.zeros(4, dtype=bool),
+        track=np.zeros(4, dtype=int),
+        turn=np.tile(np.eye(3), (4, 2, 1, 1)),
+    )
+    table = SimpleNamespace(kind=kind, known=np.full(4, -1), trials=trials)
+    fits = SimpleNamespace(place=place, held=np.tile(1e-6 * np.eye(3), (4, 1, 1)))
+    summary = SimpleNamespace(middle=middle, mean=(np.ones((1, 3)), middle[None], middle[None]))
+    found = {}
+    for clear in (1.0, 0.0):
+        form = np.array([[TX, NONE, NONE, 0, NONE]])
+        looked = VisibilityObservations(pack(form, landmarks), np.array([clear]), np.ones(1), nothing_heard(1))
+        context = SimpleNamespace(landmarks=landmarks, scene=SimpleNamespace(use_vt=True), visibility=looked)
+        found[clear], before = hypothesis_evidence.log_opacity(table, fits, summary, known, context)
+        np.testing.assert_allclose(before, [0.0, CONSTANTS.log_rare, 0.0, 0.0])  # it would hide the known one
+    hides = np.array([1.0, 0.0, 1.0, 0.0])
+    # heard a cycle ago it is there but for a rare event, and so is what lets it be heard through; hidden it is cleared
+    there = (1.0 - CONSTANTS.rare) * np.array([1.0 - CONSTANTS.rare, CONSTANTS.cleared])
+    np.testing.assert_allclose(found[1.0], hides * np.log(1.0 - there[0]), atol=1e-12)
+    np.testing.assert_allclose(found[0.0], hides * np.log(1.0 - there[1]), atol=1e-12)
+
+
+def test_a_small_wall_may_stand_before_all_that_is_known_and_never_be_heard_itself():
+    table = _table([WALL, WALL, WALL, POINT])
+    wide = np.array([0.0, -1.0, -100.0, -100.0])
+    found = hypothesis_evidence.log_wide_or_small(table, wide)
+    odds = (1.0 - CONSTANTS.rare) * np.exp(wide[:3]) + CONSTANTS.rare
+    np.testing.assert_allclose(np.exp(found[:3]), odds, rtol=1e-12)
+    assert found[3] == -100.0  # a point is never wide
+
+
 def test_a_ceiling_beside_an_upright_wall_starts_out_level_and_a_far_wall_upright():
     middle = np.array([1.0, 1.0, 1.0])
     landmarks = enter(empty_table(1), True, middle, 10, 5.0, unknown(1, 1))
