@@ -125,7 +125,8 @@ def compute_run(
     from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.pipeline import run_slam
-    from rislam_rt.pipeline.long.run import LongRun, is_long, run_long
+    from rislam_rt.pipeline.long.run import LongRun, run_long
+    from rislam_rt.pipeline.long.slices import is_long
     from rislam_rt.pipeline.scores.summary import summarise
     from rislam_rt.pipeline.store.run_folder import open_run
 

@@ -35,11 +35,6 @@ class LongRun(NamedTuple):
     """Every n-th cycle, at most `SHOWN`."""
 
 
-def is_long(scene: Scene, spec: PipelineSpec) -> bool:
-    """Whether a run has so many cycles that it is simulated in slices."""
-    return (spec.cycles or len(scene.agent)) > slices.SLICE
-
-
 def run_long(
     scene: Scene, spec: PipelineSpec, store: run_folder.RunFolder, *, rng: np.random.Generator, jobs: int,
     progress: Tell,

@@ -29,6 +29,13 @@ from rislam_rt.storage.netcdf import read_dataset, write_dataset
 
 SLICE = 1000
 """Number of cycles in a slice. In the paper's room the paths of a cycle take 0.1 MB: 0.1 GB a slice."""
+
+
+def is_long(scene: Scene, spec: PipelineSpec) -> bool:
+    """Whether a run has so many cycles that it is simulated in slices."""
+    return (spec.cycles or len(scene.agent)) > SLICE
+
+
 SHOWN = 2000
 """Largest number of cycles that figures of a long run are drawn from."""
 FOLDER, PATHS_FILE = "slices", "paths.nc"

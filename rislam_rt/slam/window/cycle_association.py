@@ -14,13 +14,8 @@ from rislam_rt.slam.predicted_returns import TX, Poses, poses_of
 from rislam_rt.slam.window.landmarks.horizon_detection import expected_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, recall, recall_rises, visible
-from rislam_rt.slam.window.landmarks.measurement_prediction import (
-    ExpectedComponents,
-    KnownEnvironment,
-    UnresolvedClusters,
-    cluster,
-    predict_returns,
-)
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, KnownEnvironment, predict_returns
+from rislam_rt.slam.window.landmarks.unresolved_clusters import UnresolvedClusters, cluster
 from rislam_rt.slam.window.smoother import attitude, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import LEVEL_BODY, Tilts
 from rislam_rt.slam.window.smoother.motion_basis import HEAD

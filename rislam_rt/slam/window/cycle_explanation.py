@@ -22,8 +22,9 @@ from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
 from rislam_rt.slam.window.landmarks.landmark_update import update_landmarks
-from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment, conditioned_share
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.landmarks.unresolved_clusters import conditioned_share
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, scatter_variance
 from rislam_rt.slam.window.motion.motion_learning import log_manoeuvre
 from rislam_rt.slam.window.ris_candidate import weigh_tracks

@@ -12,8 +12,8 @@ from rislam_rt.errors import ResultError
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.long import slices
-from rislam_rt.pipeline.long.run import is_long, read_any, run_long
-from rislam_rt.pipeline.long.slices import join_paths, join_schemes
+from rislam_rt.pipeline.long.run import read_any, run_long
+from rislam_rt.pipeline.long.slices import is_long, join_paths, join_schemes
 from rislam_rt.pipeline.recordings.inputs import PADDING, dataset_to_inputs
 from rislam_rt.pipeline.recordings.own_measurements import localise, run_rng
 from rislam_rt.pipeline.scores.summary import summarise_scheme

@@ -7,7 +7,8 @@ from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window import cycle_association, tracks
 from rislam_rt.slam.window.cycle_association import _absorbed, _rivals
 from rislam_rt.slam.window.landmarks.horizon_detection import elevations, nothing_heard, prior_tilts
-from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
+from rislam_rt.slam.window.landmarks.unresolved_clusters import cluster
 from rislam_rt.slam.window.smoother.attitude import first_levels
 
 CELL = np.array([0.3, 0.5, 0.5])

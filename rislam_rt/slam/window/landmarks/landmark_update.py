@@ -12,12 +12,9 @@ from rislam_rt.slam.observations import UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import TX, Poses
 from rislam_rt.slam.window.landmarks.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, learn_ratios
-from rislam_rt.slam.window.landmarks.measurement_prediction import (
-    ExpectedComponents,
-    KnownEnvironment,
-    UnresolvedClusters,
-)
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, weigh
+from rislam_rt.slam.window.landmarks.unresolved_clusters import UnresolvedClusters
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 

@@ -5,7 +5,8 @@ import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.horizon_detection import elevations
-from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents, cluster, conditioned_share
+from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
+from rislam_rt.slam.window.landmarks.unresolved_clusters import cluster, conditioned_share
 from rislam_rt.slam.window.solver_limits import EDGE
 
 CELL = np.array([0.3, 0.5, 0.5])
