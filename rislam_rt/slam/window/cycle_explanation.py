@@ -14,10 +14,10 @@ from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
+from rislam_rt.slam.window.births.explained_walls import explained_walls
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
-from rislam_rt.slam.window.landmarks.duplicate_walls import images_of_pairs
 from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.horizon_detection import HorizonEvidence, level_above, prior_tilts, weigh_tilts
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, idents, image_ident
@@ -30,7 +30,7 @@ from rislam_rt.slam.window.motion.motion_learning import log_manoeuvre
 from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
-from rislam_rt.slam.window.smoother.motion_basis import HEAD, rotation
+from rislam_rt.slam.window.smoother.motion_basis import rotation
 from rislam_rt.slam.window.solver_limits import REFRESH
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -282,8 +282,7 @@ def remove_or_add_features(state: WindowState, left: Residuals, view: CycleAssoc
     if state.cycle % REFRESH == 0 and len(state.landmarks.ident):
         gone = features_to_remove(state.landmarks, left, state.log)
         if not gone.any():
-            mean, covariance = window_gaussian.now(state.window)
-            gone = images_of_pairs(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks)
+            gone = explained_walls(state)
         state, fresh = remove_from_map(state, ~gone), not gone.any()
     return births(state, view) if fresh else state
 

@@ -224,11 +224,10 @@ LEVEL_RISE = 0.9
 """Vertical share of the way to a wall's image above which the wall may be level."""
 
 
-def direction_beliefs(
-    place: Floats, summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable
-) -> DirectionPriors:
-    """Direction priors of a hypothesis's wall at `place` (3,): upright, at right angles to a known one, or level."""
-    span = place - summary.middle
+def direction_beliefs(place: Floats, middle: Floats, others: Floats) -> DirectionPriors:
+    """Direction priors of a hypothesis's wall, the image `place` (3,) [m] of `middle` (3,), whose images in known walls
+    are `others` (W, 3): upright, at right angles to one of them, or level."""
+    span = place - middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
@@ -239,13 +238,13 @@ def direction_beliefs(
     elif rise < UPRIGHT_RISE:
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        rows, along = _square_axes(span[None], known.place[landmarks.walls] - summary.middle)
+        rows, along = _square_axes(span[None], others - middle)
         axes += list(along)
         log_odds += [float(_log_square(np.asarray(reach)))] * len(rows)
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
     return DirectionPriors(
-        np.zeros(count, dtype=np.int64), axis, axis @ summary.middle, np.full(count, std), np.array(log_odds),
+        np.zeros(count, dtype=np.int64), axis, axis @ middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip
 

@@ -202,7 +202,7 @@ def decide_tracks(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
-                direction_beliefs(fits.place[at], summary, known, landmarks)
+                direction_beliefs(fits.place[at], summary.middle, known.place[landmarks.walls])
                 if table.trials.is_wall[at] else no_holds(),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]),
             )

@@ -1,4 +1,4 @@
-"""Duplicate walls: which planes of the map are one wall, or what two other walls make, by comparing one plane less."""
+"""Duplicate walls: which planes of the map are one wall, by comparing one plane with two."""
 
 import numpy as np
 import scipy
@@ -9,7 +9,6 @@ from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, by_wall, reflect
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.solver_limits import NEARBY
 
 
 def second_planes(
@@ -49,7 +48,7 @@ def same_wall(place: Floats, blocks: Floats, anchor: Floats, middle: Floats) -> 
     across = square[:, None, None] * AXES - span[:, :, None] * span[:, None, :]
     own = np.diagonal(wide, axis1=0, axis2=1).transpose(2, 0, 1) + CONSTANTS.lean**2 * across
     spread = own[:, None] + own - wide - np.swapaxes(wide, 2, 3) + 1e-8 * AXES
-    one, tail = _log_density(gap, spread), CONSTANTS.tail
+    one, tail = log_same_place(gap, spread), CONSTANTS.tail
     length = np.linalg.norm(gap, axis=2)
     along = gap / np.maximum(length, 1e-9)[..., None]
     std = np.sqrt(np.vecdot(along, (spread @ along[..., None])[..., 0]))
@@ -61,46 +60,7 @@ def same_wall(place: Floats, blocks: Floats, anchor: Floats, middle: Floats) -> 
     return np.asarray(one - two + CONSTANTS.log_rare)
 
 
-def images_of_pairs(features: Floats, covariance: Floats, landmarks: WindowTable) -> Booleans:
-    """Whether each feature (F,) of the map is a wall that was born of the return over two other walls, features (F, 3)
-    [m] being known within a covariance (3F, 3F) [m^2].
-
-    It was if, from where it was born, both are nearer and throw the agent's image to where it has it. A wall of its own
-    has it anywhere, as births have it; that the return over two walls is held for a wall is `rare`, and it may be over
-    any two.
-    """
-    walls = landmarks.walls
-    count, found = len(walls), np.zeros(len(features), dtype=np.bool_)
-    if count < 3:
-        return found
-    place, anchor = features[walls], landmarks.anchor[walls]
-    each = reflect(anchor[:, None], place, anchor)  # (W, W, 3): from where the first was born, in the second
-    length = np.linalg.norm(each - anchor[:, None], axis=2)
-    nearer = length < np.diagonal(length)[:, None]
-    both = reflect(each[:, :, None], place, anchor)
-    apart = np.linalg.norm(both - place[:, None, None], axis=3)
-    pair = nearer[:, :, None] & nearer[:, None] & ~np.eye(count, dtype=np.bool_)
-    wall, first, second = (pair & (apart < NEARBY)).nonzero()
-    if not len(wall):
-        return found
-    span = place[second] - anchor[second]
-    flip = AXES - 2.0 * span[:, :, None] * (span / np.vecdot(span, span)[:, None])[:, None, :]
-    by_first, by_second = (
-        by_wall(spot, place[row], anchor[row]) for spot, row in ((anchor[wall], first), (each[wall, first], second))
-    )
-    slopes = np.concatenate([np.tile(-AXES, (len(wall), 1, 1)), flip @ by_first, by_second], axis=2)
-    rows = np.stack([wall, first, second], axis=1)
-    blocks = covariance.reshape(len(features), 3, len(features), 3).swapaxes(1, 2)[walls[:, None], walls]
-    spread = blocks[rows[:, :, None], rows[:, None, :]].swapaxes(2, 3).reshape(-1, 9, 9)
-    reach = length[wall, wall]
-    spread = slopes @ spread @ np.swapaxes(slopes, 1, 2) + 1e-8 * AXES
-    one = _log_density(both[wall, first, second] - place[wall], spread)
-    two = np.log((count - 1.0) * (count - 2.0)) - np.log(8.0 * np.pi * CONSTANTS.size * reach**2)
-    found[walls[wall[one - two + CONSTANTS.log_rare > CONSTANTS.log_born]]] = True
-    return found
-
-
-def _log_density(gap: Floats, spread: Floats) -> Floats:
+def log_same_place(gap: Floats, spread: Floats) -> Floats:
     """Log density of gaps (..., 3) [m] between two walls' images that are the same place within covariances
     (..., 3, 3) [m^2], with the tails of Student's t."""
     tail, (far, log_det) = CONSTANTS.tail, squared_distance(gap, spread)

@@ -1,11 +1,11 @@
-"""Planes that are one wall, planes that are two, and planes that are what two others make."""
+"""Planes that are one wall, and planes that are two: what the map shows of them."""
 
 import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.estimates import build_map
-from rislam_rt.slam.window.landmarks.duplicate_walls import images_of_pairs, same_wall, second_planes
+from rislam_rt.slam.window.landmarks.duplicate_walls import same_wall, second_planes
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 
@@ -81,40 +81,3 @@ def test_an_agent_that_stands_in_a_plane_is_no_trouble():
         odds = same_wall(places, blocks, np.tile(MIDDLE, (2, 1)), foot)
     assert np.isfinite(odds).all()
     assert odds[0, 1] < 0.0
-
-
-SIDE, END, CEILING, FLOOR = (-1.0, 0.0, 0.0, 1.1), (0.0, 1.0, 0.0, 1.2), (0.0, 0.0, 1.0, 1.6), (0.0, 0.0, -1.0, 1.2)
-"""Outward normals and distances [m] from `MIDDLE` of four walls of a room."""
-ELSEWHERE = MIDDLE + np.array([1.4, -0.5, 0.0])
-
-
-def _room(walls, ghost, *, off=0.0, std=1e-3, order=(0, 1, 2)):
-    """Which of two walls, each a normal and a distance, at right angles or opposite, and of a third, made of the return
-    over both as it is heard from `ghost`, `off` [m] farther; all known within `std` [m]."""
-    normals, distances = np.array(walls)[:, :3], np.array(walls)[:, 3]
-    feet = MIDDLE + distances[:, None] * normals
-    legs = np.vecdot(feet - ghost, normals)
-    shift = 2.0 * (legs @ normals if normals[0] @ normals[1] == 0.0 else legs.sum() * normals[1])
-    shift += 2.0 * off * shift / np.linalg.norm(shift)
-    place = np.array([*(MIDDLE + 2.0 * distances[:, None] * normals), ghost + shift])[list(order)]
-    landmarks = empty_table(1)
-    for anchor in np.array([MIDDLE, MIDDLE, ghost])[list(order)]:
-        landmarks = enter(landmarks, True, anchor, 10, 5.0, unknown(1, 1))
-    return images_of_pairs(place, std**2 * np.eye(9), landmarks).tolist()
-
-
-@pytest.mark.parametrize("walls", [(SIDE, END), (CEILING, END), (FLOOR, CEILING)])
-@pytest.mark.parametrize("ghost", [MIDDLE, ELSEWHERE])
-def test_the_return_over_two_walls_is_no_third(walls, ghost):
-    assert _room(walls, ghost) == [False, False, True]
-    assert _room(walls, ghost, order=(2, 0, 1)) == [True, False, False]
-
-
-@pytest.mark.parametrize("walls", [(SIDE, END), (FLOOR, CEILING)])
-def test_a_corner_cut_off_and_a_loft_are_walls_of_their_own(walls):
-    assert _room(walls, ELSEWHERE, off=-0.3) == [False, False, False]
-    assert _room(walls, ELSEWHERE, off=0.3) == [False, False, False]
-
-
-def test_a_third_wall_that_is_known_badly_may_be_one_of_its_own():
-    assert _room((SIDE, END), MIDDLE, std=3.0) == [False, False, False]
