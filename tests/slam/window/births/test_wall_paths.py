@@ -6,12 +6,13 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from rislam_rt import slam
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
-from rislam_rt.model import RadioConfig, SensorModel
+from rislam_rt.model import Material, RadioConfig, Reflector, SensorModel, Trajectory
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
@@ -124,3 +125,32 @@ def test_a_wall_that_leans_out_is_found_by_what_comes_down_from_the_ceiling() ->
     angle = np.degrees(np.arccos(np.clip(abs(found @ true.normal.T), 0.0, 1.0)))
     assert angle[:, true.names.index("wall_y1")].min() < 2.0
     assert angle.min(axis=1).max() < 10.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_beam_before_known_things_is_found_by_what_comes_over_the_ceiling(seed: int) -> None:
+    """A beam hangs 0.7 m down from the ceiling before a wall and three spheres, and begins 2 m on: it is never heard by
+    itself, and they are known when the return over ceiling and beam begins."""
+    room, radio = load_scene(ROOMS / "paper_room"), with_reference_snr(RadioConfig(), 13.0)
+    time = 0.1 * np.arange(40)
+    place = np.stack([np.full(40, 1.6), 0.8 + time, np.full(40, 0.5)], axis=1)
+    walk = Trajectory(time, place, np.tile([0.0, 1.0, 0.0], (40, 1)), np.full(40, np.pi / 2.0 + 0.3), room.agent.body)
+    corners = np.array([[3.2, 2.8, 2.3], [3.2, 6.0, 2.3], [3.2, 6.0, 3.0], [3.2, 2.8, 3.0]])
+    beam = Reflector("beam", corners, np.array([[0, 1, 2], [0, 2, 3]]), Material(reflection=0.85))
+    spheres = (
+        replace(room.scatterers[0], name=f"sphere_{row}", position=np.array(spot))
+        for row, spot in enumerate([(4.5, 2.0, 1.0), (5.0, 3.5, 1.4), (4.2, 4.6, 0.8)])
+    )
+    scene = replace(
+        room, ris=None, reflectors=(*room.reflectors, beam), scatterers=(*room.scatterers, *spheres), agent=walk
+    )
+    paths, config, rng = ImageSourceChannel(scene, radio, 2).paths(walk), SlamConfig(), np.random.default_rng(seed)
+    start = StartPrior(walk.position[0], walk.velocity[0], float(walk.heading[0]))
+    state = slam.init(start, walk.body, None, SensorModel(radio), config, rng=rng)
+    for cycle, heading in enumerate(walk.heading.tolist()):
+        heard, _ = measure(paths.of_cycle(cycle), 0, heading, radio, ReceiverConfig(), rng=rng)
+        state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, heading, config, rng=rng)
+    found = slam.estimate(state, config).map
+    square = np.abs(found.wall_normal).max(axis=1) > np.cos(np.radians(1.0))
+    assert square.all()
+    assert np.abs(found.wall_offset[found.wall_normal[:, 0] > 0.9] - 3.2).min() < 0.02
