@@ -91,7 +91,7 @@ class ModelConstants(NamedTuple):
     @property
     def log_rare(self) -> float:
         """Model constant: log probability of an unannounced manoeuvre, a thing behind a wall, two walls neither of
-        which is heard."""
+        which is heard, a new wall that is small."""
         return float(np.log(self.rare))
 
     @property

@@ -54,7 +54,7 @@ def find_candidate(
     (`DISMISSAL`).
 
     A track that seems to come from behind a wall may be the panel over that wall, or the wall ends before: the panel
-    is there as rarely as any new feature is (`hypothesis_evidence.log_opacity`).
+    is there as rarely as any new feature behind a wall that is heard (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one

@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX, by_wall, reflect
-from rislam_rt.slam.window.births.hypothesis_evidence import direction_beliefs
+from rislam_rt.slam.window.births.hypothesis_evidence import direction_beliefs, log_right
 from rislam_rt.slam.window.landmarks.duplicate_walls import log_same_place
 from rislam_rt.slam.window.landmarks.path_forms import margins
 from rislam_rt.slam.window.smoother import window_gaussian
@@ -82,7 +82,7 @@ def log_explained(spot: Floats, rows: Integers, place: Floats, anchor: Floats, b
 def log_own_place(place: Floats, spread: Floats, middle: Floats, others: Floats) -> float:
     """Log density [1/m^3] of a wall's place (3,) [m], the image of `middle` within a covariance `spread` (3, 3) [m^2],
     if it is a wall of its own: at any distance, in any direction but for what is known of directions beforehand
-    (`direction_beliefs`), with the images `others` (W, 3) [m] of `middle` in other walls."""
+    (`direction_beliefs`, each by itself), with the images `others` (W, 3) [m] of `middle` in other walls."""
     beliefs, sure = direction_beliefs(place, middle, others), np.logaddexp(0.0, CONSTANTS.log_upright)
     reach = np.linalg.norm(place - middle)
     value = -np.log(8.0 * np.pi * CONSTANTS.size * reach**2)
@@ -90,7 +90,7 @@ def log_own_place(place: Floats, spread: Floats, middle: Floats, others: Floats)
         return float(value - sure)  # it slants
     variance = np.vecdot(beliefs.axis, beliefs.axis @ spread) + beliefs.std**2
     off = beliefs.axis @ place - beliefs.aim
-    told = beliefs.log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance)
+    told = log_right(beliefs.log_odds, off, variance)
     return float(value + (np.logaddexp(0.0, told) - sure).sum())
 
 

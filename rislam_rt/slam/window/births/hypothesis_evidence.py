@@ -211,7 +211,7 @@ def log_opacity(
 
 def log_wide_or_small(table: Hypotheses, log_wide: Floats) -> Floats:
     """Log probability (H,) of what new walls hide and of where they are not heard, of which `log_wide` is that of wide
-    ones; 0 for other features.
+    ones; of other features `log_wide` itself.
 
     A new wall is rarely small, a face of a piece of furniture: all else may then be beside it, and its own bounce may
     miss it for good.
@@ -315,7 +315,7 @@ def log_upright(
             each = CONSTANTS.log_upright + off.shape[1] * width[rows] - 0.5 * np.vecdot(off, weight)
             each = (each - 0.5 * np.linalg.slogdet(2.0 * np.pi * inside)[1])[:, None]
         else:
-            each = _log_right(CONSTANTS.log_upright + width[rows, None], off, np.diagonal(inside, axis1=1, axis2=2))
+            each = log_right(CONSTANTS.log_upright + width[rows, None], off, np.diagonal(inside, axis1=1, axis2=2))
         held.gain[rows] = (np.logaddexp(0.0, each) - sure).sum(axis=1)
         own = ~pair[rows]
         rows, across, off = rows[own], across[own], off[own]
@@ -327,12 +327,12 @@ def log_upright(
     square, axis = _square_axes(span[rows], known.place[landmarks.walls] - summary.middle)
     rows = rows[square]
     variance = np.vecdot(axis, (spread[rows] @ axis[..., None])[..., 0]) + noise[rows]
-    each = _log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)
+    each = log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)
     held.gain[rows] += np.logaddexp(0.0, each) - sure
     return held
 
 
-def _log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
+def log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:
     """Posterior log odds that a direction prior holds of a hypothesis's wall, from the prior ones and the offset [m] of
     the wall's image with its variance [m^2]."""
     return np.asarray(log_odds - 0.5 * off**2 / variance - 0.5 * np.log(2.0 * np.pi * variance))
