@@ -1,2 +1,2 @@
-"""Births and removals of map features: hypotheses of what caused a track, their evidence, and features that residuals
-contradict."""
+"""Births and removals of map features: which hypothesis of what caused a track is born, and which features residuals or
+other walls take back."""

@@ -9,13 +9,13 @@ from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import remove_from_map, resolve
-from rislam_rt.slam.window.births.hypotheses import BESIDE, known_features
-from rislam_rt.slam.window.births.map_explanations import explanations
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
-from rislam_rt.slam.window.births.track_summary import TrackSummary, summarise_tracks
-from rislam_rt.slam.window.births.unheard_returns import bearings, missing_legs
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import motion_agreement
+from rislam_rt.slam.window.hypotheses.hypotheses import BESIDE, known_features
+from rislam_rt.slam.window.hypotheses.map_explanations import explanations
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary, summarise_tracks
+from rislam_rt.slam.window.hypotheses.unheard_returns import bearings, missing_legs
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN

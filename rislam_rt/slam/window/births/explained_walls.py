@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX, by_wall, reflect
-from rislam_rt.slam.window.births.hypothesis_evidence import direction_beliefs, log_right
+from rislam_rt.slam.window.hypotheses.hypothesis_evidence import direction_beliefs, log_right
 from rislam_rt.slam.window.landmarks.duplicate_walls import log_same_place
 from rislam_rt.slam.window.landmarks.path_forms import margins
 from rislam_rt.slam.window.smoother import window_gaussian

@@ -9,7 +9,7 @@ import scipy
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX
-from rislam_rt.slam.window.births.hypotheses import (
+from rislam_rt.slam.window.hypotheses.hypotheses import (
     IS_IMAGE,
     TWO_WALLS,
     WALLS,
@@ -17,7 +17,7 @@ from rislam_rt.slam.window.births.hypotheses import (
     KnownFeatures,
     hypotheses,
 )
-from rislam_rt.slam.window.births.hypothesis_evidence import (
+from rislam_rt.slam.window.hypotheses.hypothesis_evidence import (
     MORE_UNKNOWN,
     concurrent,
     direction_beliefs,
@@ -30,12 +30,12 @@ from rislam_rt.slam.window.births.hypothesis_evidence import (
     log_upright,
     log_wide_or_small,
 )
-from rislam_rt.slam.window.births.hypothesis_fits import Fits, smooth_paths, try_all
-from rislam_rt.slam.window.births.image_hypotheses import fitted_twice, with_images
-from rislam_rt.slam.window.births.path_feasibility import log_possible
-from rislam_rt.slam.window.births.point_identification import identify
-from rislam_rt.slam.window.births.track_summary import TrackSummary
-from rislam_rt.slam.window.births.unheard_returns import log_unheard
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Fits, smooth_paths, try_all
+from rislam_rt.slam.window.hypotheses.image_hypotheses import fitted_twice, with_images
+from rislam_rt.slam.window.hypotheses.path_feasibility import log_possible
+from rislam_rt.slam.window.hypotheses.point_identification import identify
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.unheard_returns import log_unheard
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.solver_limits import CERTAIN

@@ -6,8 +6,9 @@ import numpy as np
 
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE, TX
-from rislam_rt.slam.window.births import births, hypothesis_evidence, track_classification
-from rislam_rt.slam.window.births.hypotheses import (
+from rislam_rt.slam.window.births import births, track_classification
+from rislam_rt.slam.window.hypotheses import hypothesis_evidence
+from rislam_rt.slam.window.hypotheses.hypotheses import (
     BESIDE,
     KNOWN_WALL,
     OVER_RX,
@@ -17,7 +18,7 @@ from rislam_rt.slam.window.births.hypotheses import (
     hypotheses,
     known_features,
 )
-from rislam_rt.slam.window.births.hypothesis_fits import Fits
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.horizon_detection import nothing_heard
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations, pack

@@ -26,8 +26,8 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import NONE, poses_of
 from rislam_rt.slam.predicted_returns import TX as MOVING
 from rislam_rt.slam.window.births.births import _without_rival
-from rislam_rt.slam.window.births.point_identification import log_none_shorter, longer
 from rislam_rt.slam.window.cycle_association import return_sides
+from rislam_rt.slam.window.hypotheses.point_identification import log_none_shorter, longer
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, spread_places, unknown, weigh

@@ -12,8 +12,8 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.planes import crossing
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import reflect
-from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
-from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.hypotheses import KNOWN_WALL, WALL_KNOWN, Hypotheses, KnownFeatures
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.path_forms import margins, planes
 from rislam_rt.slam.window.solver_limits import STEP
 

@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES
-from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.solver_limits import ASTRAY, CERTAIN, STEPS
 
 

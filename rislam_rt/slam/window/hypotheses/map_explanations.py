@@ -12,8 +12,8 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import Poses, linearise
-from rislam_rt.slam.window.births.track_summary import TrackSummary
 from rislam_rt.slam.window.cycle_association import CycleAssociation
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, compile_forms
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import poses

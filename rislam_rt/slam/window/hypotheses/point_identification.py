@@ -13,8 +13,8 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import AXES, NONE, Poses, poses_of
 from rislam_rt.slam.sampling import even_draws
-from rislam_rt.slam.window.births.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
-from rislam_rt.slam.window.births.hypothesis_fits import Fits
+from rislam_rt.slam.window.hypotheses.hypotheses import IS_POINT, OVER_SAME, POINT, Hypotheses
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Fits
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.ris_identification import (
     PanelIdentity,

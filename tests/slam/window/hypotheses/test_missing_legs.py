@@ -7,7 +7,7 @@ import pytest
 
 from rislam_rt.model import RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.births.unheard_returns import bearings, missing_legs
+from rislam_rt.slam.window.hypotheses.unheard_returns import bearings, missing_legs
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 

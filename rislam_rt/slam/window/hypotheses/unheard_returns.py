@@ -14,9 +14,9 @@ from rislam_rt.slam.arrival_rays import rays
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.predicted_returns import poses_of, reflect
-from rislam_rt.slam.window.births.hypotheses import Hypotheses
-from rislam_rt.slam.window.births.path_feasibility import over_known
-from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.hypotheses import Hypotheses
+from rislam_rt.slam.window.hypotheses.path_feasibility import over_known
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.horizon_detection import above_within, elevations
 from rislam_rt.slam.window.landmarks.measurement_prediction import detection_probability
 from rislam_rt.slam.window.smoother.motion_basis import HEAD

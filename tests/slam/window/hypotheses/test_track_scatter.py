@@ -12,7 +12,7 @@ from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import Body, RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER, PANEL
-from rislam_rt.slam.window.births.track_summary import expected_scatter, summarise_tracks
+from rislam_rt.slam.window.hypotheses.track_summary import expected_scatter, summarise_tracks
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import window_gaussian
 

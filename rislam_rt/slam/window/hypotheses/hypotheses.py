@@ -9,8 +9,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.sampling import square_roots
-from rislam_rt.slam.window.births.hypothesis_fits import Trials
-from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Trials
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 
 KINDS = (

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX
-from rislam_rt.slam.window.births.hypotheses import (
+from rislam_rt.slam.window.hypotheses.hypotheses import (
     ALIGNED_TURN,
     BESIDE,
     IS_IMAGE,
@@ -21,10 +21,10 @@ from rislam_rt.slam.window.births.hypotheses import (
     Hypotheses,
     KnownFeatures,
 )
-from rislam_rt.slam.window.births.hypothesis_fits import Fits
-from rislam_rt.slam.window.births.image_hypotheses import image_amplitudes
-from rislam_rt.slam.window.births.path_feasibility import bounces
-from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Fits
+from rislam_rt.slam.window.hypotheses.image_hypotheses import image_amplitudes
+from rislam_rt.slam.window.hypotheses.path_feasibility import bounces
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import recall_forms
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment

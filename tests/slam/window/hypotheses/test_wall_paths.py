@@ -17,11 +17,11 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import reflect
-from rislam_rt.slam.window.births.hypotheses import KNOWN_WALL, WALL, WALL_KNOWN
-from rislam_rt.slam.window.births.hypothesis_evidence import log_upright
-from rislam_rt.slam.window.births.hypothesis_fits import Fits
-from rislam_rt.slam.window.births.path_feasibility import bounces, log_possible
-from rislam_rt.slam.window.births.unheard_returns import log_silence
+from rislam_rt.slam.window.hypotheses.hypotheses import KNOWN_WALL, WALL, WALL_KNOWN
+from rislam_rt.slam.window.hypotheses.hypothesis_evidence import log_upright
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Fits
+from rislam_rt.slam.window.hypotheses.path_feasibility import bounces, log_possible
+from rislam_rt.slam.window.hypotheses.unheard_returns import log_silence
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 
 ROOMS = Path(__file__).parents[4] / "scenes"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.slam.window.births.map_explanations import _log_evidence, _Predicted
+from rislam_rt.slam.window.hypotheses.map_explanations import _log_evidence, _Predicted
 from rislam_rt.slam.window.solver_limits import STRENGTHS
 
 REPORTED = np.tile([0.001, 0.002, 0.002], (8, 1))

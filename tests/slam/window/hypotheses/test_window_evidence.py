@@ -5,9 +5,9 @@ import numpy as np
 from rislam_rt.model import Body
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX, Poses, linearise, poses_of, reflect
-from rislam_rt.slam.window.births import hypothesis_fits
-from rislam_rt.slam.window.births.hypothesis_fits import COMMON, Trials, smooth_paths, try_all
-from rislam_rt.slam.window.births.track_summary import TrackSummary, scatter_of
+from rislam_rt.slam.window.hypotheses import hypothesis_fits
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import COMMON, Trials, smooth_paths, try_all
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary, scatter_of
 from rislam_rt.slam.window.landmarks.path_forms import compile_forms
 
 

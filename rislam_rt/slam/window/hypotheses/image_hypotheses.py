@@ -13,7 +13,7 @@ from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.sampling import square_roots
-from rislam_rt.slam.window.births.hypotheses import (
+from rislam_rt.slam.window.hypotheses.hypotheses import (
     BOTH_LEGS,
     FAR,
     IMAGE,
@@ -26,8 +26,8 @@ from rislam_rt.slam.window.births.hypotheses import (
     Hypotheses,
     KnownFeatures,
 )
-from rislam_rt.slam.window.births.hypothesis_fits import Trials
-from rislam_rt.slam.window.births.track_summary import TrackSummary
+from rislam_rt.slam.window.hypotheses.hypothesis_fits import Trials
+from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.solver_limits import APART, BEARINGS, REACH
 
