@@ -241,6 +241,48 @@ def test_boxes_face_to_face_are_one_note(paper: Scene) -> None:
     assert "'plate'" in " ".join(complaints(hung).values())
 
 
+def shut_off(room: Scene, part: str, opened: bool = False) -> Scene:
+    """The room with a part of it shut off by sheets, below a raised floor, behind an inner wall, or above a lowered
+    ceiling; or with one of its sides left open."""
+    x, y, z = [3.0, 0, 0], [0, 3.0, 0], {"below": 0.0, "behind": 0.0, "above": 2.6}[part]
+    up = [0, 0, {"below": 0.3, "behind": 3.0, "above": 0.4}[part]]
+    lid = grid([3, 0, 0.3 if part == "below" else z], x, y, 1, 1)
+    sheets = {"sheet": lid, "side": grid([3, 3, z], x, up, 1, 1), "front": grid([3, 0, z], y, up, 1, 1)}
+    if part == "behind":
+        sheets = {"sheet": sheets["front"], "side": sheets["side"]}
+    for name in list(sheets)[: len(sheets) - opened]:
+        room = furnished(room, name, sheets[name])
+    return room
+
+
+@pytest.mark.parametrize(
+    ("part", "chest", "poster"),
+    [
+        ("below", block([4, 1, 0.3], [5, 2, 1.3]), grid([4, 2.2, 0.3], [1, 0, 0], [0, 0.5, 0], 1, 1)),
+        ("behind", block([2.2, 1, 0.1], [3, 2, 0.9]), grid([3, 0.2, 1], [0, 0.5, 0], [0, 0, 0.5], 1, 1)),
+        ("above", block([4, 1, 0.1], [4.5, 2, 2.6]), grid([4, 2.2, 2.6], [1, 0, 0], [0, 0.5, 0], 1, 1)),
+    ],
+)
+def test_a_face_before_a_void_is_seen_if_the_void_is(paper: Scene, part: str, chest: Mesh, poster: Mesh) -> None:
+    """On a raised floor, against an inner wall, under a lowered ceiling: the void is within the bounds of the room."""
+    closed, opened = (furnished(shut_off(paper, part, opened), "chest", chest) for opened in (False, True))
+    assert complaints(closed) == {}
+    assert "'chest' lies in the plane of 'sheet'" in " ".join(remarks(closed).values())
+    for room, name in ((opened, "chest"), (furnished(closed, "poster", poster), "poster")):
+        (warning,) = complaints(room).values()
+        assert f"'{name}' lies in the plane of 'sheet'" in warning
+
+
+def test_a_poster_behind_a_cupboard_is_seen(paper: Scene) -> None:
+    """5 cm off the wall that the poster hangs on, a cupboard hides it from nearly everywhere."""
+    room = furnished(paper, "poster", grid([0, 3.4, 1], [0, 0.2, 0], [0, 0, 0.2], 1, 1))
+    room = furnished(room, "cupboard", block([0.05, 3, 0.1], [0.6, 4, 2]))
+    assert list(complaints(room)) == ["warning reflector[6].mesh (poster)"]
+    room = furnished(room, "sides", joined([grid([0, y, 0.1], [0.05, 0, 0], [0, 0, 1.9], 1, 1) for y in (3, 4)]))
+    lids = joined([grid([0, 3, z], [0.05, 0, 0], [0, 1, 0], 1, 1) for z in (0.1, 2)])
+    assert complaints(furnished(room, "lids", lids)) == {}
+
+
 def test_room_of_a_larger_building_is_no_object(paper: Scene) -> None:
     """Two closed rooms, one a thousandth of the scene's box: its landmark says that it is lived in."""
     far = block([40.0, 40.0, 0.0], [60.0, 60.0, 20.0])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, cross, row_blocks
-from rislam_rt.geometry.triangles import edge_planes, triangle_planes
+from rislam_rt.geometry.triangles import edge_planes, triangle_cross, triangle_planes
 
 
 def touching(points: Floats, triangles: Floats, distance: float) -> tuple[Integers, Integers]:
@@ -56,6 +56,19 @@ def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float
         order = np.argsort(-distance[k, t], kind="stable")
         nearest[k[order] + rows.start] = t[order]
     return nearest
+
+
+def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats) -> Floats:
+    """Query to a mesh: free distance (D,) [m] from a place (3,) along unit vectors (D, 3) to the first triangle
+    (T, 3, 3), or out of the box (2, 3)."""
+    with np.errstate(divide="ignore"):
+        out = (np.where(directions > 0.0, box[1], box[0]) - place) / directions
+    leaves = np.where(directions == 0.0, np.inf, out).min(axis=1)
+    hit = ray_hits(place, directions, triangles)
+    normal = triangle_cross(triangles)[hit]
+    slope = np.einsum("di,di->d", directions, normal)
+    height = np.einsum("di,di->d", triangles[hit, 0] - place, normal)
+    return np.where(hit < 0, leaves, np.minimum(leaves, height / np.where(slope != 0.0, slope, 1.0)))
 
 
 def winding(point: Floats, triangles: Floats) -> float:

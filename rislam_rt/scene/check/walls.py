@@ -11,12 +11,14 @@ from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.input_messages import counted
-from rislam_rt.scene.check.mesh_queries import touching, winding
+from rislam_rt.scene.check.mesh_queries import crossings, free_ways, sphere_directions, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
 """Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat."""
+NUM_VIEWS = 20
+"""Places from which the scene check looks about, and rays from each."""
 
 
 class WallParts(NamedTuple):
@@ -66,8 +68,10 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
     offset = np.concatenate([part.offset for part in parts.flat])
     limit = tracer_gap(room.bounds)
     worst: dict[tuple[int, int, bool], CoplanarPair] = {}
-    for pair in stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs:
-        key = parts.reflector(pair.upper), parts.reflector(pair.lower), _is_seen(room, parts, pair, limit)
+    pairs = stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs
+    views = _views(room) if pairs else np.zeros((0, 3))
+    for pair in pairs:
+        key = parts.reflector(pair.upper), parts.reflector(pair.lower), _is_seen(room, parts, pair, limit, views)
         if key not in worst or worst[key].gap < pair.gap:
             worst[key] = pair
     hidden = sum(not seen for _, _, seen in worst)
@@ -84,25 +88,43 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
             hidden = 0
 
 
-def _is_seen(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: float) -> bool:
-    """Scene check: whether two walls that overlap have a side in the room where they do, as the foot of a crate, or two
-    crates face to face, have not."""
+def _is_seen(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: float, views: Floats) -> bool:
+    """Scene check: whether a side of two walls that overlap is seen from any view (V, 3) where they do, as neither is
+    at the foot of a crate, between two crates face to face, or where an inner wall or a raised floor hides a void."""
     wall, other = (room.triangles[parts.owner == number] for number in (pair.upper, pair.lower))
     points = np.einsum("lc,tci->tli", _lattice(6), wall)
     normal = np.broadcast_to(triangle_planes(wall)[0][:, None], points.shape).reshape(-1, 3)
     points = points.reshape(-1, 3)
     common = np.unique(touching(points, other, limit)[0])
     common = common if len(common) else np.arange(len(points))
+    sides = np.concatenate([points[common] + step * normal[common] for step in (MIN_CLEARANCE, -MIN_CLEARANCE)])
+    sides = np.delete(sides, room.outside(sides), axis=0)
+    if not len(sides):
+        return False
     upper, lower = (room.triangles[room.owner == parts.reflector(number)] for number in (pair.upper, pair.lower))
-    for row in common[:: max(1, len(common) // 8)]:
-        sides = points[row] + MIN_CLEARANCE * np.outer([1.0, -1.0], normal[row])
-        own = [abs(winding(side, upper)) >= 0.5 for side in sides]
-        for number in np.delete([0, 1], room.outside(sides)):
-            # what is inside the other, too, only if this is on its outside: a poster is inside the shell of a room
-            behind = own[1 - number] and abs(winding(sides[number], lower)) >= 0.5
-            if not own[number] and not behind:
-                return True
-    return False
+    seen = sides[np.arange(len(views)) % len(sides)]  # each by its own share of the views
+    for triangles in (upper, lower, room.triangles):  # the nearest hide most
+        blocked = np.unique(crossings(views, seen, triangles)[0])
+        views, seen = np.delete(views, blocked, axis=0), np.delete(seen, blocked, axis=0)
+    return len(views) > 0
+
+
+def _views(room: TriangleArray) -> Floats:
+    """Places (V, 3) all over the room of a scene check, joined with the agent's way by one or two free straight lines.
+
+    A wall that a path of up to six bounces meets is no more than three such lines away from one of its ends.
+    """
+    rays, found = sphere_directions(NUM_VIEWS**2), [room.scene.agent.position]
+    # how far along each free line: evenly from end to end
+    shares = (np.arange(2 * len(rays)) * 0.5 * (np.sqrt(5.0) - 1.0) % 1.0).reshape(2, -1)
+    for share in shares:
+        chosen = found[-1][np.linspace(0, len(found[-1]) - 1, NUM_VIEWS).astype(np.int64)]
+        places = []
+        for number, place in enumerate(chosen):
+            look, part = rays[number::NUM_VIEWS], share[number::NUM_VIEWS]
+            places.append(place + (part * free_ways(place, look, room.triangles, room.bounds))[:, None] * look)
+        found.append(np.concatenate(places))
+    return np.concatenate(found[1:])[np.argsort(shares, axis=None)]  # mixed, so that every share of them is all over
 
 
 def _lattice(count: int) -> Floats:

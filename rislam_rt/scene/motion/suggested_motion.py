@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
-from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross
-from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions
+from rislam_rt.geometry.triangles import distance_to_triangles
+from rislam_rt.scene.check.mesh_queries import free_ways, sphere_directions
 from rislam_rt.scene.findings import Fault
 
 BASELINE = {"tx_offset_m": [-0.04388, -0.02397, 0.0], "rx_offset_m": [0.04388, 0.02397, 0.0]}
@@ -52,18 +52,6 @@ def suggest_agent(triangles: Floats) -> dict[str, Any]:
     ways = np.stack([np.cos(turn), np.sin(turn), np.zeros(NUM_WAYS)], axis=-1)
     ahead, behind = (free_ways(place, sign * ways, triangles, box) - keep for sign in (1.0, -1.0))
     return _motion(place, ways, ahead, behind, keep, triangles)
-
-
-def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats) -> Floats:
-    """Free distance (D,) [m] from a place (3,) along (D, 3) to the first surface, or out of the box (2, 3)."""
-    with np.errstate(divide="ignore"):
-        out = (np.where(directions > 0.0, box[1], box[0]) - place) / directions
-    leaves = np.where(directions == 0.0, np.inf, out).min(axis=1)
-    hit = ray_hits(place, directions, triangles)
-    normal = triangle_cross(triangles)[hit]
-    slope = np.einsum("di,di->d", directions, normal)
-    height = np.einsum("di,di->d", triangles[hit, 0] - place, normal)
-    return np.where(hit < 0, leaves, np.minimum(leaves, height / np.where(slope != 0.0, slope, 1.0)))
 
 
 def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:

@@ -6,8 +6,9 @@ from built_in_rooms.parts import box_walls
 
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.scene import load_scene
+from rislam_rt.scene.check.mesh_queries import free_ways
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.suggested_motion import free_ways, suggest_agent
+from rislam_rt.scene.motion.suggested_motion import suggest_agent
 from rislam_rt.scene.shapes import block, quad
 
 
