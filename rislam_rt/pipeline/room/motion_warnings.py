@@ -13,6 +13,9 @@ from rislam_rt.slam.model_constants import CONSTANTS
 GRAVITY = 9.81
 """Acceleration [m/s^2] that nothing which rolls or walks on a floor exceeds: friction carries about its weight."""
 
+ROUNDING = 1e-6
+"""Part of a limit by which a speed may exceed it without a warning: the arithmetic, or the digits of a recording."""
+
 FEWEST_DIGITS, MOST_DIGITS = 3, 17
 """Significant digits of a speed in a message, and how many tell any two numbers of float64 apart."""
 
@@ -32,13 +35,14 @@ def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:
     if step.max(initial=0.0) > MAX_SPEED:  # a jump, which the scene check names by its step's speed
         speed[:-1] = np.maximum(speed[:-1], step)
     cycle = int(np.argmax(speed))
-    if speed[cycle] > (1.0 + 1e-6) * top_speed:
+    least = float(speed[cycle]) / (1.0 + ROUNDING)
+    if least > top_speed:
         limit, fastest = _unequal(top_speed, float(speed[cycle]))
         message = (
             f"{limit} m/s, and the agent moves at up to {fastest} m/s (cycle {cycle}): paths over walls "
             "and scatterers may pass for the panel's"
         )
-        mend = f"give receiver.top_speed = {np.ceil(10.0 * speed[cycle]) / 10.0:g}"
+        mend = f"give receiver.top_speed = {np.ceil(10.0 * least) / 10.0:g}"
         yield Finding("warning", file, "receiver.top_speed", message, mend)
 
 

@@ -34,6 +34,16 @@ def test_a_speed_above_the_receivers_is_said_with_its_cycle(room):
     assert not said(replace(faster(room, 7, [0.6, 0.0, 0.0]), ris=None))
 
 
+def test_rounding_of_a_speed_raises_no_advice(room):
+    """The least tenth with which the warning ends: 0.8 m/s, computed along a way, is 0.8 in one cycle and a little more
+    in the next."""
+    for speed, wanted in ((0.8, 0.8), (np.nextafter(0.8, 1.0), 0.8), (0.6 * (1.0 + 5e-7), 0.6), (0.80001, 0.9)):
+        changed = faster(room, 7, [speed, 0.0, 0.0])
+        (line,) = said(changed)
+        assert line.endswith(f"give receiver.top_speed = {wanted}")
+        assert not said(changed, top_speed=wanted)
+
+
 def test_a_jump_has_one_speed_whatever_is_said_of_it(room):
     """The scene check names the speed of the step; that of the cycles beside it, from both their steps, is lower."""
     position = room.agent.position.copy()
