@@ -12,6 +12,7 @@ from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
 from rislam_rt.scene.check import faint_slabs, find_errors, find_warnings, material_errors
+from rislam_rt.scene.check.triangle_array import START_KEY
 from rislam_rt.scene.check.units import (
     ROOM_FIELD,
     SPEED_FIELD,
@@ -22,7 +23,15 @@ from rislam_rt.scene.check.units import (
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
-from rislam_rt.scene.schema import MAX_SCENE_BYTES, MaterialSection, RisSection, ScattererSection, SceneSpec, read_spec
+from rislam_rt.scene.schema import (
+    MAX_SCENE_BYTES,
+    AgentSection,
+    MaterialSection,
+    RisSection,
+    ScattererSection,
+    SceneSpec,
+    read_spec,
+)
 from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.shipped import find_room
 from rislam_rt.toml import parse_toml
@@ -39,6 +48,8 @@ class SceneDraft(NamedTuple):
     findings: list[Finding]
     bounds: Floats | None = None
     """(2, 3) [m] of the meshes that could be read."""
+    start_key: str = START_KEY
+    """Key of the scene file that says where the agent starts."""
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -53,7 +64,7 @@ def load_scene(path: str | Path) -> Scene:
     draft = read_draft(path)
     raise_errors(draft.findings)
     assert draft.scene is not None
-    raise_errors(find_errors(draft.scene, draft.file))
+    raise_errors(find_errors(draft.scene, draft.file, draft.start_key))
     return draft.scene
 
 
@@ -66,9 +77,11 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
     warnings only those about units are looked for: such a mistake often is what the errors come from.
     """
     if isinstance(scene, Scene):
-        return _check_read(scene, scene.name, radio)
+        return _check_read(scene, scene.name, START_KEY, radio)
     draft = read_draft(scene)
-    findings = draft.findings if draft.scene is None else _check_read(draft.scene, draft.file, radio)
+    findings = draft.findings
+    if draft.scene is not None:
+        findings = _check_read(draft.scene, draft.file, draft.start_key, radio)
     units = _unit_findings(draft)
     if any(finding.severity == "error" for finding in findings):
         return findings + units
@@ -87,9 +100,9 @@ def _unit_findings(draft: SceneDraft) -> list[Finding]:
     return found
 
 
-def _check_read(scene: Scene, file: str, radio: RadioConfig | None) -> list[Finding]:
+def _check_read(scene: Scene, file: str, start_key: str, radio: RadioConfig | None) -> list[Finding]:
     """Check a scene that has been loaded: its errors, or if it has none its warnings and notes."""
-    errors = find_errors(scene, file)
+    errors = find_errors(scene, file, start_key)
     if radio is not None:
         errors += material_errors(scene, file, radio)
     faint = [] if radio is None else faint_slabs(scene, file, radio)
@@ -158,7 +171,14 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     ris = join_panels(tuple(panels))
     digest = _digest(content, mesh_files.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
-    return SceneDraft(str(file), scene, [], bounds)
+    return SceneDraft(str(file), scene, [], bounds, _start_key(spec.agent))
+
+
+def _start_key(agent: AgentSection) -> str:
+    """Key of the scene file to load that says where the agent starts."""
+    if agent.waypoints is not None:
+        return "agent.waypoints[0]"
+    return START_KEY if agent.trajectory is None else "agent.trajectory"
 
 
 def _material(section: MaterialSection) -> Material:

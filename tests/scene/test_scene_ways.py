@@ -11,11 +11,13 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.motion.agent_motion import at_cycles
 from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
 from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv
 from rislam_rt.scene.motion.waypoints import round_corners
+from rislam_rt.scene.shapes import block
 
 EPOCH = 1_700_000_000.0
 CSV = "stamp_ns,px_mm,py_mm,pz_mm,yaw_deg,note\n"
@@ -35,6 +37,27 @@ def moved(damaged: Callable[[str, str], Path]) -> Callable[..., Scene]:
         return load_scene(room)
 
     return _moved
+
+
+@pytest.mark.parametrize(
+    ("motion", "key"),
+    [
+        ("start = [3, 3, 0.5]\nvelocity = [0.1, 0, 0]\ncycles = 3\ncycle_s = 0.1", r"agent\.start"),
+        ("waypoints = [[3, 3, 0.5], [3.2, 3, 0.6]]\nspeed_m_s = 0.1\ncycle_s = 0.1", r"agent\.waypoints\[0\]"),
+        ('trajectory = "walk.tum"', r"agent\.trajectory"),
+    ],
+)
+def test_a_bad_start_is_told_by_the_key_that_gives_it(
+    moved: Callable[..., Scene], damaged: Callable[[str, str], Path], motion: str, key: str
+) -> None:
+    tum = "".join(f"{0.1 * k} {3 + 0.01 * k} 3 0.5 0 0 0 1\n" for k in range(3))
+    room = damaged("[ris]", '[[reflector]]\nname = "table"\nmesh = "table.ply"\nmaterial.reflection = 0.9\n\n[ris]')
+    (room / "table.ply").write_bytes(ply_bytes(*block([2.5, 2.5, 0.2], [3.5, 3.5, 0.8])))
+    with pytest.raises(SceneError, match=rf"scene\.toml: {key}: \[3\.0, 3\.0, 0\.5\] lies inside the object 'table'"):
+        moved(motion, walk_tum=tum)
+    (room / "table.ply").write_bytes(ply_bytes(*block([2.5, 2.5, 0.2], [3.5, 3.5, 0.5])))
+    with pytest.raises(SceneError, match=rf"scene\.toml: {key}: agent at .* lies on 'table'"):
+        load_scene(room)
 
 
 def test_a_csv_file_says_what_its_columns_are(moved: Callable[..., Scene]) -> None:

@@ -27,7 +27,7 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
         outside = room.outside(points)
         if len(outside):
             message = f"{_where(part, int(outside[0]), points)} lies outside the meshes' bounds {room.box}"
-            yield room.error(_field(int(outside[0])), message, "move the start or change the motion")
+            yield room.error(_field(room, int(outside[0])), message, "move the start or change the motion")
             return
     yield from _on_surface(room, places)
     yield from _through_wall(room)
@@ -84,7 +84,9 @@ def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Find
         cycles, near = touching(points, room.triangles, MIN_CLEARANCE)
         if len(cycles):
             message = f"{_where(part, int(cycles[0]), points)} lies on '{room.name(int(near[0]))}'"
-            yield room.error(_field(int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
+            yield room.error(
+                _field(room, int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces"
+            )
             return
 
 
@@ -99,7 +101,7 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
     cycles, walls = crossings(motion.tx, motion.rx, room.triangles)
     if len(cycles):
         message = f"'{room.name(int(walls[0]))}' stands between Tx and Rx at cycle {int(cycles[0])}"
-        yield room.error(_field(int(cycles[0])), message, "keep further away from it")
+        yield room.error(_field(room, int(cycles[0])), message, "keep further away from it")
 
 
 def _inside_object(room: TriangleArray) -> Iterator[Finding]:
@@ -107,7 +109,9 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
     start = room.scene.agent.position[0]
     name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:
-        yield room.error("agent.start", f"{start.tolist()} lies inside the object '{name}'", "move the start out of it")
+        yield room.error(
+            room.start_key, f"{start.tolist()} lies inside the object '{name}'", "move the start out of it"
+        )
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
@@ -135,6 +139,6 @@ def _where(part: str, cycle: int, points: Floats) -> str:
     return f"{part} at {np.round(points[cycle], 4).tolist()} (cycle {cycle})"
 
 
-def _field(cycle: int) -> str:
+def _field(room: TriangleArray, cycle: int) -> str:
     """Key of the scene file that says where the agent is at a cycle; how it moves on, several can say."""
-    return "agent.start" if cycle == 0 else "agent"
+    return room.start_key if cycle == 0 else "agent"

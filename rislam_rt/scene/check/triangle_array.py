@@ -14,6 +14,8 @@ MIN_CLEARANCE = 1e-3
 """Least distance [m] of a device or scatterer from a surface: a nearer one loses that surface's reflection."""
 MIN_ALTITUDE = 1e-6
 """Least height [m] of a triangle: one with a smaller height has no usable normal."""
+START_KEY = "agent.start"
+"""Key of the agent's start, as findings of the scene check name it, unless the scene file says it otherwise."""
 
 
 class TriangleArray(NamedTuple):
@@ -28,6 +30,8 @@ class TriangleArray(NamedTuple):
     """(T,) number of the reflector of each triangle."""
     bounds: Floats
     """(2, 3) [m] lowest and highest corner."""
+    start_key: str = START_KEY
+    """Key of the scene file that says where the agent starts, for findings."""
 
     def name(self, triangle: int) -> str:
         """Name of the reflector that a triangle of the scene belongs to."""
@@ -64,12 +68,13 @@ class TriangleArray(NamedTuple):
         return Finding("note", self.file, field, message, mend)
 
 
-def build_triangle_array(scene: Scene, file: str) -> TriangleArray:
+def build_triangle_array(scene: Scene, file: str, start_key: str = START_KEY) -> TriangleArray:
     """Collect the triangles of a scene that was read from `file` in one array for the scene check."""
     triangles = np.concatenate([r.triangles for r in scene.reflectors])
     owner = np.repeat(np.arange(len(scene.reflectors)), [len(r.faces) for r in scene.reflectors])
     corners = triangles.reshape(-1, 3)
-    return TriangleArray(file, scene, triangles, owner, np.stack([corners.min(axis=0), corners.max(axis=0)]))
+    bounds = np.stack([corners.min(axis=0), corners.max(axis=0)])
+    return TriangleArray(file, scene, triangles, owner, bounds, start_key)
 
 
 def without_area(triangles: Floats) -> Booleans:
