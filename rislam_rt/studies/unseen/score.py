@@ -32,7 +32,8 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
     landmarks, births.
 
     None where there is nothing to score. Relative errors are without the error of the start prior, which no measurement
-    reduces.
+    reduces. `lost` is by the truth, from `LOST` [m] on: a run's summary may say that it has not `diverged` (0.5 m), and
+    `silent` that the estimator did not notice.
 
     Raises
     ------
