@@ -225,6 +225,8 @@ def _solve(
     spread = prediction_variance(window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread, _excess_variance(window, left)))
     state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window), lively))
+    if lively[1] and state.is_level:  # associated as if it climbed, which the other steps contradict
+        state = state._replace(window=window_gaussian.solve(state.window))
     return state, view, left, float(np.sum(innovation**2)), covariance
 
 

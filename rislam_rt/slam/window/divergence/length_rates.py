@@ -12,7 +12,9 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
 MEASURED = 6
-"""Measurements of a track from which on it has a rate of length: as many as births ask for."""
+"""Measurements of a track from which on it has a rate of length: as many as births ask for..."""
+FIRST = 4
+"""...and of one of the first tracks, while there are no longer ones: two for the rate, and two that must agree."""
 
 
 class _PlainRates(NamedTuple):
@@ -115,6 +117,11 @@ class Lengths(NamedTuple):
         return np.asarray(np.bincount(self.which, value, len(self.number)), dtype=np.float64)
 
 
+def enough_measured(cycles: int) -> int:
+    """Measurements of a track from which on it has a rate of length, when `cycles` have been measured."""
+    return min(MEASURED, max(FIRST, cycles))
+
+
 def lengths(heard: Heard) -> Lengths:
     """Lengths of tracks and explained paths, with what the positions leave of them, so that a turn or an acceleration
     bends none."""
@@ -177,7 +184,7 @@ def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], F
     total, weighted = found.total, found.weight * x
     s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
     spread = s * sxx - sx**2
-    enough = (found.number >= MEASURED) & (spread > 1e-9 * s * s * found.heard.step**2)
+    enough = (found.number >= enough_measured(len(found.heard.place))) & (spread > 1e-9 * s * s * found.heard.step**2)
     spread = np.where(enough, spread, 1.0)
     slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
     return slopes, CONSTANTS.crowd * s / spread, enough

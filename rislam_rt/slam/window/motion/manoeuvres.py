@@ -9,12 +9,13 @@ more than it is rarer.
 
 import numpy as np
 
+from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
 from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares, unique_forms
-from rislam_rt.slam.window.motion.motion_learning import solve_livelier, vertical_information
+from rislam_rt.slam.window.motion.motion_learning import UP, solve_livelier, vertical_information
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
@@ -27,8 +28,9 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     """State whose last steps are as lively as can be, and accelerated as the tracks agree that they are, if these speak
     for a manoeuvre that the motion as believed leaves out.
 
-    What scatter wall returns were held to have is weighed again, as long as it goes on: first by the cycles before, so
-    that they tell of the motion what they can, then by all.
+    One that begins has to be held for true, as births may follow from it; one that goes on only to be likelier than
+    not. What scatter wall returns were held to have is weighed again, as long as it goes on: first by the cycles
+    before, so that they tell of the motion what they can, then by all.
     """
     window = state.window
     if window.rates is None or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
@@ -38,12 +40,12 @@ def with_manoeuvre(state: WindowState) -> WindowState:
         return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps
     lively = (state.level[:2] @ motion.transition(CONSTANTS.stay))[:, -1]
-    # a floor is held for level until another is held for true
-    climbs = np.array([0.0, CONSTANTS.log_upright + CONSTANTS.log_born if state.is_level else 0.0])
+    least = np.where(lively > 0.5, 0.0, CONSTANTS.log_born)
+    least[UP] += CONSTANTS.log_upright * state.is_level  # most floors are level
     best, accel, steps = 0.0, np.zeros(3), 0
     for each in [each for each in LASTED if each < len(window.step)]:
         share = np.maximum(lively, 1.0 - CONSTANTS.stay**each)
-        log_odds, by = motion_agreement.weigh_manoeuvre(state, told, each, np.log(share / (1.0 - share)) - climbs)
+        log_odds, by = motion_agreement.weigh_manoeuvre(state, told, each, np.log(share / (1.0 - share)) - least)
         if log_odds > best:
             best, accel, steps = log_odds, by, each
     if not steps:
@@ -52,11 +54,20 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     last = slice(-steps - 1, None)
     trial = solve_livelier(window, steps + 1, upwards=bool(accel[2]))
     trial.accel[last, :3] = window.accel[last, :3] + accel
+    before = state
     for until in (state.window.num_poses - 2 - steps, state.window.num_poses):
         # which tracks follow hangs on the motion, and the motion on them
         state = with_rates(_with_scatter_relearnt(state._replace(window=trial), until))
         trial = window_gaussian.solve(state.window)
-    return state._replace(window=trial)
+    after = state._replace(window=trial)
+    return after if best + _log_borne_out(before, after, state.cycle - steps) > 0.0 else before
+
+
+def _log_borne_out(before: WindowState, after: WindowState, begin: int) -> float:
+    """Log likelihood ratio of what is heard over walls alone since a cycle, by the motion `after` against that `before`
+    a manoeuvre; no path tells more than that it is another than it was held for, which is rare."""
+    ratio = _log_returns(after, begin, predictions(after, 0)) - _log_returns(before, begin, predictions(before, 0))
+    return float(np.clip(ratio, CONSTANTS.log_rare, -CONSTANTS.log_rare).sum())
 
 
 def _with_scatter_relearnt(state: WindowState, until: int) -> WindowState:
@@ -101,7 +112,8 @@ def with_climb(state: WindowState) -> WindowState:
     inner = vertical_information(trial.window).information[last, last]
     free = np.linalg.slogdet(np.eye(steps + 1) + CONSTANTS.liveliest**2 * inner)[1]
     free += float(np.sum(trial.window.accel[last, 2] ** 2)) / CONSTANTS.liveliest**2
-    log_ratio = _log_returns(trial, begin, predictions(trial, 0)) - _log_returns(state, begin, found) - 0.5 * free
+    ratio = _log_returns(trial, begin, predictions(trial, 0)) - _log_returns(state, begin, found)
+    log_ratio = float(ratio.sum()) - 0.5 * free
     return trial if log_ratio + CONSTANTS.log_rare - CONSTANTS.log_upright > CONSTANTS.log_born else state
 
 
@@ -118,12 +130,12 @@ def _scattering_as_before(state: WindowState, steps: int, found: Predictions) ->
     return state._replace(log=log._replace(extra=np.minimum(log.extra, before.extra)), visibility=visibility)
 
 
-def _log_returns(state: WindowState, begin: int, found: Predictions) -> float:
-    """Log likelihood, without its constants, of the lengths of returns over walls alone since a cycle, as they are
-    `found` at the estimate; each path scatters by a variance of its own, of which beforehand no more is known than that
-    it fits (`crowd`)."""
+def _log_returns(state: WindowState, begin: int, found: Predictions) -> Floats:
+    """Log likelihoods (P,), without their constants, of the lengths of returns over walls alone since a cycle, path by
+    path, as they are `found` at the estimate; each path scatters by a variance of its own, of which beforehand no more
+    is known than that it fits (`crowd`)."""
     log, left = state.log, levelled(state, 0, found)[1]
     left = left.take((log.form[left.row, 0, 0] == TX) & (log.cycle[left.row] >= begin))
     _, which = unique_forms(log.form[left.row, 0])
     square = left.left[:, 0] ** 2 * (1.0 + log.extra[left.row, 0] / log.std[left.row, 0] ** 2)
-    return float(-0.5 * (np.bincount(which) + 1.0) @ np.log(CONSTANTS.crowd + np.bincount(which, square)))
+    return np.asarray(-0.5 * (np.bincount(which) + 1.0) * np.log(CONSTANTS.crowd + np.bincount(which, square)))

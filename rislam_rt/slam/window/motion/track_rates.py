@@ -14,7 +14,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
-from rislam_rt.slam.window.divergence.length_rates import MEASURED
+from rislam_rt.slam.window.divergence.length_rates import enough_measured
 from rislam_rt.slam.window.measurement_log import ArrayEnds
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
@@ -81,7 +81,7 @@ def rate_factor(state: WindowState) -> RateFactor | None:
         return None
     first = state.cycle - window.num_poses + 1
     rows = (~log.explained & (log.track >= 0) & (log.cycle >= first)).nonzero()[0]
-    rows = rows[np.bincount(log.track[rows])[log.track[rows]] >= MEASURED]
+    rows = rows[np.bincount(log.track[rows])[log.track[rows]] >= enough_measured(state.cycle)]
     if not len(rows) or not (window.step > 0.0).all():
         return None
     rows = rows[np.argsort(log.track[rows], kind="stable")]

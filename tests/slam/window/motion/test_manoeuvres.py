@@ -1,4 +1,4 @@
-"""An agent that sets off from rest along the walls, with nothing in its map that measures the way."""
+"""Manoeuvres: an agent that sets off from rest or climbs, where its map measures nothing of it, and what is none."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,11 @@ from rislam_rt.model import Measurement, RadioConfig, SensorModel
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window import filter as window_filter
 from rislam_rt.slam.window.divergence import motion_agreement
+from rislam_rt.slam.window.motion import manoeuvres
+from rislam_rt.slam.window.motion.motion_learning import solve_livelier
 
 ROOM, COUNT = Path(__file__).parents[4] / "scenes" / "paper_room", 28
 CONFIG = SlamConfig(filter="window", use_vt=True)
@@ -23,20 +27,26 @@ RECEIVER = ReceiverConfig("bound", alternation=False)
 def follow(place, velocity, turned, seed, depth=2):
     """Errors (K, 3) [m] and squared deviations (K,) across of the filter for an agent that faces `turned` [rad], in a
     room that throws signals back over up to `depth` walls."""
+    off, square = [], []
+    for cycle, state in enumerate(states(place, velocity, turned, seed, depth)):
+        found = slam.estimate(state, CONFIG)
+        off.append(found.position - place[cycle])
+        square.append(float(off[-1][:2] @ np.linalg.solve(found.covariance[:2, :2], off[-1][:2])))
+    return np.array(off), np.array(square)
+
+
+def states(place, velocity, turned, seed, depth=2):
+    """States of the filter after each cycle, for an agent as `follow` has it."""
     scene, rng, count = load_scene(ROOM), np.random.default_rng(seed), len(place)
     motion = replace(scene.agent[:count], position=place, velocity=velocity, heading=np.full(count, turned))
     radio = with_reference_snr(RadioConfig(), 13.0)
     paths = without_panel(ImageSourceChannel(replace(scene, agent=motion), radio, depth).paths(motion))
     start = StartPrior(place[0], velocity[0] + 0.01 * rng.standard_normal(3) * [1.0, 1.0, 0.0], turned)
     state = slam.init(start, motion.body, None, SensorModel(radio), CONFIG, rng=rng)
-    off, square = [], []
     for cycle in range(count):
         heard, _ = measure(paths, cycle, turned, radio, RECEIVER, rng=rng)
         state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, turned, CONFIG, rng=rng)
-        found = slam.estimate(state, CONFIG)
-        off.append(found.position - place[cycle])
-        square.append(float(off[-1][:2] @ np.linalg.solve(found.covariance[:2, :2], off[-1][:2])))
-    return np.array(off), np.array(square)
+        yield state
 
 
 @pytest.mark.parametrize(("turned", "seed"), [(0.0, 0), (0.7, 1)], ids=["along the array", "across it"])
@@ -49,6 +59,55 @@ def test_who_sets_off_along_the_walls_is_followed(turned, seed):
     # held for standing still, it was 2.5 m off, at a claimed 2 cm
     assert np.linalg.norm(off[-8:, :2], axis=1).max() < 5e-3
     assert square[-8:].max() < 9.2  # chi^2, 2 dof: 0.99
+
+
+@pytest.mark.parametrize(("push", "seed"), [(0.5, 0), (0.8, 1), (0.8, 2)])
+def test_who_sets_off_at_once_is_followed_before_anything_is_born(push, seed):
+    """From rest in the first cycle: the first tracks tell of it as soon as two of their lengths have to agree."""
+    time, way = 0.1 * np.arange(9)[:, None], np.array([np.cos(0.4), np.sin(0.4), 0.0])
+    off, square = follow(np.array([1.6, 1.8, 0.9]) + 0.5 * push * time**2 * way, push * time * way, 0.4, seed)
+    # until the first births it was held for standing still: 37 to 100 mm off in these cycles
+    assert np.linalg.norm(off[4:, :2], axis=1).max() < 0.01
+    assert square[4:].max() < 9.2  # chi^2, 2 dof: 0.99
+
+
+def test_no_manoeuvre_is_believed_that_the_map_contradicts(monkeypatch):
+    """Tracks speak for a climb while the ceiling is heard where it is from a level floor: as much as they outweigh that
+    its path is another than it was held for, and no more."""
+    place = np.array([1.2, 2.4, 0.8]) + np.arange(25)[:, None] * [0.06, 0.02, 0.0]
+    *_, state = states(place, np.tile([0.6, 0.2, 0.0], (25, 1)), 0.32, 0)
+    state = manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32))
+    accel = state.window.accel + np.array([0.0, 0.0, 0.3]) * (np.arange(len(state.window.accel)) > 12)[:, None]
+    climbed = state._replace(window=state.window._replace(accel=accel))
+    assert manoeuvres._log_borne_out(state, state, 22) == 0.0
+    contradicted = manoeuvres._log_borne_out(state, climbed, 22)
+    assert contradicted <= CONSTANTS.log_rare
+    monkeypatch.setattr(manoeuvres, "solve_livelier", lambda window, *_, **__: climbed.window)
+    monkeypatch.setattr(manoeuvres, "_with_scatter_relearnt", lambda state, _: state)
+    monkeypatch.setattr(manoeuvres, "with_rates", lambda state: state)
+    monkeypatch.setattr(manoeuvres.window_gaussian, "solve", lambda _: climbed.window)
+    for odds in (-contradicted - 0.1, -contradicted + 0.1):
+        told = lambda *_, odds=odds: (odds, np.array([0.0, 0.0, 0.3]))  # noqa: E731
+        monkeypatch.setattr(motion_agreement, "weigh_manoeuvre", told)
+        assert (manoeuvres.with_manoeuvre(state) is state) == (odds < -contradicted)
+
+
+def test_a_climb_for_one_cycle_that_the_steps_contradict_leaves_no_height_open(monkeypatch):
+    """A cycle is associated as if the agent climbed, and the floor is held for level all the same."""
+    place = np.array([1.2, 2.4, 0.8]) + np.arange(5)[:, None] * [0.06, 0.02, 0.0]
+    over, found = window_filter._associate_over_motions, []
+
+    def climbing(state, *rest):
+        state, view, _ = over(state, *rest)
+        found.append(state.cycle)
+        window = solve_livelier(state.window, 3, upwards=True) if state.cycle == 4 else state.window
+        return state._replace(window=window), view, (0.0, 1e-3 * (state.cycle == 4))
+
+    monkeypatch.setattr(window_filter, "_associate_over_motions", climbing)
+    *_, state = states(place, np.tile([0.6, 0.2, 0.0], (5, 1)), 0.32, 0)
+    assert found[-1] == 4
+    assert state.is_level
+    assert np.sqrt(slam.estimate(state, CONFIG).covariance[2, 2]) < 1e-3  # it was 0.02 m
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
