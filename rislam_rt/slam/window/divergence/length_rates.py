@@ -13,7 +13,7 @@ from rislam_rt.slam.window.measurement_log import Log, unique_forms
 
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for..."""
-FIRST = 4
+EARLY = 4
 """...and of one of the first tracks, while there are no longer ones: two for the rate, and two that must agree."""
 
 
@@ -119,7 +119,7 @@ class Lengths(NamedTuple):
 
 def enough_measured(cycles: int) -> int:
     """Measurements of a track from which on it has a rate of length, when `cycles` have been measured."""
-    return min(MEASURED, max(FIRST, cycles))
+    return min(MEASURED, max(EARLY, cycles))
 
 
 def lengths(heard: Heard) -> Lengths:

@@ -72,7 +72,7 @@ def latest_lengths(state: WindowState) -> length_rates.Lengths | None:
     None where they are too few."""
     passed = state.window.step[:-1][-PAST:]
     silent = not len(state.log.cycle) or state.log.cycle[-1] != state.cycle - 1  # then the log ends before the poses
-    if silent or len(passed) < length_rates.FIRST - 1 or not is_checked(state):
+    if silent or len(passed) < length_rates.EARLY - 1 or not is_checked(state):
         return None
     return _lengths(state, slice(-2 - len(passed), -1), float(passed.mean()))
 
