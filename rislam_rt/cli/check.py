@@ -48,7 +48,7 @@ def command(
 
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings
     from rislam_rt.scene import check_scene
-    from rislam_rt.scene.load import scene_file
+    from rislam_rt.scene.scene_folder import scene_file
 
     changed = list(set_ or ())
     if carrier_ghz is not None:

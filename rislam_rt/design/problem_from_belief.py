@@ -198,7 +198,7 @@ def _point_gains(
 
 
 def _length_variance(landmarks: MapEstimate, paths: _PredictedPaths, tx: Floats, rx: Floats) -> Floats:
-    """Variance (B, Q) [m^2] of the lengths of paths that the belief predicts, from the landmarks' covariances."""
+    """Variance (B, Q) [m^2] of path lengths in a design problem from a belief, by the covariances of its landmarks."""
     first = unit(landmarks.position[paths.tx_point] - tx)
     second = unit(landmarks.position[paths.rx_point] - rx)
     tx_spread, rx_spread = landmarks.covariance[paths.tx_point], landmarks.covariance[paths.rx_point]

@@ -36,22 +36,23 @@ class Antennas:
 
     @property
     def of_tx(self) -> tuple[str, str]:
-        """Pattern and polarisation of the agent's Tx antenna."""
+        """Pattern and polarisation of the Tx antenna of the agent's radio."""
         return self.tx, self.polarization
 
     @property
     def of_rx(self) -> tuple[str, str]:
-        """Pattern and polarisation of the agent's Rx antenna."""
+        """Pattern and polarisation of the Rx antenna of the agent's radio; polarised as the Tx's unless given."""
         return self.rx, self.rx_polarization or self.polarization
 
     @property
     def of_landmark(self) -> tuple[str, str]:
-        """Pattern and polarisation with which a landmark re-radiates: isotropic, polarised as the Tx."""
+        """Pattern and polarisation with which a landmark re-radiates what the radio sends: isotropic, polarised as the
+        Tx."""
         return "iso", self.polarization
 
     @property
     def plain(self) -> bool:
-        """Whether the antennas of Tx and Rx are both isotropic and vertically polarised."""
+        """Whether the radio's antennas, Tx and Rx, are both isotropic and vertically polarised."""
         return self.of_tx == self.of_rx == ("iso", "V")
 
 

@@ -127,7 +127,8 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
 
 
 def _print_faults(report: "PathReport", of: str, at: str) -> None:
-    """Print the first ten unexplained paths and the first ten errors beyond their limits of a channel comparison."""
+    """Print, below the terminal table of a channel comparison, the first ten unexplained paths and the first ten errors
+    beyond their limits."""
     for path in [p for p in report.one_sided if not p.reason][:10]:
         print(f"unexplained: {of}, {at} {path.cycle}, {path.label}, only {path.side}")
     for breach in report.breaches[:10]:

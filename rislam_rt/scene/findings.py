@@ -41,7 +41,7 @@ class Fault(SceneError):
 
     def at(self, file: str, field: str) -> Finding:
         """Make this fault a finding of the scene check: an error at the file and field that the caller names."""
-        return Finding("error", file, f"{field}.{self.key}" if self.key else field, self.message, self.mend)
+        return error_at(file, f"{field}.{self.key}" if self.key else field, self.message, self.mend)
 
 
 class Faults(Fault):
@@ -51,6 +51,21 @@ class Faults(Fault):
         super().__init__(faults[0].message, faults[0].mend)
         self.args = tuple(str(fault) for fault in faults)
         self.faults = faults
+
+
+def error_at(file: str, field: str, message: str, mend: str) -> Finding:
+    """Make an error of the scene check at a key of the scene file."""
+    return Finding("error", file, field, message, mend)
+
+
+def warning_at(file: str, field: str, message: str, mend: str) -> Finding:
+    """Make a warning of the scene check at a key of the scene file."""
+    return Finding("warning", file, field, message, mend)
+
+
+def note_at(file: str, field: str, message: str, mend: str) -> Finding:
+    """Make a note of the scene check, on something worth knowing, at a key of the scene file."""
+    return Finding("note", file, field, message, mend)
 
 
 def panel_key(number: int, panels: int) -> str:

@@ -23,6 +23,7 @@ from rislam_rt.scene.check.units import (
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
+from rislam_rt.scene.scene_folder import scene_file
 from rislam_rt.scene.schema import (
     MAX_SCENE_BYTES,
     AgentSection,
@@ -33,11 +34,7 @@ from rislam_rt.scene.schema import (
     read_spec,
 )
 from rislam_rt.scene.shapes import solid_mesh
-from rislam_rt.shipped import find_room
 from rislam_rt.toml import parse_toml
-
-SCENE_FILE = "scene.toml"
-"""Name of the scene file in a scene folder."""
 
 
 class SceneDraft(NamedTuple):
@@ -125,12 +122,6 @@ def read_draft(path: str | Path) -> SceneDraft:
     except Fault as fault:
         return SceneDraft(str(file), None, [one.at(str(file), "") for one in fault.faults])
     return assemble(spec, file, content)
-
-
-def scene_file(path: str | Path) -> Path:
-    """Path of the scene file to load, for which a scene folder, a scene file or the name of a built-in room stands."""
-    path = find_room(path)
-    return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
 def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:

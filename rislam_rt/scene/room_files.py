@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 from textwrap import fill
 from typing import Any
 
-from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import Mesh, ply_bytes
-from rislam_rt.scene.scene_folder import mesh_file
+from rislam_rt.scene.scene_folder import SCENE_FILE, mesh_file
 from rislam_rt.toml import toml_bytes
 
 PAPER_MATERIAL = {"reflection": 0.85}

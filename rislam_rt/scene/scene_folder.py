@@ -1,5 +1,5 @@
-"""Files of a scene folder: reading those that a scene names, none outside and none too large, and the file names of its
-meshes, which walls and scatterers give.
+"""Files of a scene folder: the scene file, reading those that it names, none outside and none too large, and the file
+names of its meshes, which walls and scatterers give.
 """
 
 import hashlib
@@ -9,9 +9,20 @@ from pathlib import Path, PurePosixPath
 
 from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.shipped import find_room
+
+SCENE_FILE = "scene.toml"
+"""Name of the scene file in a scene folder."""
 
 BELOW = "give a relative path below it, with / between folders"
 """How to mend the path of a scene's file; a backslash in quotes is no separator, and often another character."""
+
+
+def scene_file(path: str | Path) -> Path:
+    """Path of the scene file in a scene folder, where the folder, the file itself or the name of a built-in room may be
+    given."""
+    path = find_room(path)
+    return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 
 
 def read_inside(folder: Path, name: str, limit: int) -> bytes:

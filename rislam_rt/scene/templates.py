@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from rislam_rt.errors import SceneError
-from rislam_rt.scene.load import SCENE_FILE
+from rislam_rt.scene.scene_folder import SCENE_FILE
 from rislam_rt.scene.write import write_files
 from rislam_rt.shipped import shipped_missing, shipped_rooms
 from rislam_rt.toml import parse_toml, toml_bytes

@@ -12,9 +12,8 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
-from rislam_rt.scene.load import SCENE_FILE
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.scene_folder import mesh_file
+from rislam_rt.scene.scene_folder import SCENE_FILE, mesh_file
 from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.toml import toml_bytes
 

@@ -13,7 +13,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import Material, RadioConfig, Scene
 from rislam_rt.model.itu import itu_parameters
 from rislam_rt.scene import check_scene, write_scene
-from rislam_rt.scene.load import scene_file
+from rislam_rt.scene.scene_folder import scene_file
 
 RADIO = RadioConfig()
 

@@ -27,8 +27,8 @@ class LegEnds(NamedTuple):
     def coefficient(
         self, coatings: Coatings, walls: Integers, normals: Floats, direction: Floats, cycle: Integers
     ) -> Complexes:
-        """Coefficient (N,) of legs that leave along `direction` (N, 3) and bounce on `walls` (N, d): both antenna
-        patterns and the polarised reflections, without spreading loss and carrier phase."""
+        """Coefficient (N,) from antenna to antenna of legs that leave along `direction` (N, 3) and bounce on `walls`
+        (N, d): both antenna patterns and the polarised reflections, without spreading loss and carrier phase."""
         heading = self.heading[cycle]
         basis = polarisation_basis(direction)
         parts = radiated(*self.device, direction, heading)

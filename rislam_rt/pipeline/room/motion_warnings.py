@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.constants import MAX_SPEED
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.model import Scene
-from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.findings import Finding, warning_at
 from rislam_rt.slam.model_constants import CONSTANTS
 
 GRAVITY = 9.81
@@ -43,7 +43,7 @@ def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:
             "and scatterers may pass for the panel's"
         )
         mend = f"give receiver.top_speed = {np.ceil(10.0 * least) / 10.0:g}"
-        yield Finding("warning", file, "receiver.top_speed", message, mend)
+        yield warning_at(file, "receiver.top_speed", message, mend)
 
 
 def _unequal(limit: float, value: float) -> tuple[str, str]:
@@ -62,4 +62,4 @@ def _manoeuvring_agent(scene: Scene, file: str) -> Iterator[Finding]:
             f"the filter's liveliest motion has a deviation of {CONSTANTS.liveliest:g} m/s^2"
         )
         mend = "mend what jumps there, or smooth the recording"
-        yield Finding("warning", file, "agent", message, mend)
+        yield warning_at(file, "agent", message, mend)

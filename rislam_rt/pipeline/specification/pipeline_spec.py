@@ -126,7 +126,8 @@ class DesignSection(DesignerSection):
 
     @property
     def least_snr(self) -> float:
-        """SNR (linear) at which the pipeline's design takes a path to be detected every other time; 0 if not set."""
+        """Least SNR (linear) by the table `[design]` of a pipeline's specification: at it the design takes a path to be
+        detected every other time; 0 if not set."""
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 

@@ -10,7 +10,7 @@ from rislam_rt.geometry.connected_parts import connected_triangles
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions, touching, winding
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
-from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.findings import Finding, error_at, warning_at
 
 NUM_PROBES = 400
 """Rays cast from the agent's start to look for holes of the room: one of 0.03 sr, 30 cm wide at 2 m, is found."""
@@ -27,7 +27,7 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
         outside = room.outside(points)
         if len(outside):
             message = f"{_where(part, int(outside[0]), points)} lies outside the meshes' bounds {room.box}"
-            yield room.error(_field(room, int(outside[0])), message, "move the start or change the motion")
+            yield error_at(room.file, _field(room, int(outside[0])), message, "move the start or change the motion")
             return
     yield from _on_surface(room, places)
     yield from _through_wall(room)
@@ -42,7 +42,7 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     if lost.any():
         mean = np.round(directions[lost].mean(axis=0), 2) + 0.0
         message = f"{lost.mean():.1%} of rays from the start leave the room, towards {mean.tolist()} in the mean"
-        yield room.warning("reflector", message, "close the room, if it is not meant to be open")
+        yield warning_at(room.file, "reflector", message, "close the room, if it is not meant to be open")
     yield from _odd_steps(room)
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
@@ -51,13 +51,13 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
         if away.min() < radius:
             at = f"at cycle {int(np.argmin(away))}"
             message = f"the agent comes within {away.min():.2g} m of its centre {at}, and its radius is {radius:g} m"
-            yield room.warning(field, message, "lead the agent around it")
+            yield warning_at(room.file, field, message, "lead the agent around it")
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
             message = "it lies below the array, which hears from above only"
-            yield room.warning(field, message, "it will not be heard: fine if that is meant, else raise it")
+            yield warning_at(room.file, field, message, "it will not be heard: fine if that is meant, else raise it")
         name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
-            yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
+            yield warning_at(room.file, field, f"it lies inside '{name}', where no ray reaches it", "move it out")
 
 
 def _odd_steps(room: TriangleArray) -> Iterator[Finding]:
@@ -70,12 +70,12 @@ def _odd_steps(room: TriangleArray) -> Iterator[Finding]:
     fast, gap, usual = int(np.argmax(speed)), int(np.argmax(step)), float(np.median(step))
     if speed[fast] > MAX_SPEED:
         message = f"it moves at up to {speed[fast]:.3g} m/s (after cycle {fast})"
-        yield room.warning("agent", message, "give metres and seconds, and mend what jumps there")
+        yield warning_at(room.file, "agent", message, "give metres and seconds, and mend what jumps there")
     if step[gap] > max(LONGEST_GAP, MANY_STEPS * usual):
         message = (
             f"{step[gap]:.3g} s without a pose after cycle {gap}, where else there are {usual:.3g} s between poses"
         )
-        yield room.warning("agent.trajectory", message, "cut the file there, unless it is meant")
+        yield warning_at(room.file, "agent.trajectory", message, "cut the file there, unless it is meant")
 
 
 def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Finding]:
@@ -84,8 +84,8 @@ def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Find
         cycles, near = touching(points, room.triangles, MIN_CLEARANCE)
         if len(cycles):
             message = f"{_where(part, int(cycles[0]), points)} lies on '{room.name(int(near[0]))}'"
-            yield room.error(
-                _field(room, int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces"
+            yield error_at(
+                room.file, _field(room, int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces"
             )
             return
 
@@ -96,12 +96,12 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
     cycles, walls = crossings(motion.position[:-1], motion.position[1:], room.triangles)
     if len(cycles):
         message = f"the path goes through '{room.name(int(walls[0]))}' after cycle {int(cycles[0])}"
-        yield room.error("agent", message, "lead it around the object")
+        yield error_at(room.file, "agent", message, "lead it around the object")
         return
     cycles, walls = crossings(motion.tx, motion.rx, room.triangles)
     if len(cycles):
         message = f"'{room.name(int(walls[0]))}' stands between Tx and Rx at cycle {int(cycles[0])}"
-        yield room.error(_field(room, int(cycles[0])), message, "keep further away from it")
+        yield error_at(room.file, _field(room, int(cycles[0])), message, "keep further away from it")
 
 
 def _inside_object(room: TriangleArray) -> Iterator[Finding]:
@@ -109,8 +109,8 @@ def _inside_object(room: TriangleArray) -> Iterator[Finding]:
     start = room.scene.agent.position[0]
     name = _enclosing(room, start, holding=room.scene.landmark_positions)
     if name:
-        yield room.error(
-            room.start_key, f"{start.tolist()} lies inside the object '{name}'", "move the start out of it"
+        yield error_at(
+            room.file, room.start_key, f"{start.tolist()} lies inside the object '{name}'", "move the start out of it"
         )
 
 

@@ -1,6 +1,5 @@
 """All triangles of a scene as one array, from which every part of the scene check works."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +7,6 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import triangle_heights
 from rislam_rt.model import Scene
-from rislam_rt.scene.findings import Finding
 
 MIN_CLEARANCE = 1e-3
 """Least distance [m] of a device or scatterer from a surface: a nearer one loses that surface's reflection."""
@@ -47,25 +45,6 @@ class TriangleArray(NamedTuple):
         """Bounds of a scene's triangles in words."""
         low, high = np.round(self.bounds, 3).tolist()
         return f"{low} to {high}"
-
-    def degenerate(self, field: str, triangles: Floats) -> Iterator[Finding]:
-        """Scene check: error of a mesh, triangles (T, 3, 3), that has faces without area."""
-        bad = without_area(triangles)
-        if bad.any():
-            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
-            yield self.error(field, message, "remove degenerate faces from the mesh")
-
-    def error(self, field: str, message: str, mend: str) -> Finding:
-        """Make an error of the scene check at a key of the scene file."""
-        return Finding("error", self.file, field, message, mend)
-
-    def warning(self, field: str, message: str, mend: str) -> Finding:
-        """Make a warning of the scene check at a key of the scene file."""
-        return Finding("warning", self.file, field, message, mend)
-
-    def note(self, field: str, message: str, mend: str) -> Finding:
-        """Make a note of the scene check, on something worth knowing, at a key of the scene file."""
-        return Finding("note", self.file, field, message, mend)
 
 
 def build_triangle_array(scene: Scene, file: str, start_key: str = START_KEY) -> TriangleArray:

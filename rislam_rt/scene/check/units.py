@@ -11,7 +11,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.model import Reflector, Trajectory
-from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.findings import Finding, warning_at
 from rislam_rt.scene.mesh_placement import UNITS
 
 NAMES = {"millimetres": "mm", "centimetres": "cm", "inches": "in"}
@@ -59,12 +59,12 @@ def unit_warnings(file: str, table: Mapping[str, Any], bounds: Floats | None) ->
         for field, value in _values(table, path):
             if abs(value) > limit:
                 message = f"{value:g} {unit}; in {other} it would be {value * factor:g} {unit}"
-                yield Finding("warning", file, field, message, "give metres and seconds")
+                yield warning_at(file, field, message, "give metres and seconds")
     if bounds is None:
         return
     room = _room_unit(bounds)
     if room is not None:
-        yield Finding("warning", file, ROOM_FIELD, *room)
+        yield warning_at(file, ROOM_FIELD, *room)
         return  # points in metres lie outside a room in millimetres, or in its corner
     for path in (("agent", "start"), ("ris", "center"), ("scatterer", "position"), ("agent", "waypoints")):
         for field, point in _points(table, path):
@@ -78,7 +78,7 @@ def recording_unit_warnings(file: str, agent: Trajectory, bounds: Floats) -> Ite
     usual = float(np.median(step)) if len(step) else 0.0
     if usual > LONGEST_CYCLE:
         message = f"{usual:.3g} s between poses; in milliseconds it would be {usual * 1e-3:.3g} s"
-        yield Finding("warning", file, field, message, "give seconds, or end the name of a CSV column in _ms")
+        yield warning_at(file, field, message, "give seconds, or end the name of a CSV column in _ms")
     yield from _far_point(file, field, agent.position[0], bounds)
 
 
@@ -92,7 +92,7 @@ def lone_mesh_warnings(file: str, reflectors: Sequence[Reflector]) -> Iterator[F
             meant = f"in {unit} it would be {far * UNITS[NAMES[unit]]:.3g} m"
             message = f"it reaches {far:.3g} m from the room's zero, most others {usual:.3g} m; {meant}"
             mend = f'say units = "{NAMES[unit]}" beside it, or mend its origin'
-            yield Finding("warning", file, f"reflector[{number}].units ({one.name})", message, mend)
+            yield warning_at(file, f"reflector[{number}].units ({one.name})", message, mend)
 
 
 def _room_unit(bounds: Floats) -> tuple[str, str] | None:
@@ -123,7 +123,7 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
         meant = point * factor
         if (meant >= bounds[0]).all() and (meant <= bounds[1]).all():
             message = f"{point.tolist()} is far outside the room; in {unit} it would be {np.round(meant, 6).tolist()} m"
-            yield Finding("warning", file, field, message, f"give metres: multiply by {factor:g}")
+            yield warning_at(file, field, message, f"give metres: multiply by {factor:g}")
             return
 
 

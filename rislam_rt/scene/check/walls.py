@@ -13,7 +13,7 @@ from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.input_messages import counted
 from rislam_rt.scene.check.mesh_queries import crossings, free_ways, sphere_directions, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
-from rislam_rt.scene.findings import Finding
+from rislam_rt.scene.findings import Finding, note_at, warning_at
 
 NEARLY_FLAT = 1e-2
 """Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat."""
@@ -53,12 +53,12 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
         if count < 2:
             continue
         field = f"reflector[{number}].mesh ({name})"
-        yield room.note(field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
+        yield note_at(room.file, field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
         angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
             mend = f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
-            yield room.warning(field, message, mend)
+            yield warning_at(room.file, field, message, mend)
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
@@ -81,10 +81,10 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
         if seen:
             mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm"
-            yield room.warning(field, message, f"where they overlap '{names[0]}' reflects; {mend}")
+            yield warning_at(room.file, field, message, f"where they overlap '{names[0]}' reflects; {mend}")
         elif hidden:
             message += f", and {counted(hidden - 1, 'other pair')} likewise" if hidden > 1 else ""
-            yield room.note(field, message, "nobody sees the faces where they meet; leave them")
+            yield note_at(room.file, field, message, "nobody sees the faces where they meet; leave them")
             hidden = 0
 
 

@@ -13,10 +13,11 @@ from rislam_rt.scene.check import find_errors
 from rislam_rt.scene.findings import Fault, raise_errors
 from rislam_rt.scene.importing.free_space import FreeSpace
 from rislam_rt.scene.importing.room_draft import RoomDraft, propose_panel
-from rislam_rt.scene.load import SCENE_FILE, build_panel, load_scene
+from rislam_rt.scene.load import build_panel, load_scene
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
 from rislam_rt.scene.motion.agent_motion import straight_motion
 from rislam_rt.scene.motion.suggested_motion import suggest_agent
+from rislam_rt.scene.scene_folder import SCENE_FILE
 from rislam_rt.scene.schema import RisSection
 from rislam_rt.scene.templates import room_name
 from rislam_rt.scene.write import write_scene

@@ -1,6 +1,6 @@
 """Specification of a study in unseen rooms: settings of a pipeline file of kind `unseen`."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -10,6 +10,8 @@ from rislam_rt.studies.swept.spec import SweptSpec, VariantSection
 
 TEST = 10_000
 """Seed of the first test room, every run of which is counted; rooms with smaller seeds are for development."""
+WALL_TOP_SPEED = 1.5
+"""Top speed [m/s] that receivers are told of agents along walls, who walk at up to 1.4 m/s and climb at up to 0.45."""
 
 
 class UnseenSpec(SweptSpec):
@@ -40,6 +42,14 @@ class UnseenSpec(SweptSpec):
     def is_test(self) -> bool:
         """Whether the study in unseen rooms is specified to use the test rooms."""
         return self.first >= TEST
+
+    @property
+    def run_settings(self) -> dict[str, Any]:
+        """Settings of the runs in unseen rooms that the study specifies; along walls, the receiver's top speed covers
+        the agents' unless given."""
+        if self.ways == "anyhow":
+            return dict(self.run)
+        return {**self.run, "receiver": {"top_speed": WALL_TOP_SPEED, **self.run.get("receiver", {})}}
 
     @model_validator(mode="after")
     def _one_purpose(self) -> "UnseenSpec":

@@ -22,8 +22,6 @@ from rislam_rt.sweeps import Axis, Sweep
 
 LEDGER = ("date", "first", "rooms", "snr_db", "variants", "code", "settings")
 """Columns of the ledger in which runs of test rooms are counted."""
-WALL_TOP_SPEED = 1.5
-"""Top speed [m/s] that receivers are told of agents along walls, who walk at up to 1.4 m/s and climb at up to 0.45."""
 CODE_DIGITS = 16
 """Number of digits of the code's hash in the ledger."""
 
@@ -46,17 +44,10 @@ def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
         axes.append(Axis("variant", tuple(variant.name for variant in spec.variants)))
     axes.append(Axis(SNR, tuple(spec.snr_db)))
     variants = {variant.name: dict(variant.set) for variant in spec.variants}
-    base = {"run": _run_settings(spec), "save": spec.save, "ways": spec.ways}
+    base = {"run": spec.run_settings, "save": spec.save, "ways": spec.ways}
     local = {"variants": variants, "data": str(data.absolute())}
     keys = tuple(axis.key for axis in axes)
     return Sweep(FUNCTION, tuple(axes), base, 1, spec.seed, keys, local, _depends(pipeline, local), spec.name)
-
-
-def _run_settings(spec: UnseenSpec) -> dict[str, Any]:
-    """Settings of the runs in unseen rooms; along walls, the receiver's top speed covers the agents' unless given."""
-    if spec.ways == "anyhow":
-        return dict(spec.run)
-    return {**spec.run, "receiver": {"top_speed": WALL_TOP_SPEED, **spec.run.get("receiver", {})}}
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
@@ -106,5 +97,5 @@ def unseen_record(spec: UnseenSpec) -> dict[str, Any]:
     return {
         "kind": spec.kind, "name": spec.name, "versions": library_versions(), "code": code_digest(),
         "config": spec.model_dump(mode="json"),
-        "settings": cell_spec({"run": _run_settings(spec), "variants": {}}).model_dump(mode="json"),
+        "settings": cell_spec({"run": spec.run_settings, "variants": {}}).model_dump(mode="json"),
     }  # fmt: skip

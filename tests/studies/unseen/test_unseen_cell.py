@@ -15,7 +15,7 @@ from rislam_rt.scene.random_rooms import draw_room
 from rislam_rt.studies import UnseenSpec, load_any
 from rislam_rt.studies.unseen import answers_from_arrays, build_unseen, count_tests, read_recording, replay, score_run
 from rislam_rt.studies.unseen.cell import find_setup, run_cell
-from rislam_rt.studies.unseen.sweep import WALL_TOP_SPEED
+from rislam_rt.studies.unseen.spec import WALL_TOP_SPEED
 from rislam_rt.sweeps import build_cells
 
 RUN = {
