@@ -117,9 +117,10 @@ class Lengths(NamedTuple):
         return np.asarray(np.bincount(self.which, value, len(self.number)), dtype=np.float64)
 
 
-def enough_measured(cycles: int) -> int:
-    """Measurements of a track from which on it has a rate of length, when `cycles` have been measured."""
-    return min(MEASURED, max(EARLY, cycles))
+def enough_measured(cycle: Integers) -> int:
+    """Measurements of a track from which on it has a rate of length, where components (N,) were measured in these
+    cycles."""
+    return min(MEASURED, max(EARLY, len(np.unique(cycle))))
 
 
 def lengths(heard: Heard) -> Lengths:
@@ -184,7 +185,9 @@ def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], F
     total, weighted = found.total, found.weight * x
     s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
     spread = s * sxx - sx**2
-    enough = (found.number >= enough_measured(len(found.heard.place))) & (spread > 1e-9 * s * s * found.heard.step**2)
+    cycle = found.heard.log.cycle
+    many = enough_measured(cycle[cycle > cycle.max(initial=0) - len(found.heard.place)])
+    enough = (found.number >= many) & (spread > 1e-9 * s * s * found.heard.step**2)
     spread = np.where(enough, spread, 1.0)
     slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
     return slopes, CONSTANTS.crowd * s / spread, enough

@@ -81,7 +81,8 @@ def rate_factor(state: WindowState) -> RateFactor | None:
         return None
     first = state.cycle - window.num_poses + 1
     rows = (~log.explained & (log.track >= 0) & (log.cycle >= first)).nonzero()[0]
-    rows = rows[np.bincount(log.track[rows])[log.track[rows]] >= enough_measured(state.cycle)]
+    before = log.cycle[(log.cycle >= first) & (log.cycle < state.cycle)]
+    rows = rows[np.bincount(log.track[rows])[log.track[rows]] >= enough_measured(before)]
     if not len(rows) or not (window.step > 0.0).all():
         return None
     rows = rows[np.argsort(log.track[rows], kind="stable")]

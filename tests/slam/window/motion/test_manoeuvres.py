@@ -15,37 +15,43 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import filter as window_filter
-from rislam_rt.slam.window.divergence import motion_agreement
+from rislam_rt.slam.window.divergence import length_rates, motion_agreement
 from rislam_rt.slam.window.motion import manoeuvres
 from rislam_rt.slam.window.motion.motion_learning import solve_livelier
+from rislam_rt.slam.window.smoother import motion as motion_modes
 
 ROOM, COUNT = Path(__file__).parents[4] / "scenes" / "paper_room", 28
 CONFIG = SlamConfig(filter="window", use_vt=True)
 RECEIVER = ReceiverConfig("bound", alternation=False)
+NOTHING = Measurement(*(np.zeros((0, 2) if at in (1, 4) else 0) for at in range(6)))
 
 
-def follow(place, velocity, turned, seed, depth=2):
+def follow(place, velocity, turned, seed, depth=2, **settings):
     """Errors (K, 3) [m] and squared deviations (K,) across of the filter for an agent that faces `turned` [rad], in a
     room that throws signals back over up to `depth` walls."""
     off, square = [], []
-    for cycle, state in enumerate(states(place, velocity, turned, seed, depth)):
+    for cycle, state in enumerate(states(place, velocity, turned, seed, depth, **settings)):
         found = slam.estimate(state, CONFIG)
         off.append(found.position - place[cycle])
         square.append(float(off[-1][:2] @ np.linalg.solve(found.covariance[:2, :2], off[-1][:2])))
     return np.array(off), np.array(square)
 
 
-def states(place, velocity, turned, seed, depth=2):
-    """States of the filter after each cycle, for an agent as `follow` has it."""
+def states(place, velocity, turned, seed, depth=2, dark=(), first=0.0, wrong=0.0):
+    """States of the filter after each cycle, for an agent as `follow` has it, which hears nothing in `dark` cycles,
+    `first` [s] after the start in the first, and told a start that is faster by `wrong` [m/s] along x."""
     scene, rng, count = load_scene(ROOM), np.random.default_rng(seed), len(place)
     motion = replace(scene.agent[:count], position=place, velocity=velocity, heading=np.full(count, turned))
     radio = with_reference_snr(RadioConfig(), 13.0)
     paths = without_panel(ImageSourceChannel(replace(scene, agent=motion), radio, depth).paths(motion))
-    start = StartPrior(place[0], velocity[0] + 0.01 * rng.standard_normal(3) * [1.0, 1.0, 0.0], turned)
+    told = velocity[0] + 0.01 * rng.standard_normal(3) * [1.0, 1.0, 0.0] + [wrong, 0.0, 0.0]
+    start = StartPrior(place[0], told, turned)
     state = slam.init(start, motion.body, None, SensorModel(radio), CONFIG, rng=rng)
     for cycle in range(count):
         heard, _ = measure(paths, cycle, turned, radio, RECEIVER, rng=rng)
-        state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, turned, CONFIG, rng=rng)
+        if cycle in dark:
+            heard = NOTHING
+        state, _ = slam.step(state, heard, None, 0.1 if cycle else first, turned, CONFIG, rng=rng)
         yield state
 
 
@@ -69,6 +75,60 @@ def test_who_sets_off_at_once_is_followed_before_anything_is_born(push, seed):
     # until the first births it was held for standing still: 37 to 100 mm off in these cycles
     assert np.linalg.norm(off[4:, :2], axis=1).max() < 0.01
     assert square[4:].max() < 9.2  # chi^2, 2 dof: 0.99
+
+
+@pytest.mark.parametrize(("dark", "first", "since"), [((4,), 0.0, 6), ((2,), 0.0, 5), ((), 0.1, 4)])
+def test_who_sets_off_at_once_is_followed_whatever_is_not_heard(dark, first, since):
+    """A cycle without components delays by a cycle or two; so long as there are no longer tracks, four lengths do."""
+    time, way = 0.1 * np.arange(9)[:, None], np.array([np.cos(0.4), np.sin(0.4), 0.0])
+    place = np.array([1.6, 1.8, 0.9]) + 0.4 * time**2 * way
+    off, _ = follow(place, 0.8 * time * way, 0.4, 1, dark=dark, first=first)
+    assert np.linalg.norm(off[since:, :2], axis=1).max() < 0.015  # 0.14 m in cycle 6 where it was not asked
+
+
+@pytest.mark.parametrize(("count", "many"), [(0, 4), (4, 4), (5, 5), (6, 6), (40, 6)])
+def test_the_first_tracks_are_asked_sooner(count, many):
+    """No track can be longer than there were cycles with components."""
+    assert length_rates.enough_measured(np.repeat(np.arange(10, 10 + count), 3)) == many
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_a_start_told_wrong_is_no_manoeuvre(seed):
+    """The first tracks tell of it in the cycle before a manoeuvre is asked for: no acceleration would explain it."""
+    place = np.array([1.6, 1.8, 0.9]) + np.arange(9)[:, None] * [0.03, 0.01, 0.0]
+    every = list(states(place, np.tile([0.3, 0.1, 0.0], (9, 1)), 0.4, seed, wrong=0.6))
+    assert [state.start_was_wrong for state in every] == [False] * 3 + [True] * 6
+    for state, there in zip(every[5:], place[5:], strict=True):
+        assert np.linalg.norm(slam.estimate(state, CONFIG).position - there) < 0.01  # 0.3 m a second
+
+
+@pytest.mark.parametrize(("lively", "level"), [(1e-3, True), (1e-3, False), (0.999, True), (0.999, False)])
+def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypatch):
+    """One that goes on only to be likelier than not; and most floors are level."""
+    place = np.array([1.2, 2.4, 0.8]) + np.arange(12)[:, None] * [0.06, 0.02, 0.0]
+    *_, state = states(place, np.tile([0.6, 0.2, 0.0], (12, 1)), 0.32, 0)
+    state, found = manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32)), {}
+    mode = np.full(state.level.shape, (1.0 - lively) / (state.level.shape[1] - 1))
+    mode[:, -1] = lively
+    told = lambda _state, _told, steps, prior: found.update({steps: prior}) or (-1.0, np.zeros(3))  # noqa: E731
+    monkeypatch.setattr(motion_agreement, "weigh_manoeuvre", told)
+    assert manoeuvres.with_manoeuvre(state._replace(level=mode, is_level=level)).window is state.window
+    going_on = (mode[:2] @ motion_modes.transition(CONSTANTS.stay))[:, -1]
+    for steps, prior in found.items():
+        share = np.maximum(going_on, 1.0 - CONSTANTS.stay**steps)
+        least = np.full(2, 0.0 if lively > 0.5 else CONSTANTS.log_born) + [0.0, level * CONSTANTS.log_upright]
+        np.testing.assert_allclose(prior, np.log(share / (1.0 - share)) - least, rtol=1e-12)
+    assert len(found) == 3
+
+
+def test_no_path_tells_more_than_that_it_is_another(monkeypatch):
+    """Each counts for a rare event at most, for and against, in the cycles that the manoeuvre has lasted."""
+    returns, since = iter([np.array([-50.0, -60.0, 2.0, 30.0]), np.array([0.0, -1.0, 1.0, 1.0])]), []
+    monkeypatch.setattr(manoeuvres, "predictions", lambda *_: None)
+    monkeypatch.setattr(manoeuvres, "_log_returns", lambda _, begin, __: since.append(begin) or next(returns))
+    found = manoeuvres._log_borne_out(None, None, 22)
+    assert found == pytest.approx(2.0 * CONSTANTS.log_rare + 1.0 - CONSTANTS.log_rare, rel=1e-12)
+    assert since == [22, 22]
 
 
 def test_no_manoeuvre_is_believed_that_the_map_contradicts(monkeypatch):
@@ -156,7 +216,7 @@ def test_steady_motion_is_no_manoeuvre(dark, monkeypatch):
     for cycle in range(count):
         heard, _ = measure(paths, cycle, 0.2, radio, RECEIVER, rng=rng)
         if cycle in dark:
-            heard = Measurement(*(np.zeros((0, 2) if at in (1, 4) else 0) for at in range(6)))
+            heard = NOTHING
         state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, 0.2, CONFIG, rng=rng)
     assert len(found) > 8
     assert max(odds for odds, _ in found) < 0.0
