@@ -116,7 +116,8 @@ def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypa
     going_on = (mode[:2] @ motion_modes.transition(CONSTANTS.stay))[:, -1]
     for steps, prior in found.items():
         share = np.maximum(going_on, 1.0 - CONSTANTS.stay**steps)
-        least = np.full(2, 0.0 if lively > 0.5 else CONSTANTS.log_born) + [0.0, level * CONSTANTS.log_upright]
+        begins = 0.0 if lively > 0.5 else CONSTANTS.log_born
+        least = np.array([begins, begins + level * CONSTANTS.log_upright])
         np.testing.assert_allclose(prior, np.log(share / (1.0 - share)) - least, rtol=1e-12)
     assert len(found) == 3
 
