@@ -172,6 +172,17 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     assert entry["ghost_walls"] == 2.0
 
 
+def test_what_has_not_run_is_not_counted_as_not_found():
+    """Of a sweep that goes on, each share is of the runs that there are."""
+    points = [{"scene": "../scenes/paper_room"}]
+    whole = group_rows(rows(points, lambda p, f: 0.02 * f))[0]
+    part = whole._replace(results=(*whole.results[:2], *(None for _ in whole.results[2:])), missing=4)
+    found, every = (scheme_entry(group, "optimized") for group in (part, whole))
+    shares = [name for name in every if name.endswith("_found") and every[name] is not None]
+    assert {name: found[name] for name in shares} == {name: every[name] for name in shares}
+    assert found["wall_found"] == 0.5
+
+
 def test_rooms_of_one_name_are_told_apart(tmp_path):
     points = [{"scene": f"{place}/hall"} for place in ("../a", "../b")]
     spec = RoomsSpec(kind="rooms", name="rooms", repetitions=6, scenes=[p["scene"] for p in points])

@@ -133,8 +133,9 @@ def _walls(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _pooled(group: Group, scheme: str, name: str, members: Sequence[str], part: str) -> Floats:
-    """One score of all members, e.g. all walls, in all repetitions, as one array."""
-    return np.concatenate([np.zeros(0), *(group.column(scheme, name, member, part) for member in members)])
+    """One score of all members, e.g. all walls, in all repetitions that have run and not failed, as one array."""
+    ran = ~np.isnan(group.column(scheme, "rmse_m"))
+    return np.concatenate([np.zeros(0), *(group.column(scheme, name, member, part)[ran] for member in members)])
 
 
 def bound_beside(bound: Floats, error: Floats) -> float | None:
