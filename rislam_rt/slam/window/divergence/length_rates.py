@@ -14,7 +14,7 @@ from rislam_rt.slam.window.measurement_log import Log, unique_forms
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for..."""
 EARLY = 4
-"""...and of one of the first tracks, while there are no longer ones: two for the rate, and two that must agree."""
+"""...and of one of the first tracks, while there are no longer ones: the fewest that scatter about a quadratic."""
 
 
 class _PlainRates(NamedTuple):

@@ -4,7 +4,7 @@ or what it measures passes for neighbours' pull.
 A track counts as following the agent by its agreement with the motion as believed. While that is wrong, those that tell
 of the right one do not count, and those that keep their length bear the wrong one out: who set off from rest was held
 for standing still. So all tracks are asked at once whether an acceleration in the last steps explains them better, by
-more than it is rarer.
+more than it is rarer, and the map's returns whether they bear that out.
 """
 
 import numpy as np
@@ -65,9 +65,9 @@ def with_manoeuvre(state: WindowState) -> WindowState:
 
 def _log_borne_out(before: WindowState, after: WindowState, begin: int) -> float:
     """Log likelihood ratio of what is heard over walls alone since a cycle, by the motion `after` against that `before`
-    a manoeuvre; no path tells more than that it is another than it was held for, which is rare."""
+    a manoeuvre; no path tells more than that it is another than it was held for, which is rare (`max_log_ratio`)."""
     ratio = _log_returns(after, begin, predictions(after, 0)) - _log_returns(before, begin, predictions(before, 0))
-    return float(np.clip(ratio, CONSTANTS.log_rare, -CONSTANTS.log_rare).sum())
+    return float(np.clip(ratio, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio).sum())
 
 
 def _with_scatter_relearnt(state: WindowState, until: int) -> WindowState:

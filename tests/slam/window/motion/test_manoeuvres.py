@@ -107,11 +107,12 @@ def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypa
     """One that goes on only to be likelier than not; and most floors are level."""
     place = np.array([1.2, 2.4, 0.8]) + np.arange(12)[:, None] * [0.06, 0.02, 0.0]
     *_, state = states(place, np.tile([0.6, 0.2, 0.0], (12, 1)), 0.32, 0)
-    state, found = manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32)), {}
+    state, found, accel = manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32)), {}, np.zeros(3)
     mode = np.full(state.level.shape, (1.0 - lively) / (state.level.shape[1] - 1))
     mode[:, -1] = lively
-    told = lambda _state, _told, steps, prior: found.update({steps: prior}) or (-1.0, np.zeros(3))  # noqa: E731
-    monkeypatch.setattr(motion_agreement, "weigh_manoeuvre", told)
+    monkeypatch.setattr(
+        motion_agreement, "weigh_manoeuvre", lambda _, __, steps, prior: found.update({steps: prior}) or (-1.0, accel)
+    )
     assert manoeuvres.with_manoeuvre(state._replace(level=mode, is_level=level)).window is state.window
     going_on = (mode[:2] @ motion_modes.transition(CONSTANTS.stay))[:, -1]
     for steps, prior in found.items():
@@ -148,8 +149,9 @@ def test_no_manoeuvre_is_believed_that_the_map_contradicts(monkeypatch):
     monkeypatch.setattr(manoeuvres, "with_rates", lambda state: state)
     monkeypatch.setattr(manoeuvres.window_gaussian, "solve", lambda _: climbed.window)
     for odds in (-contradicted - 0.1, -contradicted + 0.1):
-        told = lambda *_, odds=odds: (odds, np.array([0.0, 0.0, 0.3]))  # noqa: E731
-        monkeypatch.setattr(motion_agreement, "weigh_manoeuvre", told)
+        monkeypatch.setattr(
+            motion_agreement, "weigh_manoeuvre", lambda *_, odds=odds: (odds, np.array([0.0, 0.0, 0.3]))
+        )
         assert (manoeuvres.with_manoeuvre(state) is state) == (odds < -contradicted)
 
 
