@@ -24,7 +24,7 @@ _HOMES = {
     "rislam_rt.pipeline.recordings": (
         "Inputs", "dataset_to_inputs", "localise", "read_inputs", "inputs_of", "replay", "answers_from_arrays",
     ),
-    "rislam_rt.studies.unseen": ("read_recording", "score_run"),
+    "rislam_rt.studies.unseen": ("Recording", "Truth", "read_recording", "record_run", "score_run", "write_recording"),
     "rislam_rt.sweeps": ("Axis", "Sweep", "SweepOptions", "run_sweep"),
 }  # fmt: skip
 _PUBLIC = {name: home for home, names in _HOMES.items() for name in names}

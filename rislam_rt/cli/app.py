@@ -9,7 +9,7 @@ from rislam_rt.cli.verbosity import with_verbosity
 
 COMMANDS = (
     "run", "sweep", "slam", "pipelines", "config", "new", "check", "export", "show", "trace", "compare", "design",
-    "report", "doctor",
+    "report", "score", "doctor",
 )  # fmt: skip
 """Commands in the order of the help, each a module of this folder with a function `command`."""
 

@@ -109,7 +109,7 @@ def read_any(folder: Path) -> LongRun:
     """
     about = run_folder.read_marker(folder) if (folder / run_folder.RUN_FILE).is_file() else {}
     if "config" in about:
-        _check_settings(folder, about["config"])
+        check_settings(folder, about["config"])
     if "slices" not in about:
         result = run_folder.read_run(folder)
         return LongRun(summarise(result), result)
@@ -121,7 +121,7 @@ def read_any(folder: Path) -> LongRun:
         return _gather(folder, scene, about, about["identity"])
 
 
-def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
+def check_settings(folder: Path, config: Mapping[str, Any]) -> None:
     """Check that this version knows all settings of a run read from `folder`, as its bounds are computed from them."""
     try:
         PipelineSpec.model_validate(dict(config))

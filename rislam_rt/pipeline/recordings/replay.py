@@ -18,6 +18,7 @@ from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec
+from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.slam import StartPrior
 from rislam_rt.toml import put_dotted
 
@@ -31,6 +32,9 @@ class Answers(NamedTuple):
     """(K,) diagnostics; of each, `landmark` and `outcome` are read."""
     seconds: float
     """Mean CPU time [s] of a cycle, step and estimate."""
+    maps_over_time: bool = True
+    """Whether each estimate has the map of its cycle. Else the last alone has one: when a landmark came into the map,
+    and what was in it and is no more, is not known."""
 
 
 def answers_from_arrays(
@@ -46,7 +50,8 @@ def answers_from_arrays(
     covariance
         (K, 3, 3) of the position [m^2]; without it there is no NEES.
     maps
-        (K,) one a cycle, or the last one alone; without them the map is empty.
+        (K,) one a cycle, or the last one alone, from which neither delays nor births can be scored; without them the
+        map is empty.
     lost
         (K,) whether the estimator holds itself for lost.
     landmark
@@ -65,9 +70,10 @@ def answers_from_arrays(
     ):  # fmt: skip
         if given is not None and np.shape(given) != wanted:
             raise ConfigError(f"{name}: shape {np.shape(given)} received; give {wanted}, a row a cycle")
-    if len(known) > cycles or (landmark is not None and len(landmark) != cycles):
-        name, count = ("maps", len(known)) if len(known) > cycles else ("landmark", len(landmark or ()))
-        raise ConfigError(f"{name}: {count} received; give {cycles}, one a cycle")
+    if len(known) not in (0, 1, cycles):
+        raise ConfigError(f"maps: {len(known)} received; give {cycles}, one a cycle, or the last one alone")
+    if landmark is not None and len(landmark) != cycles:
+        raise ConfigError(f"landmark: {len(landmark)} received; give {cycles}, one a cycle")
     for cycle, (own, heard) in enumerate(zip(landmark or (), inputs.measurements, strict=False)):
         if np.shape(own) != (len(heard),):
             raise ConfigError(
@@ -89,7 +95,7 @@ def answers_from_arrays(
     said = np.zeros(cycles, dtype=np.bool_) if lost is None else lost
     told = zip(landmark or none, said, strict=True)
     infos = tuple(OwnDiagnostics(np.asarray(own), "diverged" if is_lost else "ok") for own, is_lost in told)
-    return Answers(tuple(estimates), infos, 0.0)
+    return Answers(tuple(estimates), infos, 0.0, maps_over_time=len(known) != 1 or cycles == 1)
 
 
 class Recorder:
@@ -148,7 +154,7 @@ class Recorder:
 @in_one_blas_thread
 def replay(
     inputs: Inputs, config: Mapping[str, Any], scheme: str, changes: Mapping[str, Any] | None = None,
-    estimator: Estimator | None = None, *, rng: np.random.Generator,
+    estimator: Estimator | None = None, *, rng: np.random.Generator, progress: Tell = tell_nobody,
 ) -> Answers:  # fmt: skip
     """Run an estimator on the recorded inputs of a run, cycle by cycle, and return its estimates; no paths are traced.
 
@@ -163,6 +169,8 @@ def replay(
         Its name, which says whose estimator is run, unless `estimator` gives one; `module:Class` is one's own.
     changes
         Settings by dotted key, as `slam.filter`.
+    progress
+        Called after each cycle with `scheme`, the cycles done and their number.
 
     Raises
     ------
@@ -185,9 +193,10 @@ def replay(
     own = run.config(settings)
     state = run.init(inputs.start, inputs.body, inputs.panel, settings.sensor, own, rng=rng)
     steps = zip(inputs.measurements, inputs.codes, np.diff(inputs.time, prepend=0.0), inputs.heading, strict=True)
-    for measurement, code, dt, heading in steps:
+    for cycle, (measurement, code, dt, heading) in enumerate(steps):
         state, _ = run.step(state, measurement, code, float(dt), float(heading), own, rng=rng)
         run.estimate(state, own)
+        progress(scheme, cycle + 1, len(inputs.time))
     return recorder.answers
 
 

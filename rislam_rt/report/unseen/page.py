@@ -47,9 +47,10 @@ def _meaning() -> list[str]:
     it is above the detection threshold for {HEARD:g} s in all; walls in one plane are one. A wall is found if at the
     end a plane of the map lies within {NEAR_WALL:g} m of it (RMS over its surface) and within {NEAR_ANGLE:g} degrees,
     one to one, and found well within {GOOD_ANGLE:g} degree and {GOOD_OFFSET:g} m at its middle; a landmark, within
-    {NEAR_POINT:g} m. Ghosts are what stands for nothing, heard or not, one to one. A birth is of the right kind if most
-    components that the landmark got were of that kind. Delays are medians from the first audible cycle to the first in
-    which the map holds it."""
+    {NEAR_POINT:g} m; the panel, if the landmark that the map holds for it does. Ghosts are what stands for nothing,
+    heard or not, one to one. A birth is of the right kind if most components that the landmark got were of that kind.
+    Delays are medians from the first audible cycle to the first in which the map holds it; a panel that is not found
+    has none."""
     return [*paragraph(text), "", *paragraph(lost)]
 
 

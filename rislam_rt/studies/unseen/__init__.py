@@ -2,13 +2,14 @@
 
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, Recorder, answers_from_arrays, replay
-from rislam_rt.studies.unseen.recording_file import read_recording
+from rislam_rt.studies.unseen.recorded_run import record_run
+from rislam_rt.studies.unseen.recording_file import Recording, read_recording, write_recording
 from rislam_rt.studies.unseen.score import score_run
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.studies.unseen.sweep import build_unseen, count_tests
-from rislam_rt.studies.unseen.truth import build_truth
+from rislam_rt.studies.unseen.truth import Truth, build_truth
 
 __all__ = [
-    "Answers", "Inputs", "Recorder", "UnseenSpec", "answers_from_arrays", "build_truth", "build_unseen", "count_tests",
-    "read_recording", "replay", "score_run",
+    "Answers", "Inputs", "Recorder", "Recording", "Truth", "UnseenSpec", "answers_from_arrays", "build_truth",
+    "build_unseen", "count_tests", "read_recording", "record_run", "replay", "score_run", "write_recording",
 ]  # fmt: skip

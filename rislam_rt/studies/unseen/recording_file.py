@@ -1,4 +1,4 @@
-"""Recording file of a run in an unseen room, in NetCDF: inputs of the estimator and, under other names, the truth."""
+"""Recording file of a run in NetCDF: inputs of the estimator and, under other names, the truth that it is scored by."""
 
 import json
 from collections.abc import Mapping
@@ -9,6 +9,7 @@ import numpy as np
 
 from rislam_rt.errors import RislamError, StoreError
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, inputs_to_dataset
+from rislam_rt.storage.files import MARK
 from rislam_rt.storage.netcdf import Entry, read_dataset, variables, write_dataset
 from rislam_rt.studies.unseen.truth import Truth
 
@@ -34,7 +35,7 @@ TRUTH: dict[str, Entry] = {
 
 
 class Recording(NamedTuple):
-    """Recorded run of one scheme in an unseen room: inputs of its estimator, truth, settings and scores."""
+    """Recorded run of one scheme, in an unseen room or another: inputs of its estimator, truth, settings and scores."""
 
     inputs: Inputs
     truth: Truth
@@ -43,7 +44,7 @@ class Recording(NamedTuple):
     config: Mapping[str, Any]
     """Specification of the run."""
     traits: Mapping[str, Any]
-    """Seed and classes of the room."""
+    """Seed and classes of an unseen room; of another, its name, and the run's folder and seed."""
     scores: Mapping[str, Any]
     """Scores of the scheme's own estimator."""
 
@@ -84,7 +85,7 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
     """NetCDF data set of a recorded run: `INPUTS`, `TRUTH` with names from `true_` on, the rest as attributes."""
     truth = recording.truth
     about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
-    data = inputs_to_dataset(recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel))
+    data = inputs_to_dataset(recording.inputs, **about, scheme=recording.scheme, true_panel=truth.panel, origin=MARK)
     values = {name: getattr(truth, name) for name in TRUTH}
     plain = {name: v.astype(np.int8) if v.dtype == np.bool_ else v for name, v in values.items()}
     content = variables(plain, TRUTH)
@@ -97,6 +98,6 @@ def dataset_to_recording(data: "xr.Dataset") -> Recording:
     values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
     for name in ("landmark_audible", "wall_audible"):
         values[name] = values[name].astype(np.bool_)
-    truth = Truth(**values, panel=bool(marks["true_panel"]))
+    truth = Truth(**values, panel=int(marks["true_panel"]))
     config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
     return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)

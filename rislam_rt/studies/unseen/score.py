@@ -25,15 +25,17 @@ GOOD_ANGLE, GOOD_OFFSET = 1.0, 0.02
 """[deg] and [m] Largest errors of a wall that counts as well estimated."""
 MIN_PARTS = 3
 """Least number of components associated with a landmark for its kind to be scored."""
+OVER_TIME = ("wall_delay_s", "point_delay_s", "panel_delay_s", "births", "births_judged", "births_right")
+"""Scores that need the map of every cycle."""
 
 
 def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
-    """Score the estimates of one run in an unseen room against its truth: RMSE, bounds, NEES, divergence, walls,
-    landmarks, births.
+    """Score the estimates of one run, in an unseen room or another, against its truth: RMSE, bounds, NEES, divergence,
+    walls, landmarks, births.
 
-    None where there is nothing to score. Relative errors are without the error of the start prior, which no measurement
-    reduces. `lost` is by the truth, from `LOST` [m] on: a run's summary may say that it has not `diverged` (0.5 m), and
-    `silent` that the estimator did not notice.
+    None where there is nothing to score, and of delays and births where the last map alone is known. Relative errors
+    are without the error of the start prior, which no measurement reduces. `lost` is by the truth, from `LOST` [m] on:
+    a run's summary may say that it has not `diverged` (0.5 m), and `silent` that the estimator did not notice.
 
     Raises
     ------
@@ -64,7 +66,9 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
     maps = [estimate.map for estimate in answers.estimates]
     scores |= wall_scores(truth, maps, inputs.time, told)
     scores |= point_scores(truth, maps, inputs, told)
-    return scores | kind_scores(truth, maps, answers)
+    scores |= panel_scores(truth, maps, inputs, told)
+    scores |= kind_scores(truth, maps, answers)
+    return scores if answers.maps_over_time else scores | dict.fromkeys(OVER_TIME)
 
 
 def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outcomes: list[Any]) -> dict[str, Any]:
@@ -114,35 +118,51 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
 
 
 def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Floats) -> dict[str, Any]:
-    """Scores of landmarks in an unseen room: how many detectable ones the last map has, errors and delays, panel, ghost
+    """Scores of landmarks in an unseen room: how many detectable ones the last map has, errors and delays, ghost
     points, GOSPA."""
-    there = truth.landmark[: len(truth.landmark) - (truth.panel and inputs.panel is None)]
+    there = truth.landmark[: len(truth.landmark) - (truth.panel if inputs.panel is None else 0)]
     audible = truth.landmark_audible[:, : len(there)]
     heard = heard_long(audible, inputs.time)
-    first, named = np.full(len(there), -1), np.full(len(there), -1)
-    match = first
+    match = first = np.full(len(there), -1)
     for cycle, found in enumerate(maps):
         points = np.flatnonzero(found.parent < 0)
         match = evaluate.match_points(found.position[points] - told, there, cutoff=NEAR_POINT)
-        first[(match >= 0) & (first < 0)] = cycle
-        held = np.flatnonzero(match >= 0)
-        ris = found.ris_probability[points[match[held]]] > 0.5
-        named[held[ris & (named[held] < 0)]] = cycle
+        first = np.where((match >= 0) & (first < 0), cycle, first)
     last = maps[-1].position[maps[-1].parent < 0] - told
     score = evaluate.gospa(last, there, cutoff=NEAR_POINT)
     held = np.flatnonzero((match >= 0) & heard)
     error = np.linalg.norm(last[match[held]] - there[held], axis=1)
-    panel = inputs.panel is not None and bool(heard[-1])
     return {
         "points_heard": int(heard.sum()),
         "points_found": len(held),
         "point_m": _median(error),
         "point_delay_s": _delay(np.where(heard, first, -1), audible, inputs.time),
-        "panel_heard": panel,
-        "panel_found": bool(panel and match[-1] >= 0 and named[-1] >= 0),
-        "panel_delay_s": _delay(named[-1:], audible[:, -1:], inputs.time) if panel else None,
         "ghost_points": int(score.false),
         "gospa_m": float(score.distance),
+    }
+
+
+def panel_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Floats) -> dict[str, Any]:
+    """Scores of the panel in an unseen room: whether it is detectable, whether the last map has it, and the delay.
+
+    The map has it where the landmark that it holds for it lies within `NEAR_POINT` of it. A second landmark in the same
+    place, which may be nearer, does not change that. Of several panels all that are detectable have to be found; the
+    delay is their median.
+    """
+    count = int(truth.panel) if inputs.panel is not None else 0  # True is one
+    first_panel = len(truth.landmark) - count
+    there, audible = truth.landmark[first_panel:], truth.landmark_audible[:, first_panel:]
+    heard = heard_long(audible, inputs.time)
+    has = np.zeros((len(maps), count), dtype=np.bool_)
+    for cycle, found in enumerate(maps):
+        for panel in range(count):
+            row = found.panel_row(panel)
+            has[cycle, panel] = row >= 0 and np.linalg.norm(found.position[row] - told - there[panel]) <= NEAR_POINT
+    first = np.where(has[-1] & heard, np.argmax(has, axis=0), -1)
+    return {
+        "panel_heard": bool(heard.any()),
+        "panel_found": bool(heard.any() and has[-1, heard].all()),
+        "panel_delay_s": _delay(first, audible, inputs.time),
     }
 
 

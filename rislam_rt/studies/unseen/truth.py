@@ -1,4 +1,4 @@
-"""The truth that a run in an unseen room is scored against: motion, landmarks, walls, when detectable, the bounds."""
+"""The truth that a run is scored against: motion, landmarks, walls, when they are detectable, the bounds of the run."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -29,8 +29,8 @@ class Truth(NamedTuple):
     """(K, 3) [m/s] true velocity."""
     landmark: Floats
     """(N, 3) [m] true landmarks, the panel last if there is one."""
-    panel: bool
-    """Whether there is a panel."""
+    panel: int
+    """Number of panels."""
     landmark_audible: Booleans
     """(K, N) whether a path over the landmark is above the detection threshold."""
     wall_middle: Floats
@@ -66,7 +66,7 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
     of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
     bound, relative = run_bounds(scene, paths, result, spec)
     return Truth(
-        scene.agent.position, scene.agent.velocity, scene.landmark_positions, scene.ris is not None,
+        scene.agent.position, scene.agent.velocity, scene.landmark_positions, len(scene.panels),
         (audible[:, :, None] & of).any(axis=1), *surfaces, audible_planes(paths, audible, group), paths.kind,
         paths.landmark, result.component_path, bound, relative,
     )  # fmt: skip

@@ -83,7 +83,10 @@ def test_plain_arrays_are_scored_like_an_estimator(tmp_path: Path) -> None:
         ("covariance", {"covariance": np.eye(3)}, f"shape (3, 3) received; give ({cycles}, 3, 3), a row a cycle"),
         ("lost", {"lost": np.array([True])}, f"shape (1,) received; give ({cycles},), a row a cycle"),
         ("landmark", {"landmark": []}, f"0 received; give {cycles}, one a cycle"),
-        ("maps", {"maps": (cycles + 1) * [empty_map()]}, f"{cycles + 1} received; give {cycles}, one a cycle"),
+        *(
+            ("maps", {"maps": n * [empty_map()]}, f"{n} received; give {cycles}, one a cycle, or the last one alone")
+            for n in (cycles + 1, cycles - 1)
+        ),
     ):
         with pytest.raises(ConfigError) as found:
             answers_from_arrays(inputs, **({"position": told} | wrong))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.model import Body, MapEstimate, Measurement, PathKind, RisSpec, SlamEstimate, empty_map
-from rislam_rt.pipeline.recordings.replay import Answers, Inputs
+from rislam_rt.pipeline.recordings.replay import Answers, Inputs, answers_from_arrays
 from rislam_rt.slam import StartPrior
-from rislam_rt.studies.unseen.score import lost_scores, score_run
+from rislam_rt.studies.unseen.score import OVER_TIME, lost_scores, score_run
 from rislam_rt.studies.unseen.truth import Truth
 
 K = 150
@@ -142,6 +142,65 @@ def test_a_landmark_that_is_nowhere_is_a_ghost() -> None:
     assert scores["points_found"] == 0
     assert scores["ghost_points"] == 2
     assert not scores["panel_found"]
+
+
+def with_point(known: MapEstimate, place: Any, ris: Any) -> MapEstimate:
+    """The map with a second landmark at a place, and other probabilities of being the panel."""
+    return replace(
+        known, ident=[*known.ident, 11], position=[*known.position, place], parent=[*known.parent, -1],
+        covariance=np.tile(1e-6 * np.eye(3), (4, 1, 1)), ris_probability=ris, strength=np.ones(4),
+    )  # fmt: skip
+
+
+def test_the_panel_is_found_whatever_lies_beside_it() -> None:
+    """Of two landmarks in one place, the one that is not held for the panel may be the nearer."""
+    known = whole_map()
+    known = replace(known, position=known.position + np.outer([0.0, 0.004, 0.0], [1.0, 0.0, 0.0]))
+    both = with_point(known, POINTS[1] + TOLD, [0.0, 0.9, 0.0, 0.01])
+    scores = score_run(truth(), inputs(), answers(found=both))
+    assert scores["panel_found"]
+    assert scores["panel_delay_s"] == pytest.approx(1.0)
+    assert (scores["points_found"], scores["ghost_points"]) == (2, 1)
+    # the landmark at the panel's place is not held for the panel, another far off is
+    other = with_point(whole_map(), [9.0, 9.0, 1.0], [0.0, 0.4, 0.0, 0.9])
+    scores = score_run(truth(), inputs(), answers(found=other))
+    assert (scores["panel_heard"], scores["panel_found"], scores["panel_delay_s"]) == (True, False, None)
+
+
+def test_a_panel_that_is_lost_again_is_not_found_and_has_no_delay() -> None:
+    given, without = answers(), replace(whole_map(), ris_probability=np.zeros(3))
+    estimates = (*given.estimates[:-1], replace(given.estimates[-1], map=without))
+    scores = score_run(truth(), inputs(), given._replace(estimates=estimates))
+    assert (scores["panel_found"], scores["panel_delay_s"]) == (False, None)
+    assert scores["points_found"] == 2
+
+
+def test_of_several_panels_all_have_to_be_found() -> None:
+    true, both = truth()._replace(panel=2), replace(whole_map(), ris_probability=np.array([0.9, 0.8, 0.0]))
+    for number, found in (([0, 1, 0], True), ([0, 0, 0], False), ([1, 0, 0], False)):
+        scores = score_run(true, inputs(), answers(found=replace(both, panel=np.array(number))))
+        assert (scores["panel_heard"], scores["panel_found"]) == (True, found)
+    assert score_run(true, inputs()._replace(panel=None), answers())["points_heard"] == 0
+
+
+def test_the_last_map_alone_is_scored_alike_and_tells_nothing_of_the_time_before() -> None:
+    whole = answers(found=with_point(whole_map(), POINTS[1] + TOLD, [0.0, 0.9, 0.0, 0.01]))
+    given = inputs()._replace(
+        measurements=K * (Measurement(*(np.ones((4, *n)) for n in ((), (2,), (), (), (2,), ()))),)
+    )
+    position, covariance = (
+        np.array([getattr(each, name) for each in whole.estimates]) for name in ("position", "covariance")
+    )
+    arrays = position, covariance[:, :3, :3]
+    taken = [info.landmark for info in whole.infos]
+    last = score_run(truth(), given, answers_from_arrays(given, *arrays, [whole.estimates[-1].map], landmark=taken))
+    maps = [each.map for each in whole.estimates]
+    every = score_run(truth(), given, answers_from_arrays(given, *arrays, maps, landmark=taken))
+    assert every == score_run(truth(), given, whole)
+    assert {name: last[name] for name in OVER_TIME} == dict.fromkeys(OVER_TIME)
+    assert not [name for name in OVER_TIME if every[name] is None]
+    assert {name: last[name] for name in last.keys() - OVER_TIME} == {n: every[n] for n in every.keys() - OVER_TIME}
+    assert last["panel_found"]
 
 
 def test_without_a_panel_there_is_none_to_find() -> None:
