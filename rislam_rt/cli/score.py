@@ -45,6 +45,7 @@ def command(
     from rislam_rt.pipeline.long.whole_run import read_whole
     from rislam_rt.report.unseen.run_card import print_run_card
     from rislam_rt.studies.unseen.recording_file import write_recording
+    from rislam_rt.sweeps.cell_work import plain_result
 
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())  # a scheme of one's own is looked for there
@@ -67,7 +68,7 @@ def command(
     print_run_card("{pipeline} in {scene}: {cycles} cycles, seed {seed}".format(**about), scores)
     for file in files.values():
         typer.echo(f"recording: {file}")
-    write_json(json, {"run": str(run), **about, "replayed": replay, "schemes": scores})
+    write_json(json, plain_result({"run": str(run), **about, "replayed": replay, "schemes": scores}))
 
 
 def _recording_file(folder: Path, run: Path, scheme: str) -> Path:

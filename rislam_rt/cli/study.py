@@ -142,7 +142,11 @@ def run_claims(spec: ClaimsSpec, given: StudyOptions) -> None:
 
 def run_unseen(spec: UnseenSpec, given: StudyOptions) -> None:
     """For `rislam-rt run` of the study in unseen rooms: print scores, write its page; exit code 1 if a room failed."""
-    _refuse_scene(given, "unseen", "draws its rooms; leave it out")
+    _refuse_scene(
+        given,
+        "unseen",
+        "draws its rooms; leave it out (a run in a room of one's own has the same card by rislam-rt score)",
+    )
     cells = Path("sweeps") / spec.name
     record = unseen_record(spec)
     files = page_files(spec.name, figure=given.page)
