@@ -25,10 +25,22 @@ def pipeline_file(name: str) -> Path:
     Its folder and the working folder are added to Python's module path, so that it can name a user's own methods.
     """
     file = find_pipeline(name)
-    for folder in (str(file.parent.resolve()), os.getcwd()):
+    look_for_methods_in(str(file.parent.resolve()), os.getcwd())
+    return file
+
+
+def run_folder(name: str) -> Path:
+    """Command line argument of a completed run: its folder. Methods of a user's own are looked for in the working
+    folder."""
+    look_for_methods_in(os.getcwd())
+    return Path(name)
+
+
+def look_for_methods_in(*folders: str) -> None:
+    """Add folders to Python's module path, for a user's own methods on the command line."""
+    for folder in folders:
         if folder not in sys.path:
             sys.path.append(folder)  # last, so that nobody's file hides a library
-    return file
 
 
 SceneFolder = Annotated[
@@ -42,6 +54,10 @@ PipelineFile = Annotated[
     typer.Argument(
         metavar="PIPELINE", help="Pipeline file (TOML), or the name of a built-in one.", parser=pipeline_file
     ),
+]
+RunFolder = Annotated[
+    Path,
+    typer.Argument(metavar="RUN", help="Folder of a completed run.", parser=run_folder, show_default=False),
 ]
 MAIN_JOB = Path("trace_then_slam")
 """Default pipeline of all commands."""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import JsonFile
+from rislam_rt.cli.options import JsonFile, RunFolder
 from rislam_rt.cli.output_files import OUTPUT, write_json
 from rislam_rt.cli.run import show_scores
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a completed run.", show_default=False)],
+    run: RunFolder,
     rerun: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write a recording for the Rerun viewer (.rrd); needs the extra `viz`."),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import JsonFile
+from rislam_rt.cli.options import JsonFile, RunFolder
 from rislam_rt.cli.output_files import check_output, write_json
 from rislam_rt.cli.verbosity import verbosity, warn
 from rislam_rt.input_messages import counted
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a completed run.", show_default=False)],
+    run: RunFolder,
     save: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Write a recording of each scheme (.nc) there: inputs, truth, scores."),
@@ -39,16 +39,11 @@ def command(
 
     Example: rislam-rt score runs/trace_then_slam-office-7-0123abcd --save recordings
     """
-    import os
-    import sys
-
     from rislam_rt.pipeline.long.whole_run import read_whole
     from rislam_rt.report.unseen.run_card import print_run_card
     from rislam_rt.studies.unseen.recording_file import write_recording
     from rislam_rt.sweeps.cell_work import plain_result
 
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())  # a scheme of one's own is looked for there
     result = read_whole(run)
     files = {name: _recording_file(save, run, name) for name in result.schemes} if save is not None else {}
     found = _recorded(result, run, replay=replay)

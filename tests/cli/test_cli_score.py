@@ -1,6 +1,8 @@
 """`score`: the card of a run in a room of one's own, its recordings, and one line for what cannot be."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,41 @@ def test_a_run_in_a_room_of_ones_own_is_scored_and_recorded(run, tmp_path):
         "error: --save card.json: is a file; give a folder\n"
     )
     assert Path("kept/mine_random.nc").read_text() == "of my own"
+
+
+OWN = """import numpy as np
+from rislam_rt.model import pose_estimate
+
+
+class Resting:
+    def init(self, start, body, panel, sensor, *, rng):
+        return start, body
+
+    def step(self, state, measurement, code, dt, heading, *, rng):
+        return state
+
+    def estimate(self, state):
+        start, body = state
+        return pose_estimate(start.position, 0.0 * start.velocity, start.heading, np.eye(6), body)
+"""
+
+
+def test_a_filter_of_ones_own_is_scored_where_its_file_is(run, tmp_path, monkeypatch):
+    module = f"own_{tmp_path.name}"  # a name that no other test has loaded
+    (tmp_path / f"{module}.py").write_text(OWN)
+    words = (*RUN[:2], *RUN[4:-2], "--set", f'schemes=["{module}:Resting"]')
+    assert run(*words, "--out", "mine")[0] == 0
+    away = (sys.executable, "-m", "rislam_rt", "score", tmp_path / "mine", "--json", "card.json")
+    (tmp_path / "away").mkdir()
+    done = subprocess.run(away, cwd=tmp_path / "away", capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    mend = f"put {module}.py into the working folder, or install it"
+    assert done.stderr == f"error: {tmp_path / 'mine'}: '{module}:Resting': no module '{module}'; {mend}\n"
+    done = subprocess.run(away, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    card = json.loads((tmp_path / "card.json").read_text())["schemes"][f"{module}:Resting"]
+    assert card["relative_rmse_m"] > 0.0
+    assert (card["births"], card["walls_found"]) == (0, 0)
 
 
 @pytest.mark.parametrize("folder", ["nowhere", ROOT / "docs"])

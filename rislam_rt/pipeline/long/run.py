@@ -13,6 +13,7 @@ from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.tally import Tally
+from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.run import library_versions, run_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise, summary_table
@@ -126,6 +127,11 @@ def check_settings(folder: Path, config: Mapping[str, Any]) -> None:
     try:
         PipelineSpec.model_validate(dict(config))
     except ValidationError as error:
+        first = error.errors()[0]
+        if first["type"] == "value_error" and is_own(str(first["input"])):  # and its file is not to be found
+            said = str(first["msg"]).removeprefix("Value error, ")
+            said = said.replace("beside the pipeline file", "into the working folder")
+            raise ConfigError(f"{folder}: {said}") from None
         strange = ".".join(str(part) for part in error.errors()[0]["loc"])
         more = f" and {error.error_count() - 1} more" if error.error_count() > 1 else ""
         raise ResultError(
