@@ -85,7 +85,9 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
     """NetCDF data set of a recorded run: `INPUTS`, `TRUTH` with names from `true_` on, the rest as attributes."""
     truth = recording.truth
     about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
-    data = inputs_to_dataset(recording.inputs, **about, scheme=recording.scheme, true_panel=truth.panel, origin=MARK)
+    data = inputs_to_dataset(
+        recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel), origin=MARK
+    )
     values = {name: getattr(truth, name) for name in TRUTH}
     plain = {name: v.astype(np.int8) if v.dtype == np.bool_ else v for name, v in values.items()}
     content = variables(plain, TRUTH)
