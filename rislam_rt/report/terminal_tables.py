@@ -10,7 +10,7 @@ from rich.table import Column, Table
 
 from rislam_rt.input_messages import share_text
 from rislam_rt.model import PathKind, Paths, Scene
-from rislam_rt.pipeline.scores.loss_causes import words_of_loss
+from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
 from rislam_rt.shipped import short_names
 
 if TYPE_CHECKING:
@@ -34,11 +34,12 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the terminal table of a run's scores: label, then one cell for each scheme."""
     schemes = list(summary["schemes"].values())
     first = schemes[0]
-    aligned = [s["rmse_aligned_m"] for s in schemes]
+    relative, aligned = ([s[key] for s in schemes] for key in ("relative_rmse_m", "rmse_aligned_m"))
     known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it
     heard = [wall for wall in first["walls"] if any(s["walls"][wall][k] is not None for s in schemes for k in known)]
     rows = [
         ["agent", *(_metres(s["rmse_m"]) for s in schemes)],
+        ["agent, relative to its start", *("-" if error is None else _metres(error) for error in relative)],
         ["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)],
         *(
             [f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)]
@@ -54,12 +55,23 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         ["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)],
         ["association: precision, recall", *map(", ".join, shares)],
         ["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)],
-        ["diverged", *("yes" if s["diverged"] else "no" for s in schemes)],
+        ["diverged", *(_diverged(s) for s in schemes)],
         ["held itself for lost", *(_said(s["outcomes"]) for s in schemes)],
     ]
     if any(s["lost"]["times"] for s in schemes):
         rows.append(["because", *(words_of_loss(s["lost"]) if s["lost"]["times"] else "-" for s in schemes)])
     return rows
+
+
+def unnoticed_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Lines below the terminal table of a run, one for each scheme that diverged without noticing."""
+    found = ((name, scores) for name, scores in summary["schemes"].items() if is_unnoticed(scores))
+    return [f"{name}: {UNNOTICED}; off by up to {_metres(scores['largest_m'])}" for name, scores in found]
+
+
+def _diverged(scores: Mapping[str, Any]) -> str:
+    """Cell of a terminal table: whether a scheme diverged by the truth, and whether it noticed."""
+    return "yes, without noticing" if is_unnoticed(scores) else "yes" if scores["diverged"] else "no"
 
 
 def _said(outcomes: Mapping[str, int]) -> str:
