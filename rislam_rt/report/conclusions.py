@@ -12,6 +12,7 @@ from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
 from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
 from rislam_rt.pipeline.scores.summary import landmark_track
+from rislam_rt.pipeline.scores.wall_scores import found_of_heard
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.slam.step_info import StepOutcome
 
@@ -66,9 +67,8 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
         parts.append(f"{name} not found" if found is None else f"{name} found after {found:.1f} s")
     names = [name for name in scores["landmarks"] if "cycles_identified" not in scores["landmarks"][name]]
     held = sum(scores["landmarks"][name]["final_m"] is not None for name in names)
-    walls = [wall for wall in scores["walls"].values() if wall["bound_deg"] is not None]
     parts.append(f"{held} of {len(names)} scatterers")
-    parts.append(f"{sum(wall['angle_deg'] is not None for wall in walls)} of {len(walls)} walls that were heard")
+    parts.append(f"{found_of_heard(scores['walls'])} walls that were heard")
     return "; ".join(parts)
 
 

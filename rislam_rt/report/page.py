@@ -10,6 +10,7 @@ import numpy as np
 
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
+from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.pipeline.scores.summary import DIVERGED, FAR_OVER
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.report.code_pictures import draw_run_codes
@@ -135,7 +136,8 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
 Relative to its start: without what the agent was told wrong of it
 (within {100.0 * result.config["start"]["position_std_m"]:.3g} cm an axis), which no measurement can mend. Path aligned:
 the estimated path shifted and turned onto the true one.
-Walls, at the end: distance of the estimated plane over the true surface, and the angle between them. The bound is the
+Walls, at the end: distance of the estimated plane over the true surface, and the angle between them; those in one
+plane are one, and heard is one over which a path was loud enough for {HEARD:g} s in all. The bound is the
 posterior bound of the same motion, codes and noise with landmarks and walls unknown. GOSPA is of the last map's points,
 cut off at 1 m. Association: of the components taken for a landmark or wall, how many rightly (precision); of those
 that came from one, how many were taken for it (recall). Budget: the settings <code>budget.*</code>, against the mean
