@@ -79,6 +79,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> N
     Where the user `named` no schemes, those that need a panel are left out of a scene without one, and a line says so.
     """
     from rislam_rt.cli.scene_arguments import open_scene, scene_of
+    from rislam_rt.model.delay_spread import SPREAD
     from rislam_rt.pipeline.channels import prepare_channel
     from rislam_rt.pipeline.run import check_run
     from rislam_rt.pipeline.specification.radio import build_radio
@@ -100,7 +101,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> N
         show_run(folder, about, given)
         return
     prepare_channel(spec.channel)
-    opened.warn()
+    opened.warn(but=SPREAD)
     compute_run(spec, opened.scene, identity, folder, given)
 
 

@@ -109,6 +109,16 @@ def test_a_room_without_a_panel_runs_without_the_default_schemes_that_need_one(r
     assert run("run", "mine.toml", *SHORT, *room)[0] == 2
 
 
+def test_a_panels_delay_spread_is_warned_of_once(run):
+    """By the run, of the motion that it drew; not by the check of the scene as well. Without a panel by nobody."""
+    wide = ("--set", "radio.bandwidth_ghz=5", "--set", 'schemes=["random", "no_ris"]', "--no-report")
+    words = "delays over the panel spread by up to"
+    code, _, err = run("run", PIPELINE, *SHORT, *wide)
+    assert code == 0
+    assert err.count(words) == 1
+    assert words not in run("run", PIPELINE, *SHORT, *wide, "--set", 'schemes=["no_ris"]')[2]
+
+
 def test_run_report_and_json(run, tmp_path, monkeypatch):
     one = ("--set", 'schemes=["random"]')
     code, out, _ = run("run", PIPELINE, *SHORT, *one, "--json", "run.json", "--out", "mine")
