@@ -33,6 +33,11 @@ def shipped_missing(kind: str) -> str:
     return f"the {kind} that come with the package were not found in {place}: install it whole, or copy '{kind}' there"
 
 
+def is_shipped(pipeline: Path) -> bool:
+    """Whether a pipeline file is one of those that come with the package."""
+    return pipeline.resolve() in {file.resolve() for file in shipped_pipelines().values()}
+
+
 def find_pipeline(name: str | Path) -> Path:
     """Path of a pipeline file from a path or a name: the file if there is one, else the pipeline of that name that
     comes with the package."""

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink, link_budget, survey
+from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink, Survey, link_budget, survey
 from rislam_rt.adviser.remedies import detection_label, remedies
 from rislam_rt.adviser.tracing_cost import TraceCost, trace_cost
 from rislam_rt.model import Scene
@@ -37,10 +37,11 @@ class Advice(NamedTuple):
         return {"threshold_db": self.threshold_db, "links": links, "remedies": self.remedies, "costs": costs}
 
 
-def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator) -> Advice:
+def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator, looked: Survey | None = None) -> Advice:
     """Forecast what a run would detect in a room that passes the scene check, what would help, and what tracing costs.
-    `rng` draws the random codes that a RIS panel is tried under."""
-    looked = survey(scene, settings)
+    `rng` draws the random codes that a RIS panel is tried under; `looked` is the survey of the room, where there is one
+    already."""
+    looked = looked or survey(scene, settings)
     links = link_budget(looked, rng=rng)
     threshold = 10.0 * float(np.log10(settings.sensor.threshold))
     return Advice(links, remedies(looked, links), trace_cost(scene, settings.radio, len(looked.paths.walls)), threshold)

@@ -71,7 +71,7 @@ def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: Sensor
 
 PLACES = 15
 """Number of positions of a link budget, evenly along the trajectory; first, middle and last are its columns."""
-DEPTHS = ((500, 2), (2000, 1))
+DEPTHS = ((500, 2), (5000, 1))
 """Most triangles of a room, and the wall bounces that its link budget then counts; with more triangles direct paths
 alone: the check is to take seconds. More bounces are seldom the strongest; they cover weaker paths."""
 NOTHING_DB = -400.0

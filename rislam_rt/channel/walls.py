@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.channel.occluders import Occluders, build_occluders
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.geometry.coplanar import stack_walls, tracer_gap
@@ -13,6 +13,7 @@ from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.planes import signed_distance
 from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.model import Material, Reflector, RisPanel, Scene
+from rislam_rt.scene.check.panel import MAX_TURN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,10 +110,14 @@ def _names(reflector: str, count: int) -> list[str]:
 
 
 def _host(panel: RisPanel, scene: Scene, reflector: Integers, normal: Floats, offset: Floats) -> int:
-    """Number of the scene's wall behind a panel, -1 without: its host's nearest plane; `reflector` (W,) of walls."""
+    """Number of the scene's wall behind a panel, -1 without: its host's nearest plane, of those that lie as the panel
+    does if there are any, as others may pass nearer by one that hangs a little before its host; `reflector` (W,) of
+    walls."""
     names = [r.name for r in scene.reflectors]
     if panel.host not in names:
         return -1
     of_host = np.flatnonzero(reflector == names.index(panel.host))
+    flat = np.linalg.norm(cross(normal[of_host], panel.spec.normal), axis=-1) <= MAX_TURN
+    of_host = of_host[flat] if flat.any() else of_host
     distance = np.abs(signed_distance(panel.center, normal[of_host], offset[of_host]))
     return int(of_host[np.argmin(distance)]) if len(of_host) else -1

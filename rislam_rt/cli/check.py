@@ -12,6 +12,7 @@ from rislam_rt.input_messages import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rislam_rt.adviser.link_budget import Survey
     from rislam_rt.model import Scene
     from rislam_rt.pipeline.specification.pipeline_spec import Settings as Records
     from rislam_rt.scene.findings import Finding
@@ -46,6 +47,8 @@ def command(
     """
     from dataclasses import asdict
 
+    from rislam_rt.adviser.late_paths import late_path_warnings
+    from rislam_rt.adviser.link_budget import survey
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings
     from rislam_rt.scene import check_scene
     from rislam_rt.scene.scene_folder import scene_file
@@ -59,9 +62,11 @@ def command(
 
         picture_kind(picture)  # before anything is worked out
     findings = check_scene(Path(scene), settings.radio)
-    checked = _checked_scene(Path(scene), findings)
+    checked, looked = _checked_scene(Path(scene), findings), None
     if checked is not None:
+        looked = survey(checked, settings)
         findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
+        findings += late_path_warnings(looked, str(scene_file(scene)))
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
@@ -70,8 +75,8 @@ def command(
         "errors": errors,
         "findings": [asdict(finding) for finding in findings],
     }
-    if checked is not None:
-        content["advice"] = _advise(checked, settings, picture)
+    if checked is not None and looked is not None:
+        content["advice"] = _advise(checked, settings, picture, looked)
     write_json(json, content)
     typer.echo(f"{scene}: {counted(errors, 'error')}, {counted(warnings, 'warning')}")
     if errors:
@@ -85,16 +90,16 @@ def _checked_scene(folder: Path, findings: "Sequence[Finding]") -> "Scene | None
     return None if any(finding.severity == "error" for finding in findings) else read_draft(folder).scene
 
 
-def _advise(scene: "Scene", settings: "Records", picture: Path | None) -> dict[str, object]:
-    """Part of `rislam-rt check`: print which landmarks will be detected, draw the coverage if asked, return the
-    advice."""
+def _advise(scene: "Scene", settings: "Records", picture: Path | None, looked: "Survey") -> dict[str, object]:
+    """Part of `rislam-rt check`: print which landmarks will be detected, as the survey has it, draw the coverage if
+    asked, return the advice."""
     import numpy as np
 
     from rislam_rt.adviser.advice import advise
     from rislam_rt.adviser.coverage import panel_coverage
     from rislam_rt.report.advice import draw_coverage, print_advice
 
-    advice = advise(scene, settings, rng=np.random.default_rng(SEED))
+    advice = advise(scene, settings, rng=np.random.default_rng(SEED), looked=looked)
     print_advice(advice)
     if picture is not None:
         coverages = panel_coverage(scene, settings)

@@ -18,6 +18,7 @@ from rislam_rt.cli.options import (
 from rislam_rt.cli.output_files import write_json
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.input_messages import counted
+from rislam_rt.shipped import is_shipped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -58,7 +59,9 @@ def command(
     spec = load_any(pipeline, set_ or ())
     given = StudyOptions(pipeline, scene, out, jobs, json, page)
     if isinstance(spec, PipelineSpec):
-        run_main_job(spec, given)
+        named = any(setting.partition("=")[0].strip() == "schemes" for setting in set_ or ())
+        named |= "schemes" in spec.model_fields_set and not is_shipped(pipeline)
+        run_main_job(spec, given, named=named)
         return
     from rislam_rt.cli import study
     from rislam_rt.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, UnseenSpec
@@ -70,9 +73,13 @@ def command(
     runs.get(type(spec), study.run_swept)(spec, given)
 
 
-def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
-    """Run all schemes of a SLAM pipeline in a scene, as `rislam-rt run` does; a completed run is shown instead."""
+def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> None:
+    """Run all schemes of a SLAM pipeline in a scene, as `rislam-rt run` does; a completed run is shown instead.
+
+    Where the user `named` no schemes, those that need a panel are left out of a scene without one, and a line says so.
+    """
     from rislam_rt.cli.scene_arguments import open_scene, scene_of
+    from rislam_rt.model.delay_spread import SPREAD
     from rislam_rt.pipeline.channels import prepare_channel
     from rislam_rt.pipeline.run import check_run
     from rislam_rt.pipeline.specification.radio import build_radio
@@ -80,7 +87,13 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
     from rislam_rt.pipeline.store.run_folder import DONE, find_run
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
+    need = [] if named else panel_schemes(spec, opened.scene)
+    if need:
+        left = [name for name in spec.schemes if name not in need] or ["no_ris"]
+        spec = spec.model_copy(update={"schemes": left})
     check_run(opened.scene, spec)
+    if need:
+        typer.echo(f"scene '{opened.scene.name}' has no panel, which {', '.join(need)} need: {', '.join(left)} alone")
     identity = run_identity(spec, opened.scene)
     folder = given.out or Path("runs") / identity.folder
     about = find_run(folder, identity)
@@ -88,8 +101,15 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions) -> None:
         show_run(folder, about, given)
         return
     prepare_channel(spec.channel)
-    opened.warn()
+    opened.warn(but=SPREAD)
     compute_run(spec, opened.scene, identity, folder, given)
+
+
+def panel_schemes(spec: "PipelineSpec", scene: "Scene") -> list[str]:
+    """For `rislam-rt run`: the schemes of a pipeline that need a panel and do not find one in the scene."""
+    from rislam_rt.pipeline.schemes import SCHEMES
+
+    return [] if scene.ris is not None else [name for name in spec.schemes if SCHEMES[name].panel]
 
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
@@ -160,9 +180,10 @@ def compute_run(
 
 
 def show_scores(summary: Mapping[str, Any]) -> None:
-    """For `rislam-rt run`: print the scores of a run from its summary, then its warnings on the error stream."""
-    from rislam_rt.report.terminal_tables import print_summary
+    """For `rislam-rt run`: print the scores of a run from its summary, then its warnings on the error stream, those of
+    schemes that diverged without noticing first."""
+    from rislam_rt.report.terminal_tables import print_summary, unnoticed_lines
 
     print_summary(summary)
-    for line in summary["warnings"]:
+    for line in (*unnoticed_lines(summary), *summary["warnings"]):
         warn(line)

@@ -20,10 +20,12 @@ class OpenedScene(NamedTuple):
     scene: "Scene"
     warnings: tuple[str, ...]
 
-    def warn(self) -> None:
-        """Print the scene's warnings, after all other checks of a command, so that an error is one line."""
+    def warn(self, but: str | None = None) -> None:
+        """Print the scene's warnings, after all other checks of a command, so that an error is one line; without those
+        that hold the words `but`, which the command itself says later."""
         for line in self.warnings:
-            warn(line)
+            if but is None or but not in line:
+                warn(line)
 
 
 def open_scene(path: Path, radio: "RadioConfig | None" = None) -> OpenedScene:

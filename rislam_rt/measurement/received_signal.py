@@ -15,6 +15,8 @@ from rislam_rt.measurement.received_paths import Received
 from rislam_rt.model import RadioConfig
 from rislam_rt.waveform import delay_response, subcarrier_frequencies
 
+SPARE = 1.25
+"""Ratio of the sounding's period to the last delay, where the number of tones is not set: a quarter is left of room."""
 FEWEST_TONES = 16
 """Smallest number of tones of a sounding that is not set."""
 
@@ -29,7 +31,7 @@ def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
     """
     if config.num_subcarriers:
         return config.num_subcarriers
-    needed = max(1.25 * radio.bandwidth * config.max_delay, FEWEST_TONES)
+    needed = max(SPARE * radio.bandwidth * config.max_delay, FEWEST_TONES)
     count = int(2 ** np.ceil(np.log2(needed)))
     if count > MOST_TONES:
         raise ConfigError(

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+SPREAD = "delays over the panel spread by up to"
+"""First words of every remark on the delay spread of a panel."""
+
 
 def band_loss_db(cells: float) -> float:
     """Loss [dB] over the band of a beam aimed at the carrier by a panel over which delays spread by T, so many
@@ -20,7 +23,7 @@ def delay_spread_remark(spread: float, bandwidth: float) -> tuple[str, str]:
     """What is to be said of a delay spread [s] over a panel beyond 1 / B: what it costs, and when to mend it."""
     limit, loss = 1e9 / bandwidth, band_loss_db(spread * bandwidth)
     return (
-        f"delays over the panel spread by up to {spread * 1e9:.3g} ns, more than 1 / B = {limit:.3g} ns: over the band "
+        f"{SPREAD} {spread * 1e9:.3g} ns, more than 1 / B = {limit:.3g} ns: over the band "
         f"a real panel loses up to {loss:.2g} dB of an aimed code's gain, which the model, one delay for all elements, "
         "leaves out",
         "keep its size where it is too weak (twice the side is 12 dB, and the band takes less); else take a smaller "

@@ -72,6 +72,8 @@ class SchemeResult:
     smoothed: Any = None
     """(K, 3) [m] positions smoothed with later measurements, of filters that do so (`slam.filter = "window"`: 40 cycles
     later, fewer at the end); None of others, and of runs in slices."""
+    start_position: Any = None
+    """(3,) [m] position that the estimator was told at the start, its prior's mean; None where that is not known."""
     given: Any = None
     """What the estimator was given, cycle by cycle, and the seed that it drew from
     (`rislam_rt.pipeline.recordings.inputs.RecordedInputs`); None where the result was read from a file: it
@@ -92,6 +94,8 @@ class SchemeResult:
             freeze(self, np.int64, panel=(cycles, held))
         if self.smoothed is not None:
             freeze(self, np.float64, smoothed=(cycles, 3))
+        if self.start_position is not None:
+            freeze(self, np.float64, start_position=(3,))
 
     def named(self, panel: int) -> Booleans:
         """Whether (K, I) each landmark of a scheme's result was identified as a RIS panel (above one half)."""

@@ -55,8 +55,11 @@ SCHEME: dict[str, Entry] = {
     "panel": (("time", "landmark"), "1", "number of that panel; left out where there is one"),
     "seconds": (("time", "step"), "s", "time taken by optimise, communicate, measure, localise"),
 }
-SMOOTHED: dict[str, Entry] = {"smoothed": (("time", "xyz"), "m", "position with hindsight")}
-"""Variable of a scheme's data set that only smoothing filters have."""
+OPTIONAL: dict[str, Entry] = {
+    "smoothed": (("time", "xyz"), "m", "position with hindsight"),
+    "start_position": (("xyz",), "m", "told position at the start"),
+}
+"""Variables of a scheme's data set that not every one has: only smoothing filters the first."""
 MAP: dict[str, Entry] = {
     "ident": (("feature",), "1", "number of the landmark or image"),
     "position": (("feature", "xyz"), "m", "estimated position"),
@@ -109,8 +112,7 @@ def scheme_to_dataset(result: SchemeResult) -> "xr.Dataset":
         content[f"info_{name}"] = (("time",), values, {"long_name": f"filter diagnostic {name}"})
     outcomes = sorted(set(result.outcome))
     codes = np.array([outcomes.index(outcome) for outcome in result.outcome], dtype=np.int64)
-    if result.smoothed is not None:
-        content |= variables({"smoothed": result.smoothed}, SMOOTHED, "")
+    content |= _arrays(result, OPTIONAL, "")
     content["outcome"] = (("time",), codes, {"long_name": "how the cycle went, index into attribute 'outcomes'"})
     coords = {"landmark": (("landmark",), result.ident, {"long_name": "number of each landmark ever held"})}
     return _dataset(content, {"scheme": result.scheme, "levels": result.levels, "outcomes": outcomes}, coords)
@@ -124,7 +126,7 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
         info={str(n).removeprefix("info_"): data[n].to_numpy() for n in data.data_vars if str(n).startswith("info_")},
         outcome=tuple(outcomes[code] for code in data["outcome"].to_numpy()),
         map=MapEstimate(**_values(data, MAP, "map_")),
-        smoothed=_values(data, SMOOTHED, "")["smoothed"] if "smoothed" in data else None,
+        **_values(data, {name: entry for name, entry in OPTIONAL.items() if name in data}, ""),
     )  # fmt: skip
 
 

@@ -135,6 +135,7 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
         parent=parent, held=held, landmark_position=landmark, ris_probability=ris_probability,
         seconds=np.array([cycle.seconds for cycle in cycles]), info=_diagnostics([cycle.info for cycle in cycles]),
         outcome=tuple(str(cycle.info.outcome) for cycle in cycles), map=maps[-1], panel=panel, given=given,
+        start_position=given.inputs.start.position,
     )  # fmt: skip
 
 

@@ -22,6 +22,12 @@ from rislam_rt.report.style import save_figure, styled
 
 STEPS_DB = np.arange(-18.0, 31.0, 6.0)
 """Limits [dB] of the coverage map's colours; zero is the detection threshold."""
+PLACES = ("start", "middle", "end")
+"""Columns of the table of advice that show a place."""
+UNSAID = {"swept": "most beams miss it", "random": "most codes miss it"}
+"""Why a landmark is not heard under so many codes whose best or mean is loud enough."""
+WEAKENED = "weakened by paths that come in with it"
+"""Why a landmark is not heard whose strongest path is loud enough and has a component of its own."""
 UNSEEN = "#d9d9d9"
 """Colour of places in the coverage map that no direct path from the panel reaches."""
 
@@ -29,7 +35,7 @@ UNSEEN = "#d9d9d9"
 def print_advice(advice: Advice) -> None:
     """Print a table of the SNR margin of each landmark along the trajectory, remedies, and the cost of tracing."""
     console = Console(highlight=False)
-    table = Table("landmark", "codes", "start", "middle", "end", "heard", "why not")
+    table = Table("landmark", "codes", *PLACES, "heard", "why not")
     for link in advice.links:
         cells = (_cell(link, at) for at in link.three)
         table.add_row(link.landmark, link.code or "any", *cells, share_text(link.share), _why(link))
@@ -38,7 +44,10 @@ def print_advice(advice: Advice) -> None:
         console.print(title, style="bold", markup=False)
         console.print(table)
         if any("(" in _cell(link, at) for link in advice.links for at in link.three):
-            console.print("in brackets: not heard there, for the reason in the last column or for want of SNR")
+            said = (
+                "in brackets: not heard there; below 0 dB it is too weak, above it is for the reason in the last column"
+            )
+            console.print(said, soft_wrap=True)
     for line in advice.remedies:
         console.print(line, markup=False, soft_wrap=True)
     console.print(f"to trace {advice.costs[0].walls} walls: {'; '.join(map(cost_words, advice.costs))}", soft_wrap=True)
@@ -87,6 +96,15 @@ def _cell(link: LandmarkLink, at: int) -> str:
 
 
 def _why(link: LandmarkLink) -> str:
-    """Report's cell of the table of advice: the most frequent reason why a landmark is not detected; empty if it is."""
+    """Report's cell of the table of advice: the most frequent reason why a landmark is not detected, none if it is
+    heard; and why it is not at each of the three places where it is loud enough all the same."""
     said = [reason for reason in link.reason if reason]
-    return "" if detection_label(link) == "heard" or not said else max(said, key=said.count)
+    usual = "" if detection_label(link) == "heard" or not said else max(said, key=said.count)
+    places: dict[str, list[str]] = {}
+    for name, at in zip(PLACES, link.three, strict=True):
+        if _cell(link, at).startswith("(+"):
+            places.setdefault(link.reason[at] or UNSAID.get(link.code, WEAKENED), []).append(name)
+    if len(places) == 1 and (usual in places or len(next(iter(places.values()))) == len(PLACES)):
+        return next(iter(places))
+    first = [usual] if usual and usual not in places else []
+    return "; ".join([*first, *(f"{', '.join(at)}: {why}" for why, at in places.items())])

@@ -10,8 +10,9 @@ from rislam_rt.arrays import Booleans
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
-from rislam_rt.pipeline.scores.loss_causes import words_of_loss
+from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
 from rislam_rt.pipeline.scores.summary import landmark_track
+from rislam_rt.pipeline.scores.wall_scores import found_of_heard
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.slam.step_info import StepOutcome
 
@@ -32,7 +33,8 @@ class Conclusions(NamedTuple):
     missing: dict[str, list[str]]
     """Landmarks that each scheme did not map, and why, by name."""
     lost: dict[str, list[str]]
-    """When and why each scheme's filter held itself for lost, by name; empty where it never was."""
+    """When and why each scheme's filter held itself for lost, or that it diverged without noticing, by name; empty
+    without either."""
 
 
 def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
@@ -50,8 +52,8 @@ def _headline(schemes: Mapping[str, Any]) -> str:
     """Headline of a run's conclusions: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random ...`"""
     parts = [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in schemes.items()]
     text = f"The agent is off by {', '.join(parts)} (RMSE)"
-    lost = [_words(name) for name, scores in schemes.items() if scores["diverged"]]
-    return text + (f"; lost with {', '.join(lost)}." if lost else ".")
+    diverged = [_words(name) for name, scores in schemes.items() if scores["diverged"]]
+    return text + (f"; diverged with {', '.join(diverged)}." if diverged else ".")
 
 
 def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> str:
@@ -65,9 +67,8 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
         parts.append(f"{name} not found" if found is None else f"{name} found after {found:.1f} s")
     names = [name for name in scores["landmarks"] if "cycles_identified" not in scores["landmarks"][name]]
     held = sum(scores["landmarks"][name]["final_m"] is not None for name in names)
-    walls = [wall for wall in scores["walls"].values() if wall["bound_deg"] is not None]
     parts.append(f"{held} of {len(names)} scatterers")
-    parts.append(f"{sum(wall['angle_deg'] is not None for wall in walls)} of {len(walls)} walls that were heard")
+    parts.append(f"{found_of_heard(scores['walls'])} walls that were heard")
     return "; ".join(parts)
 
 
@@ -98,8 +99,8 @@ def _lost(scores: Mapping[str, Any]) -> Iterator[str]:
     if lost["times"]:
         often = "once, after" if lost["times"] == 1 else f"{lost['times']} times, first after"
         yield f"held itself for lost {often} {lost['first_s']:.1f} s: {words_of_loss(lost)}"
-    elif scores["diverged"]:
-        yield "lost without noticing: nothing that it heard spoke against its map and its motion"
+    elif is_unnoticed(scores):
+        yield UNNOTICED
 
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:

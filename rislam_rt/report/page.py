@@ -10,6 +10,8 @@ import numpy as np
 
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.pipeline.scores.summary import DIVERGED, FAR_OVER
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import judge_run
@@ -131,13 +133,16 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
 <h2>RMSE</h2>
 <div class="scroll"><table><tr><th></th>{head}</tr>{rows}</table></div>
 <p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).
-Path aligned: the estimated path shifted and turned onto the true one, which takes out what the agent was told wrong
-of its start (within {100.0 * result.config["start"]["position_std_m"]:.3g} cm an axis), which no measurement can mend.
-Walls, at the end: distance of the estimated plane over the true surface, and the angle between them. The bound is the
+Relative to its start: without what the agent was told wrong of it
+(within {100.0 * result.config["start"]["position_std_m"]:.3g} cm an axis), which no measurement can mend. Path aligned:
+the estimated path shifted and turned onto the true one.
+Walls, at the end: distance of the estimated plane over the true surface, and the angle between them; those in one
+plane are one, and heard is one over which a path was loud enough for {HEARD:g} s in all. The bound is the
 posterior bound of the same motion, codes and noise with landmarks and walls unknown. GOSPA is of the last map's points,
 cut off at 1 m. Association: of the components taken for a landmark or wall, how many rightly (precision); of those
 that came from one, how many were taken for it (recall). Budget: the settings <code>budget.*</code>, against the mean
-time of each step on this machine.</p>
+time of each step on this machine. Diverged, by the truth: once off by more than {DIVERGED:g} m and {FAR_OVER:g}
+bounds; without noticing, if the filter, which knows no truth, never held itself for lost.</p>
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
 <code>rislam-rt run config.toml</code> in this folder does it again: all settings are there, the room in

@@ -8,9 +8,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
-from rislam_rt.input_messages import share_text
+from rislam_rt.input_messages import counted, share_text
 from rislam_rt.model import PathKind, Paths, Scene
-from rislam_rt.pipeline.scores.loss_causes import words_of_loss
+from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
+from rislam_rt.pipeline.scores.wall_scores import PlaneScore, found_of_heard, plane_scores
 from rislam_rt.shipped import short_names
 
 if TYPE_CHECKING:
@@ -34,32 +36,61 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the terminal table of a run's scores: label, then one cell for each scheme."""
     schemes = list(summary["schemes"].values())
     first = schemes[0]
-    aligned = [s["rmse_aligned_m"] for s in schemes]
-    known = ("bound_m", "rmse_m")  # the paths tell anything of it, or something was made of it
-    heard = [wall for wall in first["walls"] if any(s["walls"][wall][k] is not None for s in schemes for k in known)]
+    relative, aligned = ([s[key] for s in schemes] for key in ("relative_rmse_m", "rmse_aligned_m"))
     rows = [
         ["agent", *(_metres(s["rmse_m"]) for s in schemes)],
+        ["agent, relative to its start", *("-" if error is None else _metres(error) for error in relative)],
         ["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)],
         *(
             [f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)]
             for name in first["landmarks"]
         ),
-        *([f"wall {name}", *(_wall(s["walls"][name]) for s in schemes)] for name in heard),
+        *_wall_rows(schemes),
     ]
-    if len(first["walls"]) > len(heard):
-        rows.append([f"{len(first['walls']) - len(heard)} walls", *("not heard" for _ in schemes)])
     shares = [[share_text(s["association"][name]) for name in ("precision", "recall")] for s in schemes]
     rows += [
         ["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)],
         ["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)],
         ["association: precision, recall", *map(", ".join, shares)],
         ["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)],
-        ["diverged", *("yes" if s["diverged"] else "no" for s in schemes)],
+        ["diverged", *(_diverged(s) for s in schemes)],
         ["held itself for lost", *(_said(s["outcomes"]) for s in schemes)],
     ]
     if any(s["lost"]["times"] for s in schemes):
         rows.append(["because", *(words_of_loss(s["lost"]) if s["lost"]["times"] else "-" for s in schemes)])
     return rows
+
+
+def _wall_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Rows of a terminal table: how many walls each scheme found of those heard for `HEARD` seconds, and ghosts; each
+    wall that was heard or found; how many there are else. Walls in one plane are one."""
+    found = [f"{found_of_heard(s['walls'])}{_ghosts(s['ghost_walls'])}" for s in schemes]
+    rows, others = [["walls found of those heard", *found]], 0
+    for planes in zip(*(plane_scores(s["walls"]) for s in schemes), strict=True):
+        if not any(plane.heard or plane.found for plane in planes):
+            others += 1
+            continue
+        first, *more = planes[0].names
+        rows.append([f"wall {first}{f' (+{len(more)} in its plane)' if more else ''}", *map(_wall, planes)])
+    return rows + (
+        [[counted(others, "other wall"), *(f"not heard for {HEARD:g} s" for _ in schemes)]] if others else []
+    )
+
+
+def _ghosts(count: int) -> str:
+    """Part of a cell of a terminal table: how many ghost walls there are, empty without any."""
+    return f", {counted(count, 'ghost')}" if count else ""
+
+
+def unnoticed_lines(summary: Mapping[str, Any]) -> list[str]:
+    """Lines below the terminal table of a run, one for each scheme that diverged without noticing."""
+    found = ((name, scores) for name, scores in summary["schemes"].items() if is_unnoticed(scores))
+    return [f"{name}: {UNNOTICED}; off by up to {_metres(scores['largest_m'])}" for name, scores in found]
+
+
+def _diverged(scores: Mapping[str, Any]) -> str:
+    """Cell of a terminal table: whether a scheme diverged by the truth, and whether it noticed."""
+    return "yes, without noticing" if is_unnoticed(scores) else "yes" if scores["diverged"] else "no"
 
 
 def _said(outcomes: Mapping[str, int]) -> str:
@@ -227,9 +258,11 @@ def _metres(value: float | None) -> str:
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
 
 
-def _wall(score: Mapping[str, Any]) -> str:
+def _wall(plane: PlaneScore) -> str:
     """Cell of a terminal table: distance and angle error of a wall."""
-    return "not found" if score["rmse_m"] is None else f"{_metres(score['rmse_m'])}, {score['angle_deg']:.1f}°"
+    if not plane.found:
+        return "not heard" if plane.heard is False else "not found"
+    return f"{_metres(plane.wall['rmse_m'])}, {plane.wall['angle_deg']:.1f}°"
 
 
 def _point(point: "Floats") -> str:

@@ -20,7 +20,7 @@ from rislam_rt.scene.check.units import (
     recording_unit_warnings,
     unit_warnings,
 )
-from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors
+from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors, warning_at
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
 from rislam_rt.scene.scene_folder import scene_file
@@ -78,7 +78,7 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
     draft = read_draft(scene)
     findings = draft.findings
     if draft.scene is not None:
-        findings = _check_read(draft.scene, draft.file, draft.start_key, radio)
+        findings = findings + _check_read(draft.scene, draft.file, draft.start_key, radio)
     units = _unit_findings(draft)
     if any(finding.severity == "error" for finding in findings):
         return findings + units
@@ -162,7 +162,15 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     ris = join_panels(tuple(panels))
     digest = _digest(content, mesh_files.contents)
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
-    return SceneDraft(str(file), scene, [], bounds, _start_key(spec.agent))
+    return SceneDraft(str(file), scene, _idle_keys(spec.agent, str(file)), bounds, _start_key(spec.agent))
+
+
+def _idle_keys(agent: AgentSection, file: str) -> list[Finding]:
+    """Warnings of keys of the agent's section that change nothing in the scene to load."""
+    if agent.turn_deg_s is None or any((agent.halt_s or [])[1:-1]):
+        return []
+    message = "it changes nothing without a halt between the ends, where the agent would turn on the spot"
+    return [warning_at(file, "agent.turn_deg_s", message, "give one in 'halt_s', or leave it out")]
 
 
 def _start_key(agent: AgentSection) -> str:

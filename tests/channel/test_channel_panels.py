@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.channel.image_source import ImageSourceChannel
-from rislam_rt.model import PathKind, RadioConfig, RisCode
+from rislam_rt.channel.walls import build_walls
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import PathKind, RadioConfig, Reflector, RisCode
 
 RADIO = RadioConfig()
 
@@ -39,3 +41,26 @@ def test_each_panel_has_the_paths_that_it_has_alone(rooms):
             assert paths.panel[here] == (number if over else -1)
             met += over
     assert met == np.sum(paths.panel >= 0) > 3
+
+
+def test_a_panel_before_its_host_has_the_paths_of_one_on_it(rooms):
+    """Over the same walls: of the host's own bounces next to it none more comes in, whatever its distance."""
+    poses = rooms.at([[1.0, 1.2, 0.8], [4.0, 3.0, 1.0]])
+    flat, before = (
+        ImageSourceChannel(rooms.paper(center=(3.0, 3.0, height)), RADIO, 2).paths(poses) for height in (3.0, 2.97)
+    )
+    assert by_identity(before).keys() == by_identity(flat).keys()
+    column = int(np.flatnonzero(before.kind == PathKind.RIS)[0])
+    center = np.array([3.0, 3.0, 2.97])
+    length = sum(np.linalg.norm(end - center, axis=1) for end in (poses.tx, poses.rx))
+    np.testing.assert_allclose(before.tau[:, column] * SPEED_OF_LIGHT, length, rtol=1e-12)
+
+
+def test_the_wall_behind_a_panel_is_one_that_lies_as_it_does(rooms):
+    """A step in the ceiling, of one mesh: its side passes nearer by the panel, 3 cm below, than the ceiling does."""
+    corners = [(0, 0, 3), (3.01, 0, 3), (3.01, 6, 3), (0, 6, 3), (3.01, 0, 3.5), (3.01, 6, 3.5)]
+    faces = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]])
+    ceiling = Reflector("ceiling", np.array(corners, dtype=float), faces, rooms.paper().reflectors[0].material)
+    others = [one for one in rooms.paper().reflectors if one.name != "ceiling"]
+    walls = build_walls(rooms.scene([*others, ceiling], ris=rooms.panel(center=(3.0, 3.0, 2.97))))
+    np.testing.assert_allclose(np.abs(walls.normal[walls.hosts[0]]), [0.0, 0.0, 1.0])

@@ -94,6 +94,31 @@ def test_a_trace_is_written_for_deepmimo(run, tmp_path):
     assert run(*words)[0] == 2
 
 
+def test_a_room_without_a_panel_runs_without_the_default_schemes_that_need_one(run, tmp_path):
+    """But not where the user named them, on the command line or in a file."""
+    room, named = ("--scene", ROOT / "scenes" / "empty_box", "--no-report"), 'schemes=["random"]'
+    code, out, _ = run("run", PIPELINE, *SHORT, *room, "--json", "run.json")
+    assert code == 0
+    assert out.startswith("scene 'empty_box' has no panel, which optimized, random need: no_ris alone\n")
+    assert list(json.loads((tmp_path / "run.json").read_text())["schemes"]) == ["no_ris"]
+    assert "complete already" in run("run", PIPELINE, *SHORT, *room)[1]
+    code, _, err = run("run", PIPELINE, *SHORT, *room, "--set", named)
+    assert code == 2
+    assert "schemes: 'random' needs a panel" in err
+    (tmp_path / "mine.toml").write_text(f'name = "mine"\n{named}\n')
+    assert run("run", "mine.toml", *SHORT, *room)[0] == 2
+
+
+def test_a_panels_delay_spread_is_warned_of_once(run):
+    """By the run, of the motion that it drew; not by the check of the scene as well. Without a panel by nobody."""
+    wide = ("--set", "radio.bandwidth_ghz=5", "--set", 'schemes=["random", "no_ris"]', "--no-report")
+    words = "delays over the panel spread by up to"
+    code, _, err = run("run", PIPELINE, *SHORT, *wide)
+    assert code == 0
+    assert err.count(words) == 1
+    assert words not in run("run", PIPELINE, *SHORT, *wide, "--set", 'schemes=["no_ris"]')[2]
+
+
 def test_run_report_and_json(run, tmp_path, monkeypatch):
     one = ("--set", 'schemes=["random"]')
     code, out, _ = run("run", PIPELINE, *SHORT, *one, "--json", "run.json", "--out", "mine")

@@ -24,7 +24,7 @@ def test_the_page_begins_with_the_error_of_every_scheme(result):
 def test_a_lost_scheme_is_named(result):
     summary = summarise(result)
     summary["schemes"]["random"]["diverged"] = True
-    assert judge_run(result, summary).headline.endswith("lost with random codes.")
+    assert judge_run(result, summary).headline.endswith("diverged with random codes.")
 
 
 def test_why_a_scheme_is_lost_is_said(result):
@@ -44,7 +44,7 @@ def test_why_a_scheme_is_lost_is_said(result):
         {"ok": 6},
         True,
     )
-    assert judge_run(result, summary).lost["random"][0].startswith("lost without noticing")
+    assert judge_run(result, summary).lost["random"][0].startswith("diverged without noticing")
 
 
 def test_the_panel_is_found_from_when_it_stays(result):
@@ -92,5 +92,5 @@ def test_a_scheme_that_ends_a_metre_away_is_called_lost(result):
     scheme = result.schemes["random"]
     astray = replace(scheme, position=scheme.position + np.linspace(0.0, 1.0, 6)[:, None] * [0.0, 1.0, 0.0])
     both = replace(result, schemes={**result.schemes, "random": astray})
-    assert judge_run(both, summarise(both)).headline.endswith("lost with random codes.")
-    assert "lost" not in judge_run(result, summarise(result)).headline
+    assert judge_run(both, summarise(both)).headline.endswith("diverged with random codes.")
+    assert "diverged" not in judge_run(result, summarise(result)).headline

@@ -39,6 +39,47 @@ def test_a_margin_in_brackets_is_not_heard_and_the_commonest_reason_is_given(
     assert "up to 10^9 wall sequences" in text
 
 
+@pytest.mark.parametrize(
+    ("code", "reasons", "says"),
+    [
+        (
+            "",
+            ("too weak", "not to be told from VT floor", "too weak"),
+            "too weak; middle: not to be told from VT floor",
+        ),
+        ("", ("beyond the receiver's delays",) * 3, "beyond the receiver's delays"),
+        ("", ("", "", ""), "middle: weakened by paths that come in with it"),
+        ("aimed", ("too weak", "", "too weak"), "too weak; middle: weakened by paths that come in with it"),
+        ("swept", ("", "", ""), "middle: most beams miss it"),
+        ("random", ("", "", ""), "middle: most codes miss it"),
+    ],
+)
+def test_a_loud_landmark_in_brackets_says_why_in_its_row(
+    code: str,
+    reasons: tuple[str, str, str],
+    says: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    link = LandmarkLink("lamp", code, np.array([-3.0, 14.7, -4.0]), np.array([0.0, 0.2, 0.0]), reasons)
+    print_advice(Advice([link], [], [TraceCost(1, 6, 33, 31, 0.2)], 10.0))
+    text = capsys.readouterr().out
+    row = next(line for line in text.splitlines() if "(+14.7)" in line)
+    assert row.split("│")[-2].strip() == says
+    assert "below 0 dB it is too weak, above it is for the reason in the last column" in text
+
+
+def test_a_place_in_brackets_of_a_landmark_that_is_heard_says_why_too(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    late = ("", "", "beyond the receiver's delays")
+    link = LandmarkLink("ris", "aimed", np.array([26.0, 16.0, 13.2]), np.array([1.0, 1.0, 0.0]), late)
+    print_advice(Advice([link], [], [TraceCost(1, 6, 33, 31, 0.2)], 10.0))
+    assert "end: beyond the receiver's delays" in capsys.readouterr().out
+
+
 def test_a_map_without_any_direct_path_is_drawn_all_the_same(tmp_path: Path) -> None:
     scene = load_scene(ROOT / "scenes" / "paper_room")
     axis = np.linspace(0.0, 6.0, 5)

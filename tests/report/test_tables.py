@@ -1,37 +1,74 @@
-"""Rows of a run's table: every wall that is heard has one, the others share one."""
+"""Rows of a run's table: every wall that is heard or found has one, the others share one."""
 
-from rislam_rt.report.terminal_tables import summary_rows
+from rislam_rt.report.terminal_tables import summary_rows, unnoticed_lines
 
-FOUND = {"rmse_m": 0.01, "angle_deg": 0.1, "bound_m": 0.005}
-MISSED = {"rmse_m": None, "angle_deg": None, "bound_m": 0.02}
-SILENT = {"rmse_m": None, "angle_deg": None, "bound_m": None}
+FOUND = {"rmse_m": 0.01, "angle_deg": 0.1, "bound_m": 0.005, "audible_s": 7.0}
+MISSED = {"rmse_m": None, "angle_deg": None, "bound_m": 0.02, "audible_s": 2.0}
+SILENT = {"rmse_m": None, "angle_deg": None, "bound_m": 0.3, "audible_s": 1.0}
 
 
 def _scheme(**walls):
+    walls = {name: {"plane": number} | wall for number, (name, wall) in enumerate(walls.items())}
     return {
-        "rmse_m": 0.02, "rmse_aligned_m": 0.004, "bound_m": 0.01, "landmarks": {}, "walls": walls,
-        "map": {"gospa_m": 0.1},
+        "rmse_m": 0.02, "rmse_aligned_m": 0.004, "relative_rmse_m": 0.006, "largest_m": 0.03, "bound_m": 0.01,
+        "landmarks": {}, "walls": walls, "map": {"gospa_m": 0.1}, "ghost_walls": 0,
         "association": {"precision": 0.9, "recall": 0.4}, "over_budget": [], "diverged": False, "outcomes": {"ok": 10},
         "lost": {"times": 0, "first_s": None, "causes": {}},
     }  # fmt: skip
 
 
-def test_walls_that_no_path_meets_share_a_row():
-    schemes = {
-        "optimized": _scheme(near=FOUND, far=MISSED, behind=SILENT, above=SILENT),
-        "no_ris": _scheme(near=MISSED, far=SILENT, behind=SILENT, above=SILENT),
-    }
-    rows = [row for row in summary_rows({"schemes": schemes}) if "wall" in row[0]]
-    assert rows == [
+def _wall_rows(**schemes):
+    return [row for row in summary_rows({"schemes": schemes}) if "wall" in row[0]]
+
+
+def test_walls_are_counted_and_those_that_nothing_tells_of_share_a_row():
+    optimized = _scheme(near=FOUND, far=MISSED, behind=SILENT, above=SILENT)
+    no_ris = _scheme(near=MISSED, far=SILENT, behind=SILENT, above=SILENT)
+    assert _wall_rows(optimized=optimized, no_ris=no_ris | {"ghost_walls": 2}) == [
+        ["walls found of those heard", "1 of 2", "0 of 1, 2 ghosts"],
         ["wall near", "1.0 cm, 0.1°", "not found"],
-        ["wall far", "not found", "not found"],
-        ["2 walls", "not heard", "not heard"],
+        ["wall far", "not found", "not heard"],
+        ["2 other walls", "not heard for 2 s", "not heard for 2 s"],
     ]
 
 
+def test_walls_in_one_plane_are_one_and_a_wall_that_was_found_is_shown():
+    """A plane found for one of its walls is found; one found though seldom heard is listed, and not counted."""
+    one = _scheme(floor=MISSED | {"plane": 1}, step=FOUND | {"plane": 1}, near=FOUND, late=FOUND | {"audible_s": 1.0})
+    assert _wall_rows(a=one) == [
+        ["walls found of those heard", "2 of 2"],
+        ["wall floor (+1 in its plane)", "1.0 cm, 0.1°"],
+        ["wall near", "1.0 cm, 0.1°"],
+        ["wall late", "1.0 cm, 0.1°"],
+    ]
+
+
+def test_a_run_in_slices_lists_what_it_found():
+    unasked = {"audible_s": None}
+    walls = _wall_rows(a=_scheme(near=FOUND | unasked, far=MISSED | unasked))
+    assert walls[:2] == [["walls found of those heard", "1"], ["wall near", "1.0 cm, 0.1°"]]
+    assert walls[2][0] == "1 other wall"
+
+
 def test_the_shape_of_the_path_and_what_was_associated_have_rows_of_their_own():
-    one_cycle = _scheme() | {"rmse_aligned_m": None}
+    one_cycle = _scheme() | {"rmse_aligned_m": None, "relative_rmse_m": None}
     table = {label: cells for label, *cells in summary_rows({"schemes": {"a": _scheme(), "b": one_cycle}})}
     assert table["agent, path aligned"] == ["0.4 cm", "-"]
+    assert table["agent, relative to its start"] == ["0.6 cm", "-"]
     assert table["association: precision, recall"] == ["90%, 40%", "90%, 40%"]
     assert table["slower than its budget"] == ["no step", "no step"]
+
+
+def test_a_scheme_that_diverged_without_noticing_is_told_apart_from_one_that_noticed():
+    noticed = {"times": 1, "first_s": 2.0, "causes": {"map": 1}}
+    schemes = {
+        "silent": _scheme() | {"diverged": True, "largest_m": 3.55},
+        "noticed": _scheme() | {"diverged": True, "lost": noticed, "outcomes": {"ok": 9, "diverged": 1}},
+        "good": _scheme(),
+    }
+    table = {label: cells for label, *cells in summary_rows({"schemes": schemes})}
+    assert table["diverged"] == ["yes, without noticing", "yes", "no"]
+    assert table["held itself for lost"] == ["never", "in 1 of 10 cycles", "never"]
+    (line,) = unnoticed_lines({"schemes": schemes})
+    assert line.startswith("silent: diverged without noticing: ")
+    assert line.endswith("off by up to 3.55 m")

@@ -150,7 +150,23 @@ CASES: dict[str, tuple[Change, str, str]] = {
         "below the array, which hears from above only",
     ),
     "panel outside": (lambda s: panel(s, center=[3, 3, 3.1]), "error ris.center", "lies outside"),
-    "panel off its host": (lambda s: panel(s, center=[3, 3, 2.98]), "error ris.center", "20 mm off 'ceiling'"),
+    "panel off its host": (
+        lambda s: panel(s, center=[3, 3, 2.94]),
+        "error ris.center",
+        "60 mm off 'ceiling', and a panel lies on its host, or at most 50 mm before it; give center = [3.0, 3.0, 3.0]",
+    ),
+    "panel behind its host": (
+        lambda s: panel(furnished(s, "shelf", grid([2, 2, 2], [2, 0, 0], [0, 2, 0], 1, 1)), center=[3, 3, 2.01],
+                        host="shelf"),
+        "error ris.center",
+        "10 mm off 'shelf'",
+    ),
+    "panel before its host and beside it": (
+        lambda s: panel(furnished(s, "shelf", grid([1, 1, 2], [1, 0, 0], [0, 1, 0], 1, 1)), center=[3, 3, 1.98],
+                        host="shelf"),
+        "error ris.center",
+        "beside 'shelf', in its plane; move the panel onto its host",
+    ),
     "panel beside its host": (
         lambda s: panel(furnished(s, "shelf", grid([1, 1, 2], [1, 0, 0], [0, 1, 0], 1, 1)), center=[3, 3, 2],
                         host="shelf"),

@@ -51,6 +51,13 @@ def test_a_bad_second_panel_is_named(damaged: Damage, keys: dict[str, object], s
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("before", [0.0, 0.01, 0.05])
+def test_a_panel_may_hang_a_little_before_its_host(damaged: Damage, before: float) -> None:
+    """And it stays where the file says."""
+    scene = load_scene(damaged("center = [3.0, 3.0, 3.0]", f"center = [3.0, 3.0, {3.0 - before}]"))
+    np.testing.assert_array_equal(scene.panels[0].center, [3.0, 3.0, 3.0 - before])
+
+
 def test_panels_overlap_where_they_share_a_piece_of_plane() -> None:
     scene = load_scene(find_room("two_panels"))
     one = scene.panels[0]

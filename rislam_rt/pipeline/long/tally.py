@@ -15,7 +15,14 @@ from rislam_rt.model import NOTHING, STEPS, Scene
 from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
 from rislam_rt.pipeline.scores.loss_causes import LossTally
-from rislam_rt.pipeline.scores.summary import has_diverged, landmark_track, map_score, nees_per_dof, over_budget
+from rislam_rt.pipeline.scores.summary import (
+    has_diverged,
+    landmark_track,
+    map_score,
+    nees_per_dof,
+    over_budget,
+    relative_errors,
+)
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
 
 CLUTTER = None
@@ -28,6 +35,8 @@ class Tally:
         self.scene, self.budget, self.use_vt = scene, budget, use_vt
         self.planes = true_planes(scene)
         self.cycles, self.square, self.largest, self.final = 0, 0.0, 0.0, 0.0
+        self.relative: float | None = 0.0
+        self.begin: Floats | None = None
         self.diverged = False
         self.nees: list[float] | None = [0.0]
         self.outcomes: Counter[str] = Counter()
@@ -55,6 +64,12 @@ class Tally:
         self.square += float(np.sum(errors**2))
         self.largest, self.final = max(self.largest, float(errors.max())), float(errors[-1])
         self.diverged |= has_diverged(errors, None)
+        self.begin = truth[0].copy() if self.begin is None else self.begin
+        relative = relative_errors(scheme, truth, self.begin)
+        if relative is None or self.relative is None:
+            self.relative = None
+        else:
+            self.relative += float(np.sum(relative**2))
         squares = nees_per_dof(scheme, truth)
         if squares is None or self.nees is None:
             self.nees = None
@@ -80,6 +95,7 @@ class Tally:
             "over_bound": None,
             "final_m": self.final,
             "largest_m": self.largest,
+            "relative_rmse_m": None if self.relative is None else float(np.sqrt(self.relative / self.cycles)),
             "rmse_aligned_m": self.overlap.rmse() if self.cycles > 1 else None,
             "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
             "diverged": self.diverged,

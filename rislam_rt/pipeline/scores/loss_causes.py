@@ -16,6 +16,8 @@ WORDS = {
     LossCause.RESTART: "it began anew with an empty map",
 }
 """Causes of loss in plain words."""
+UNNOTICED = "diverged without noticing: nothing that it heard spoke against its map and its motion"
+"""What is said of a run that diverged by the truth, and whose estimator never held itself for lost."""
 
 
 class LossTally:
@@ -44,6 +46,12 @@ class LossTally:
         first = None if self.first is None else self.first - start
         causes = {cause.name.lower(): count for cause, count in self.causes.most_common()}
         return {"times": self.causes.total(), "first_s": first, "causes": causes}
+
+
+def is_unnoticed(scores: Mapping[str, Any]) -> bool:
+    """Whether a scheme of a run, by its scores, diverged without noticing: it never held itself for lost, so that no
+    cause of loss is known."""
+    return bool(scores["diverged"]) and not scores["lost"]["times"]
 
 
 def words_of_loss(lost: Mapping[str, Any]) -> str:

@@ -56,6 +56,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     least = scheme_bound(result.scene, result.paths, scheme.gain, scheme.scheme, result.config) if known else None
     limit = least.agent if least else None
     error, bound = evaluate.root_mean_square(errors), None if limit is None else evaluate.root_mean_square(limit)
+    relative = relative_errors(scheme, truth, truth[0])
     squares = nees_per_dof(scheme, truth)
     nees = None if squares is None else float(np.mean(squares))
     largest = float(errors.max())
@@ -72,6 +73,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "over_bound": error / bound if bound else None,
         "final_m": float(errors[-1]),
         "largest_m": largest,
+        "relative_rmse_m": None if relative is None else evaluate.root_mean_square(relative),
         "rmse_aligned_m": evaluate.rmse(evaluate.align(scheme.position, truth), truth) if len(truth) > 1 else None,
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
         "diverged": has_diverged(errors, limit),
@@ -93,6 +95,14 @@ def loss_scores(scheme: SchemeResult) -> dict[str, Any]:
     tally = LossTally()
     tally.add(scheme.time, scheme.outcome, scheme.info.get("cause"))
     return tally.scores(float(scheme.time[0]))
+
+
+def relative_errors(scheme: SchemeResult, truth: Floats, begin: Floats) -> Floats | None:
+    """Errors (K,) [m] relative to the start, for a score: without the error of the position that the estimator was
+    told at the true start `begin` (3,), which no measurement in an unknown room reduces; None where it is not known."""
+    if scheme.start_position is None:
+        return None
+    return evaluate.position_errors(scheme.position - truth, scheme.start_position - begin)
 
 
 def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:

@@ -1,7 +1,8 @@
 """Scores of walls: matches estimated planes with true walls, and measures their distance and angle."""
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.evaluate import Surfaces, ghost_planes, match_planes, plane_angle, plane_distance
 from rislam_rt.model import MapEstimate, Paths, Scene
-from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes, audible_seconds
+from rislam_rt.pipeline.scores.audible_paths import HEARD, audible_paths, audible_planes, audible_seconds
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
@@ -22,8 +23,8 @@ def wall_scores(
 
     Besides, the map's own standard deviation of the angle (both tilts together), and the bounds of angle and offset.
     A wall that reflects no path cannot be found: it has no bound, and no plane is matched with it. Coplanar walls are
-    one: the plane matched with one of them is matched with all that reflect a path. `audible_s` (W,) [s] is how long in
-    all a path over the wall's plane was above the detection threshold.
+    one: the plane matched with one of them is matched with all that reflect a path, and `plane` is the number that they
+    share. `audible_s` (W,) [s] is how long in all a path over the wall's plane was above the detection threshold.
     """
     walls = build_walls(scene)
     group, alone = coplanar(walls), wall_surfaces(walls, np.arange(len(walls)))
@@ -44,8 +45,48 @@ def wall_scores(
             "bound_deg": float(np.degrees(bound.angle)) if bound else None,
             "bound_m": bound.distance if bound else None,
             "audible_s": None if audible_s is None else float(audible_s[number]),
+            "plane": int(group[number]),
         }
     return scores
+
+
+class PlaneScore(NamedTuple):
+    """Score of the walls in one plane, which are one."""
+
+    names: list[str]
+    """Names of the walls, in the order of the scene."""
+    wall: Mapping[str, Any]
+    """Scores of the first of them that was found, or of the first."""
+    heard: bool | None
+    """Whether a path over the plane was audible for `HEARD` seconds, so that it counts as one to be found; None in runs
+    in slices, which do not ask for that."""
+
+    @property
+    def found(self) -> bool:
+        """Whether the scheme's last map has the plane."""
+        return self.wall["rmse_m"] is not None
+
+
+def plane_scores(walls: Mapping[str, Mapping[str, Any]]) -> list[PlaneScore]:
+    """Scores of walls by name, plane by plane, in the order of the scene: what `score_run` counts as one wall."""
+    planes: dict[int, list[str]] = {}
+    for name, wall in walls.items():
+        planes.setdefault(wall["plane"], []).append(name)
+    scores = []
+    for names in planes.values():
+        best = next((walls[name] for name in names if walls[name]["rmse_m"] is not None), walls[names[0]])
+        seconds = best["audible_s"]
+        scores.append(PlaneScore(names, best, None if seconds is None else bool(seconds >= HEARD - 1e-9)))
+    return scores
+
+
+def found_of_heard(walls: Mapping[str, Mapping[str, Any]]) -> str:
+    """Score of a scheme's walls in words: how many it found of those heard, `7 of 9`; `7` where that is not known."""
+    planes = plane_scores(walls)
+    found = sum(plane.found and plane.heard is not False for plane in planes)
+    if any(plane.heard is None for plane in planes):
+        return str(found)
+    return f"{found} of {sum(bool(plane.heard) for plane in planes)}"
 
 
 def seconds_audible(scene: Scene, paths: Paths, settings: Settings, gain: Any, *, use_vt: bool) -> Floats:

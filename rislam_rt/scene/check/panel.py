@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from rislam_rt.arrays import cross
+from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.triangles import triangle_planes
 from rislam_rt.model import RadioConfig, RisPanel
@@ -16,6 +16,8 @@ from rislam_rt.scene.findings import Finding, error_at, panel_key, warning_at
 
 MAX_TURN = 1e-2
 """Largest angle [rad] between the normals of a RIS panel and of its host."""
+THICKEST = 0.05
+"""Largest distance [m] of a RIS panel before its host: its own thickness and its mount, a board on studs or rails."""
 
 
 def panel_errors(room: TriangleArray) -> Iterator[Finding]:
@@ -61,7 +63,7 @@ def _overlap(one: RisPanel, other: RisPanel) -> bool:
     """Scene check: whether two RIS panels overlap, that is look the same way from one plane, and no axis of either
     separates them."""
     gap = other.center - one.center
-    if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > MIN_CLEARANCE:
+    if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > THICKEST:
         return False
     specs = (one.spec, other.spec)
     halves = [0.5 * spec.spacing * [spec.cols, spec.rows] * np.stack([spec.right, spec.up]).T for spec in specs]
@@ -99,7 +101,8 @@ def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Fin
 
 
 def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """Scene check: errors of a RIS panel that does not lie flat on the wall that is named as its host."""
+    """Scene check: errors of a RIS panel that does not lie flat on the wall that is named as its host, or just before
+    it."""
     names = [r.name for r in room.scene.reflectors]
     _, near = touching(panel.center[None], room.triangles, MIN_CLEARANCE)
     behind = sorted({room.name(int(t)) for t in near})
@@ -113,26 +116,42 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
             room.file, f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}"
         )
         return
-    if panel.host not in behind:
-        gap = _gap(room, panel)
-        message = f"{panel.center.tolist()} is {gap * 1e3:.3g} mm off '{panel.host}'" if gap > MIN_CLEARANCE else (
-            f"{panel.center.tolist()} lies beside '{panel.host}', in its plane"
-        )  # fmt: skip
-        yield error_at(room.file, f"{key}.center", message, "move the panel onto its host")
+    triangles = room.triangles[room.owner == names.index(panel.host)]
+    hung = _hung(triangles, panel)
+    if not len(hung):
+        yield error_at(room.file, f"{key}.center", *_off_host(triangles, panel))
         return
-    normal, _ = triangle_planes(room.triangles[[t for t in near if room.name(int(t)) == panel.host]])
-    turn = np.linalg.norm(cross(normal, panel.spec.normal), axis=-1).min()
+    turn = np.linalg.norm(cross(triangle_planes(triangles[hung])[0], panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
         message = f"{angle:.2f} degrees from the normal of '{panel.host}'"
         yield error_at(room.file, f"{key}.normal", message, "lay it flat on its host")
 
 
-def _gap(room: TriangleArray, panel: RisPanel) -> float:
-    """Distance [m] of a RIS panel from the nearest plane of its host."""
-    host = [r.name for r in room.scene.reflectors].index(panel.host or "")
-    normal, offset = triangle_planes(room.triangles[room.owner == host])
-    return float(np.abs(normal @ panel.center - offset).min())
+def _hung(triangles: Floats, panel: RisPanel) -> Integers:
+    """Numbers of its host's triangles (T, 3, 3) that a RIS panel lies on, or hangs before by at most `THICKEST`."""
+    normal, offset = triangle_planes(triangles)
+    height = normal @ panel.center - offset
+    before = height * np.copysign(1.0, normal @ panel.spec.normal)
+    near = np.flatnonzero((before >= -MIN_CLEARANCE) & (before <= THICKEST))
+    feet = panel.center - height[near, None] * normal[near]
+    on = [len(touching(foot[None], triangles[t][None], MIN_CLEARANCE)[0]) for foot, t in zip(feet, near, strict=True)]
+    return near[np.array(on, dtype=np.int64) > 0]
+
+
+def _off_host(triangles: Floats, panel: RisPanel) -> tuple[str, str]:
+    """Message that a RIS panel is off its host of these triangles (T, 3, 3), and how to mend it: the center to give,
+    if there is one in the plane that is nearest."""
+    normal, offset = triangle_planes(triangles)
+    height = normal @ panel.center - offset
+    nearest = int(np.argmin(np.abs(height)))
+    foot, gap = panel.center - height[nearest] * normal[nearest], float(abs(height[nearest]))
+    beside = not len(touching(foot[None], triangles, MIN_CLEARANCE)[0])
+    if gap <= MIN_CLEARANCE or (beside and gap <= THICKEST):
+        return f"{panel.center.tolist()} lies beside '{panel.host}', in its plane", "move the panel onto its host"
+    mend = "move the panel onto its host" if beside else f"give center = {(np.round(foot, 6) + 0.0).tolist()}"
+    far = f"{panel.center.tolist()} is {gap * 1e3:.3g} mm off '{panel.host}'"
+    return f"{far}, and a panel lies on its host, or at most {THICKEST * 1e3:g} mm before it", mend
 
 
 def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:

@@ -105,6 +105,20 @@ def test_summary_is_plain_and_complete(short_result):
         assert scheme["diverged"] is False
 
 
+def test_the_relative_error_is_without_that_of_the_start(short_result):
+    """The whole way told 3 cm to the side: the relative error is what it was. Not known where the start is not."""
+    shift, scheme = np.array([0.03, 0.0, 0.0]), short_result.schemes["random"]
+    moved = replace(scheme, position=scheme.position + shift, start_position=scheme.start_position + shift)
+    told = moved.start_position - short_result.scene.agent.position[0]
+    expected = np.linalg.norm(moved.position - short_result.scene.agent.position - told, axis=1)
+    summary = {}
+    for name, one in (("here", scheme), ("there", moved), ("unknown", replace(scheme, start_position=None))):
+        summary[name] = summarise(replace(short_result, schemes={"random": one}))["schemes"]["random"]
+    assert summary["there"]["relative_rmse_m"] == pytest.approx(np.sqrt(np.mean(expected**2)))
+    assert summary["there"]["relative_rmse_m"] == pytest.approx(summary["here"]["relative_rmse_m"])
+    assert summary["unknown"]["relative_rmse_m"] is None
+
+
 def test_steps_over_budget_are_named():
     seconds = {"optimise": 0.2, "communicate": 0.0, "measure": 0.01, "localise": 0.02}
     budget = {"optimise_s": 0.1, "communicate_s": 0.1, "measure_s": 0.1, "localise_s": 0.01}

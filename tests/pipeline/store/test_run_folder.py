@@ -16,6 +16,7 @@ from rislam_rt.errors import ConfigError, ResultError, StoreError
 from rislam_rt.model import MapEstimate, SchemeResult
 from rislam_rt.pipeline.run_datasets import (
     MAP,
+    OPTIONAL,
     PATHS,
     SCHEME,
     check_dataset,
@@ -78,8 +79,8 @@ def test_reads_back_to_the_last_bit(stored, short_result):
 
 
 def test_every_array_of_a_result_is_stored():
-    other = {"scheme", "levels", "info", "outcome", "map", "given", "smoothed"}
-    assert {f.name for f in fields(SchemeResult)} - other == set(SCHEME)
+    other = {"scheme", "levels", "info", "outcome", "map", "given"}
+    assert {f.name for f in fields(SchemeResult)} - other == {*SCHEME, *OPTIONAL}
     assert {f.name for f in fields(MapEstimate)} == set(MAP)
 
 
@@ -192,6 +193,14 @@ def test_hindsight_comes_back_if_there_is_any(short_result):
     looked_back = replace(scheme, smoothed=scheme.position + 0.1)
     found = dataset_to_scheme(scheme_to_dataset(looked_back)).smoothed
     np.testing.assert_array_equal(found, looked_back.smoothed)
+
+
+def test_the_start_that_was_told_comes_back(short_result):
+    """It decides the error relative to the start, which is scored anew from the files."""
+    scheme = short_result.schemes["random"]
+    np.testing.assert_array_equal(scheme.start_position, scheme.given.inputs.start.position)
+    np.testing.assert_array_equal(dataset_to_scheme(scheme_to_dataset(scheme)).start_position, scheme.start_position)
+    assert dataset_to_scheme(scheme_to_dataset(replace(scheme, start_position=None))).start_position is None
 
 
 def test_a_stopped_run_goes_on(begun, identity, short_result):

@@ -163,7 +163,6 @@ def test_a_room_with_halts_passes_its_check(folder: Callable[[str], Path]) -> No
         (CORNER + "heading = 0.5", "agent.heading: unknown key; did you mean 'heading_deg'?"),
         (CORNER + "heading_deg = 400", "agent.heading_deg: 400 received; give at most 360 degrees"),
         (CORNER + "turn_deg_s = 0", "agent.turn_deg_s: 0 received; give more than 0 degrees/s"),
-        (CORNER + "turn_deg_s = 90", "agent: 'turn_deg_s' means nothing without a halt between the ends; give one"),
         (CORNER + "halt_s = [0, 1, 0]\nturn_deg_s = 9\nheading_deg = 1", "with the fixed 'heading_deg'; leave one"),
         (
             CORNER + "halt_s = [0, 1, 0]\nturn_deg_s = 45",
@@ -187,6 +186,20 @@ def test_bad_halts_and_headings_are_one_line(folder: Callable[[str], Path], moti
     (line,) = caught.value.lines
     assert says in line
     assert "scene.toml: agent" in line
+
+
+@pytest.mark.parametrize("halts", ["", "halt_s = [1, 0, 1]\n"])
+def test_a_turn_without_a_halt_is_a_warning_and_changes_nothing(folder: Callable[[str], Path], halts: str) -> None:
+    room = folder(f"speed_m_s = 0.5\n{CORNER}{halts}turn_deg_s = 90")
+    (said,) = [finding for finding in check_scene(room) if finding.field == "agent.turn_deg_s"]
+    assert said.severity == "warning"
+    assert "changes nothing without a halt between the ends" in said.line
+    turned, file = load_scene(room).agent, room / "scene.toml"
+    file.write_text(file.read_text().replace("turn_deg_s = 90", ""))
+    plain = load_scene(room).agent
+    assert not [finding for finding in check_scene(room) if finding.field == "agent.turn_deg_s"]
+    np.testing.assert_array_equal(turned.position, plain.position)
+    np.testing.assert_array_equal(turned.heading, plain.heading)
 
 
 @pytest.mark.parametrize("key", ["halt_s = [1, 1]", "from_rest = true", "heading_deg = 5", "turn_deg_s = 5"])

@@ -1,0 +1,70 @@
+"""Late paths of a room are named once, with a setting that makes them heard; small rooms have none."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rislam_rt.adviser.late_paths import late_path_warnings
+from rislam_rt.adviser.link_budget import survey
+from rislam_rt.cli.app import app
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
+from rislam_rt.scene import load_scene
+
+ROOT = Path(__file__).parents[2]
+HALL, PAPER = (ROOT / "scenes" / name for name in ("large_hall", "paper_room"))
+
+
+def lines(room: Path, *changed: str) -> list[str]:
+    settings = build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
+    return [finding.line for finding in late_path_warnings(survey(load_scene(room), settings), "scene.toml")]
+
+
+def advised(line: str) -> list[str]:
+    """The settings that a warning asks for."""
+    said = line.partition("; give ")[2].partition(" (")[0]
+    return [part.replace(" = ", "=") for part in said.split(" and ")]
+
+
+@pytest.mark.parametrize("changed", [(), ("receiver.num_subcarriers=128",), ("receiver.estimator=bound",)])
+def test_a_hall_is_named_once_and_what_is_advised_mends_it(changed: tuple[str, ...]) -> None:
+    (line,) = lines(HALL, *changed)
+    assert line.startswith("scene.toml: receiver.max_delay: ")
+    assert "after 80 ns (24 m of path)" in line
+    assert "returns of 'wall" in line
+    assert ("as if they were shorter" in line) == ("receiver.estimator=bound" not in changed)
+    assert ("receiver.num_subcarriers=0" in advised(line)) == ("receiver.num_subcarriers=128" in changed)
+    assert lines(HALL, *changed, *advised(line)) == []
+
+
+def test_the_sounding_that_is_advised_repeats_after_all_that_is_heard() -> None:
+    (line,) = lines(HALL)
+    settings = build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", advised(line)))
+    looked = survey(load_scene(HALL), settings)
+    loud = looked.paths.valid & (settings.radio.integrated_snr(looked.paths.gain) >= settings.sensor.threshold)
+    latest = float(looked.paths.tau[loud & (looked.paths.arrival[..., 2] >= 0.0)].max())
+    assert latest <= settings.receiver.max_delay < settings.sensor.period
+    assert f"repeats after {1e9 * settings.sensor.period:.0f} ns" in line
+    assert f"{settings.receiver.max_delay / 80e-9:.2g} times as many false components" in line
+
+
+def test_a_band_too_wide_for_any_sounding_is_told_to_come_nearer() -> None:
+    wide = ("radio.carrier_ghz=1000", "radio.bandwidth_ghz=500", "radio.reference_snr_db=60")
+    (line,) = lines(HALL, *wide)
+    assert "lead the way nearer" in line
+
+
+def test_a_small_room_has_none_and_a_short_window_makes_some() -> None:
+    assert lines(PAPER) == []
+    (line,) = lines(PAPER, "receiver.max_delay=20e-9")
+    assert advised(line) != ["receiver.max_delay=2e-08"]
+
+
+def test_check_warns_of_them_and_counts_the_warning() -> None:
+    shown = CliRunner().invoke(app, ["check", str(HALL)]).output
+    assert shown.count("warning: ") == 2
+    assert shown.count("receiver.max_delay: ") == 1
+    assert "0 errors, 2 warnings" in shown
+    small = CliRunner().invoke(app, ["check", str(PAPER)]).output
+    assert "receiver.max_delay" not in small
