@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.predicted_returns import linearise_each, poses_of
+from rislam_rt.slam.predicted_returns import Poses, linearise_each, poses_of
 from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
@@ -112,13 +112,13 @@ def predictions(state: WindowState, first: int) -> Predictions:
     form, slot = log.form[rows], slot[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
-    place = poses(window)[at]
-    ends = poses_of(place[:, :3], state.heading[at] + place[:, 3], scene.body)
+    place = poses(window)
+    ends = Poses._make(each[at] for each in poses_of(place[:, :3], state.heading + place[:, 3], scene.body))
     returns = forms_apart(state.landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])))
     linear = linearise_each(returns, window.features, state.landmarks.anchor, ends, POSE)
     linear.wide[..., :3] = linear.by_pose
     if window.turns:
-        linear.wide[..., 3] = linear.by_heading(ends, place[:, :3])
+        linear.wide[..., 3] = linear.by_heading(ends, place[at, :3])
     count, share = len(rows), log.share[rows[both], None]
     (seen, other), (slopes, by_other) = ((each[:count], each[count:]) for each in (linear.seen, linear.wide))
     gap = other - seen[both]
