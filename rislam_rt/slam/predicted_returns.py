@@ -170,16 +170,27 @@ def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Po
 
     Returns that share a leg which begins at the Tx itself (`TX`) must share the Tx's position.
     """
+    return _linearise(returns, features, anchor, _tx_of_legs(returns, poses), poses, spare)
+
+
+def observe_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
+    """Predicted lengths and cosines (R, 3) of returns, each as seen from a pose of its own, as by `linearise_each`."""
+    image = _mirrored(returns.legs, features, anchor, _tx_of_legs(returns, poses))[0]
+    return _arrivals(image, returns, poses).seen
+
+
+def _tx_of_legs(returns: Returns, poses: Poses) -> Floats:
+    """Positions (G, 3) of the Tx at the legs of predicted returns that have a pose (R,) each."""
     tx = np.empty((len(returns.legs), 3))
     tx[returns.tx] = tx[returns.rx] = poses.tx
-    return _linearise(returns, features, anchor, tx, poses, spare)
+    return tx
 
 
 def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses, spare: int) -> Linear:
     """Predicted returns with derivatives, by the Tx of each leg (..., G or 1, 3) and poses (..., R or 1) of returns."""
     image, bounces = _mirrored(returns.legs, features, anchor, leg_tx)
-    seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
-    count = features.shape[-2]
+    found, count = _arrivals(image, returns, poses), features.shape[-2]
+    seen, by_tx, by_rx = found.seen, found.by_tx, _by_image(found, poses.heading)
     wide = np.zeros((*seen.shape, spare + 3 * count))
     block = np.swapaxes(wide[..., spare:].reshape(*seen.shape, count, 3), -3, -2)
     moving = returns.point == TX  # the Tx leg of a moving base is the Tx itself
@@ -197,8 +208,18 @@ def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Float
     return Linear(seen, wide, tx_jacobian, -by_rx)
 
 
-def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
-    """Lengths and cosines (..., R, 3) of returns, lengths' derivatives by the Tx legs' images, all by the Rx legs'."""
+class _Arrivals(NamedTuple):
+    """Lengths and cosines (..., R, 3) of predicted returns, unit vectors (..., R, 3) from Tx and Rx to what they see of
+    them, and the Rx legs' lengths (..., R)."""
+
+    seen: Floats
+    by_tx: Floats
+    arrival: Floats
+    rx_length: Floats
+
+
+def _arrivals(image: Floats, returns: Returns, poses: Poses) -> _Arrivals:
+    """What is seen of predicted returns from poses (..., R or 1), of images (..., G, 3) of their legs' points."""
     to_tx, to_rx = image.take(returns.tx, axis=-2) - poses.tx, image.take(returns.rx, axis=-2) - poses.rx
     tx_length, rx_length = _norm(to_tx), np.maximum(_norm(to_rx), 1e-9)
     by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9)[..., None], to_rx / rx_length[..., None]
@@ -206,14 +227,19 @@ def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Flo
     seen[..., 0] = tx_length + rx_length
     seen[..., 1] = arrival[..., 0] * cos + arrival[..., 1] * sin
     seen[..., 2] = arrival[..., 1] * cos - arrival[..., 0] * sin
-    by_rx = seen[..., None] * -arrival[..., None, :]
-    by_rx[..., 1, 0] += cos
-    by_rx[..., 1, 1] += sin
-    by_rx[..., 2, 0] -= sin
-    by_rx[..., 2, 1] += cos
-    by_rx /= rx_length[..., None, None]
-    by_rx[..., 0, :] = arrival
-    return seen, by_tx, by_rx
+    return _Arrivals(seen, by_tx, arrival, rx_length)
+
+
+def _by_image(rays: _Arrivals, heading: Floats) -> Floats:
+    """Derivatives (..., R, 3, 3) of predicted lengths and cosines by the images that the Rx sees."""
+    cos, sin, found = np.cos(heading), np.sin(heading), rays.seen[..., None] * -rays.arrival[..., None, :]
+    found[..., 1, 0] += cos
+    found[..., 1, 1] += sin
+    found[..., 2, 0] -= sin
+    found[..., 2, 1] += cos
+    found /= rays.rx_length[..., None, None]
+    found[..., 0, :] = rays.arrival
+    return found
 
 
 class _Bounces(NamedTuple):
