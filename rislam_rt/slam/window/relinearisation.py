@@ -84,7 +84,8 @@ def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowSt
 def _side_by_side(of: Integers, count: int, *parts: Floats) -> Floats:
     """Rows (K, N, ...) of numbers (A, 3, ...) of components in slots `of` (A,), sorted, those of one slot side by side
     for a re-linearisation."""
-    at = np.arange(len(of)) - np.searchsorted(of, of)
+    many = np.bincount(of, minlength=count)
+    at = np.arange(len(of)) - (np.cumsum(many) - many)[of]
     ends = np.cumsum([part.shape[2] for part in parts]).tolist()
     wide = np.zeros((count, int(at.max(initial=-1)) + 1, 3, ends[-1]))
     for part, end in zip(parts, ends, strict=True):
