@@ -6,7 +6,6 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, freeze, show_point
 from rislam_rt.errors import GeometryError
-from rislam_rt.geometry.angles import rotation_z
 
 
 def _default_offset() -> Floats:
@@ -28,8 +27,11 @@ class Body:
 
     def ends(self, position: Floats, heading: Floats) -> tuple[Floats, Floats]:
         """Positions (..., 3) [m] of Tx and Rx for agent positions (..., 3) [m] and headings (...,) [rad]."""
-        rotation = rotation_z(heading)
-        return position + rotation @ self.tx_offset, position + rotation @ self.rx_offset
+        cos, sin = np.cos(heading), np.sin(heading)
+        turned = np.empty((2, *np.shape(heading), 3))
+        for found, (x, y, z) in zip(turned, (self.tx_offset, self.rx_offset), strict=True):
+            found[..., 0], found[..., 1], found[..., 2] = cos * x - sin * y, sin * x + cos * y, z
+        return position + turned[0], position + turned[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig, RisCode, RisSpec
-from rislam_rt.ris.response import leg_parts
+from rislam_rt.ris.response import element_distances, element_pattern, leg_scale
 
 
 def image_amplitude(length: Floats, radio: RadioConfig) -> Floats:
@@ -25,11 +25,17 @@ def panel_path_gain(
 
     `ratio` (...,) is the amplitude ratio of the wall reflections.
 
-    Both legs and the code turn an element's signal together; in single precision an element errs by 1e-7 of a turn.
+    Both legs and the code turn an element's signal together; in single precision an element errs by 1e-7 of a turn. Its
+    pattern is a power of the cosine, and so that of both legs is the pattern of the product of their cosines.
     """
-    (first, second), (distance, onward) = leg_parts(spec, center, np.stack([tx, rx]), radio.wavelength)
+    ends = np.stack([tx, rx])
+    distance, onward = element_distances(spec, center, ends)
     turns = (distance + onward) / radio.wavelength + code.xi / (2.0 * np.pi)
     angle = (2.0 * np.pi * (np.rint(turns) - turns)).astype(np.float32)
-    amplitude = (first * second).astype(np.float32)
-    gain = np.sum(amplitude * np.cos(angle), axis=(-2, -1)) + 1j * np.sum(amplitude * np.sin(angle), axis=(-2, -1))
-    return np.asarray(ratio * np.sqrt(radio.tx_gain * radio.rx_gain) * gain)
+    nearness = np.reciprocal((distance * onward).astype(np.float32))
+    facing = np.prod(np.maximum((ends - center) @ spec.normal, 0.0), axis=0).astype(np.float32)
+    amplitude = nearness * np.sqrt(element_pattern(spec, nearness * facing[..., None, None]))
+    every = (*amplitude.shape[:-2], -1)
+    real, imaginary = (np.vecdot(amplitude.reshape(every), part(angle).reshape(every)) for part in (np.cos, np.sin))
+    scale = leg_scale(spec, radio.wavelength) ** 2 * np.sqrt(radio.tx_gain * radio.rx_gain)
+    return np.asarray(ratio * scale * (real + 1j * imaginary))

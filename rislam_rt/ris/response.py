@@ -52,11 +52,16 @@ def leg_response(spec: RisSpec, center: Floats, device: Floats, coefficient: Com
 
 def leg_parts(spec: RisSpec, center: Floats, device: Floats, wavelength: float) -> tuple[Floats, Floats]:
     """Amplitudes (..., N, M) of a panel's responses to one leg of coefficient 1, and elements' distances [m]."""
+    distance = element_distances(spec, center, device)
+    pattern = element_pattern(spec, ((device - center) @ spec.normal)[..., None, None] / distance)
+    return leg_scale(spec, wavelength) * np.sqrt(pattern) / distance, distance
+
+
+def element_distances(spec: RisSpec, center: Floats, device: Floats) -> Floats:
+    """Distances (..., N, M) [m] of a panel's elements from a device (..., 3), for the response to one leg."""
     ray, offsets = np.asarray(device - center), spec.offsets()
     along = (ray @ offsets.reshape(-1, 3).T).reshape(*ray.shape[:-1], *offsets.shape[:-1])
-    distance = np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets))
-    pattern = element_pattern(spec, (ray @ spec.normal)[..., None, None] / distance)
-    return (_leg_share(spec, wavelength) * wavelength / (4.0 * np.pi)) * np.sqrt(pattern) / distance, distance
+    return np.asarray(np.sqrt(np.vecdot(ray, ray)[..., None, None] - 2.0 * along + np.vecdot(offsets, offsets)))
 
 
 def far_field_response(
@@ -69,12 +74,7 @@ def far_field_response(
     ray = np.asarray(device - center)
     distance = np.linalg.norm(ray, axis=-1)
     direction = ray / distance[..., None]
-    amplitude = (
-        _leg_share(spec, wavelength)
-        * np.sqrt(element_pattern(spec, direction @ spec.normal))
-        * wavelength
-        / (4.0 * np.pi * distance)
-    )
+    amplitude = leg_scale(spec, wavelength) * np.sqrt(element_pattern(spec, direction @ spec.normal)) / distance
     along = np.einsum("nmi,...i->...nm", spec.offsets(), direction)
     phase = phasor(-2.0 * np.pi / wavelength * (distance[..., None, None] - along))
     return (np.asarray(coefficient) * amplitude)[..., None, None] * phase
@@ -85,10 +85,11 @@ def zero_code(spec: DataSheet) -> RisCode:
     return RisCode(np.zeros((spec.rows, spec.cols), dtype=np.int64), spec.levels)
 
 
-def _leg_share(spec: RisSpec, wavelength: float) -> float:
-    """Factor of a panel's response that is each leg's: square root of `sqrt(4 pi G dx dy) A / lambda`."""
+def leg_scale(spec: RisSpec, wavelength: float) -> float:
+    """Factor [m] of a panel's response that is each leg's, before distance and pattern: a device's `lambda / (4 pi)`,
+    and the square root of `sqrt(4 pi G dx dy) A / lambda`."""
     join = np.sqrt(4.0 * np.pi * element_gain_area(spec, wavelength)) * spec.amplitude / wavelength
-    return float(np.sqrt(join))
+    return float(np.sqrt(join) * wavelength / (4.0 * np.pi))
 
 
 def delay_spread(spec: RisSpec, center: Floats, tx: Floats, rx: Floats) -> Floats:

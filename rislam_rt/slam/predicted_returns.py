@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Body
 
 TX = -1
@@ -171,72 +170,133 @@ def linearise_each(returns: Returns, features: Floats, anchor: Floats, poses: Po
 
     Returns that share a leg which begins at the Tx itself (`TX`) must share the Tx's position.
     """
+    return _linearise(returns, features, anchor, _tx_of_legs(returns, poses), poses, spare)
+
+
+def observe_each(returns: Returns, features: Floats, anchor: Floats, poses: Poses) -> Floats:
+    """Predicted lengths and cosines (R, 3) of returns, each as seen from a pose of its own, as by `linearise_each`."""
+    image = _mirrored(returns.legs, features, anchor, _tx_of_legs(returns, poses))[0]
+    return _arrivals(image, returns, poses).seen
+
+
+def _tx_of_legs(returns: Returns, poses: Poses) -> Floats:
+    """Positions (G, 3) of the Tx at the legs of predicted returns that have a pose (R,) each."""
     tx = np.empty((len(returns.legs), 3))
     tx[returns.tx] = tx[returns.rx] = poses.tx
-    return _linearise(returns, features, anchor, tx, poses, spare)
+    return tx
 
 
 def _linearise(returns: Returns, features: Floats, anchor: Floats, leg_tx: Floats, poses: Poses, spare: int) -> Linear:
     """Predicted returns with derivatives, by the Tx of each leg (..., G or 1, 3) and poses (..., R or 1) of returns."""
-    image, slopes = _leg_jacobian(returns.legs, features, anchor, leg_tx)
-    seen, by_tx, by_rx = _sight_jacobians(image, returns, poses)
-    count = features.shape[-2]
+    image, bounces = _mirrored(returns.legs, features, anchor, leg_tx)
+    found, count = _arrivals(image, returns, poses), features.shape[-2]
+    seen, by_tx, by_rx = found.seen, found.by_tx, _by_image(found, poses.heading)
     wide = np.zeros((*seen.shape, spare + 3 * count))
     block = np.swapaxes(wide[..., spare:].reshape(*seen.shape, count, 3), -3, -2)
-    heard, parts = by_rx @ slopes.take(returns.rx, axis=-3), returns.legs[returns.rx]
-    rows, part = (parts >= 0).nonzero()
-    each = np.swapaxes(heard.reshape(*heard.shape[:-1], 3, 3), -3, -2)
-    block[..., rows, parts[rows, part], :, :] = each[..., rows, part, :, :]
-    moving = parts[:, 0] == TX  # the Tx leg of a moving base is the Tx itself
+    moving = returns.point == TX  # the Tx leg of a moving base is the Tx itself
+    parts, by_base = _back(returns.legs, returns.rx, bounces, by_rx.copy())
+    for rows, feature, slopes in parts:
+        block[..., rows, feature, :, :] = slopes
     still = (~moving).nonzero()[0]
     if len(still):
-        parts = returns.legs[returns.tx[still]]
-        rows, part = (parts >= 0).nonzero()
-        length = by_tx.take(still, axis=-2)[..., None, :] @ slopes.take(returns.tx[still], axis=-3)
-        each = length.reshape(*length.shape[:-2], 3, 3)
-        block[..., still[rows], parts[rows, part], 0, :] += each[..., rows, part, :]
+        toward = by_tx.take(still, axis=-2)[..., None, :]
+        for rows, feature, slopes in _back(returns.legs, returns.tx[still], bounces, toward)[0]:
+            block[..., still[rows], feature, 0, :] += slopes[..., 0, :]
     # the images of a moving base move with it
-    tx_jacobian = np.where(moving[:, None, None], heard[..., :3], 0.0)
+    tx_jacobian = np.where(moving[:, None, None], by_base, 0.0)
     tx_jacobian[..., 0, :] -= by_tx
     return Linear(seen, wide, tx_jacobian, -by_rx)
 
 
-def _sight_jacobians(image: Floats, returns: Returns, poses: Poses) -> tuple[Floats, Floats, Floats]:
-    """Lengths and cosines (..., R, 3) of returns, lengths' derivatives by the Tx legs' images, all by the Rx legs'."""
+class _Arrivals(NamedTuple):
+    """Lengths and cosines (..., R, 3) of predicted returns, unit vectors (..., R, 3) from Tx and Rx to what they see of
+    them, and the Rx legs' lengths (..., R)."""
+
+    seen: Floats
+    by_tx: Floats
+    arrival: Floats
+    rx_length: Floats
+
+
+def _arrivals(image: Floats, returns: Returns, poses: Poses) -> _Arrivals:
+    """What is seen of predicted returns from poses (..., R or 1), of images (..., G, 3) of their legs' points."""
     to_tx, to_rx = image.take(returns.tx, axis=-2) - poses.tx, image.take(returns.rx, axis=-2) - poses.rx
-    tx_length, rx_length = _norm(to_tx)[..., None], np.maximum(_norm(to_rx), 1e-9)[..., None]
-    by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9), to_rx / rx_length
-    body = np.swapaxes(rotation_z(poses.heading), -1, -2)[..., :2, :]
-    cosines = (body @ arrival[..., None])[..., 0]
-    by_rx = np.empty((*arrival.shape, 3))
-    by_rx[..., 0, :] = arrival
-    by_rx[..., 1:, :] = (body - cosines[..., None] * arrival[..., None, :]) / rx_length[..., None]
-    return np.concatenate([tx_length + rx_length, cosines], axis=-1), by_tx, by_rx
+    tx_length, rx_length = _norm(to_tx), np.maximum(_norm(to_rx), 1e-9)
+    by_tx, arrival = to_tx / np.maximum(tx_length, 1e-9)[..., None], to_rx / rx_length[..., None]
+    cos, sin, seen = np.cos(poses.heading), np.sin(poses.heading), np.empty(arrival.shape)
+    seen[..., 0] = tx_length + rx_length
+    seen[..., 1] = arrival[..., 0] * cos + arrival[..., 1] * sin
+    seen[..., 2] = arrival[..., 1] * cos - arrival[..., 0] * sin
+    return _Arrivals(seen, by_tx, arrival, rx_length)
 
 
-def _leg_jacobian(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, Floats]:
-    """Mirror images (..., G, 3) of the points of predicted returns' legs, and derivatives (..., G, 3, 9) by the point,
-    the wall next to it and the other wall."""
-    moving, image = legs[:, 0] == TX, features.take(legs[:, 0], axis=-2)
+def _by_image(rays: _Arrivals, heading: Floats) -> Floats:
+    """Derivatives (..., R, 3, 3) of predicted lengths and cosines by the images that the Rx sees."""
+    cos, sin, found = np.cos(heading), np.sin(heading), rays.seen[..., None] * -rays.arrival[..., None, :]
+    found[..., 1, 0] += cos
+    found[..., 1, 1] += sin
+    found[..., 2, 0] -= sin
+    found[..., 2, 1] += cos
+    found /= rays.rx_length[..., None, None]
+    found[..., 0, :] = rays.arrival
+    return found
+
+
+class _Bounces(NamedTuple):
+    """Bounces of N of G legs off the wall that is next to the base, or next to the device, in predicted returns."""
+
+    place: Integers
+    """(G,) row of each leg's bounce, -1 where it has none."""
+    wall: Integers
+    """(N,) feature row of the wall."""
+    span: Floats
+    """(..., N, 3) from the wall's anchor to its image, along the normal..."""
+    scaled: Floats
+    """(..., N, 3) ...the same over its square..."""
+    depth: Floats
+    """(..., N) ...and what is mirrored from the wall along it."""
+    out: Floats
+    """(..., N, 3) from the anchor's image to that of what is mirrored."""
+
+
+def _mirrored(legs: Integers, features: Floats, anchor: Floats, tx: Floats) -> tuple[Floats, list[_Bounces]]:
+    """Mirror images (..., G, 3) of the points of predicted returns' legs, and the bounces off their walls, base first;
+    `tx` (..., G or 1, 3) is the Tx."""
+    moving, image, found = legs[:, 0] == TX, features.take(legs[:, 0], axis=-2), []
     if moving.any():  # only then do images differ from pose to pose
         image = np.where(moving[:, None], tx, image)
-    slopes = np.zeros((*image.shape, 9))
-    slopes[..., :3] = AXES
     for column in (1, 2):
         rows, walls = bounced(legs, column)
         if not len(rows):
             continue
         wall, base, start = features.take(walls, axis=-2), anchor[walls], image.take(rows, axis=-2)
-        span = wall - base
-        scaled = span / np.vecdot(span, span)[..., None]
-        depth = np.vecdot(scaled, start - 0.5 * (wall + base))[..., None]
-        mirrored = start - 2.0 * depth * span
-        image[..., rows, :], flip = mirrored, AXES - 2.0 * span[..., :, None] * scaled[..., None, :]
-        slopes[..., rows, :, : 3 * column] = flip if column == 1 else flip @ slopes.take(rows, axis=-3)[..., :6]
-        slopes[..., rows, :, 3 * column : 3 * column + 3] = -2.0 * (
-            depth[..., None] * AXES + scaled[..., :, None] * (mirrored - wall)[..., None, :]
-        )
-    return image, slopes
+        span, place = wall - base, np.full(len(legs), -1)
+        scaled, place[rows] = span / np.vecdot(span, span)[..., None], np.arange(len(rows))
+        depth = np.vecdot(scaled, start - 0.5 * (wall + base))
+        mirrored = start - 2.0 * depth[..., None] * span
+        image[..., rows, :] = mirrored
+        found.append(_Bounces(place, walls, span, scaled, depth, mirrored - wall))
+    return image, found
+
+
+def _back(
+    legs: Integers, leg: Integers, bounces: list[_Bounces], slopes: Floats
+) -> tuple[list[tuple[Integers, Integers, Floats]], Floats]:
+    """Carry slopes (..., N, M, 3) of predicted returns by the images of legs `leg` (N,) back to the bases (..., N, M,
+    3), in place, from wall to wall (chain rule); returns as well those by features: which of the returns, feature
+    rows, slopes."""
+    found = []
+    for each in bounces[::-1]:
+        at = each.place[leg]
+        rows = (at >= 0).nonzero()[0]
+        own, at = slopes.take(rows, axis=-3), at[rows]
+        span, scaled, out = (side.take(at, axis=-2)[..., None, :] for side in (each.span, each.scaled, each.out))
+        turned = each.depth.take(at, axis=-1)[..., None, None] * own + np.vecdot(own, scaled)[..., None] * out
+        found.append((rows, each.wall[at], -2.0 * turned))
+        slopes[..., rows, :, :] = own - 2.0 * np.vecdot(own, span)[..., None] * scaled
+    point = legs[leg, 0]
+    rows = (point >= 0).nonzero()[0]
+    return [*found, (rows, point[rows], slopes.take(rows, axis=-3))], slopes
 
 
 def compact(returns: Returns, rows: Integers) -> Returns:

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.predicted_returns import linearise_each, poses_of
+from rislam_rt.slam.predicted_returns import Poses, linearise_each, observe_each, poses_of
 from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
@@ -28,7 +28,7 @@ class Predictions(NamedTuple):
     bias: Floats
     """(A, 3) by how much less is reported on average (see `horizon_bias`)."""
     slopes: Floats
-    """(A, 3, 4 + 3F) derivatives by pose and features of what is reported."""
+    """(A, 3, D) derivatives by pose and features of what is reported, D = 4 + 3F."""
 
 
 class Whitened(NamedTuple):
@@ -84,7 +84,8 @@ def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowSt
 def _side_by_side(of: Integers, count: int, *parts: Floats) -> Floats:
     """Rows (K, N, ...) of numbers (A, 3, ...) of components in slots `of` (A,), sorted, those of one slot side by side
     for a re-linearisation."""
-    at = np.arange(len(of)) - np.searchsorted(of, of)
+    many = np.bincount(of, minlength=count)
+    at = np.arange(len(of)) - (np.cumsum(many) - many)[of]
     ends = np.cumsum([part.shape[2] for part in parts]).tolist()
     wide = np.zeros((count, int(at.max(initial=-1)) + 1, 3, ends[-1]))
     for part, end in zip(parts, ends, strict=True):
@@ -104,30 +105,37 @@ def level(state: WindowState, first: int, change: Floats) -> WindowState:
     return state._replace(log=log._replace(seen=seen), attitude=rotation)
 
 
-def predictions(state: WindowState, first: int) -> Predictions:
-    """Predictions, as re-linearised, of the explained components that were heard at the poses from `first` on."""
+def predictions(state: WindowState, first: int, *, slopes: bool = True) -> Predictions:
+    """Predictions, as re-linearised, of the explained components that were heard at the poses from `first` on; without
+    `slopes`, which take half of the time, there are none (D = 0)."""
     window, log, scene = state.window, state.log, state.scene
     slot = log.cycle - (state.cycle - window.num_poses + 1)
     rows = (log.explained & (slot >= first)).nonzero()[0]
     form, slot = log.form[rows], slot[rows]
     both = (form[:, 1, 0] != UNKNOWN).nonzero()[0]
     at = np.concatenate([slot, slot[both]])
-    place = poses(window)[at]
-    ends = poses_of(place[:, :3], state.heading[at] + place[:, 3], scene.body)
+    place = poses(window)
+    ends = Poses._make(each[at] for each in poses_of(place[:, :3], state.heading + place[:, 3], scene.body))
     returns = forms_apart(state.landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])))
-    linear = linearise_each(returns, window.features, state.landmarks.anchor, ends, POSE)
-    linear.wide[..., :3] = linear.by_pose
-    if window.turns:
-        linear.wide[..., 3] = linear.by_heading(ends, place[:, :3])
+    known = returns, window.features, state.landmarks.anchor, ends
+    if slopes:
+        linear = linearise_each(*known, POSE)
+        every, by = linear.seen, linear.wide
+        by[..., :3] = linear.by_pose
+        if window.turns:
+            by[..., 3] = linear.by_heading(ends, place[at, :3])
+    else:
+        every = observe_each(*known)
+        by = np.zeros((*every.shape, 0))
     count, share = len(rows), log.share[rows[both], None]
-    (seen, other), (slopes, by_other) = ((each[:count], each[count:]) for each in (linear.seen, linear.wide))
+    (seen, other), (own, by_other) = ((each[:count], each[count:]) for each in (every, by))
     gap = other - seen[both]
     gap[:, 0] = scene.sensor.nearest(gap[:, 0])
     seen[both] += share * gap
-    slopes[both] += share[..., None] * (by_other - slopes[both])
+    own[both] += share[..., None] * (by_other - own[both])
     bias = np.zeros(seen.shape)
-    correct_horizon_bias(seen, log.std[rows], bias, slopes)
-    return Predictions(rows, slot, seen, bias, slopes)
+    correct_horizon_bias(seen, log.std[rows], bias, own)
+    return Predictions(rows, slot, seen, bias, own)
 
 
 def whitened(state: WindowState, found: Predictions) -> Whitened:

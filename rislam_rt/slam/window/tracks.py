@@ -122,13 +122,13 @@ def match_over_motions(
     One track alone that would go on only in a manoeuvre has reasons of its own, as a neighbour's pull.
     """
     rows, picks, score = match(calm, observed, free, cycle, strangers)
-    late = (calm.last == cycle - 1).nonzero()[0]
-    kept = int(np.isin(late, rows).sum())
-    if kept + 1 >= len(late):
+    late = calm.last == cycle - 1
+    kept = int(late[rows].sum())
+    if kept + 1 >= int(late.sum()):
         return calm, rows, picks
     lively, log_odds = manoeuvred()
     other_rows, other_picks, other = match(lively, observed, free, cycle, strangers)
-    likelier = other + log_odds > score and np.isin(late, other_rows).sum() > kept + 1
+    likelier = other + log_odds > score and late[other_rows].sum() > kept + 1
     return (lively, other_rows, other_picks) if likelier else (calm, rows, picks)
 
 

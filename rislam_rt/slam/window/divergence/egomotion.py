@@ -122,12 +122,12 @@ def weigh_change(
     """Posterior log odds that rates of path lengths change by a horizontal velocity or acceleration of one of the
     covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,), from initial
     values `starts` (S, 2); `log_prior` are the odds beforehand."""
-    nothing = np.zeros(3)
-    modes = [_find_modes(found, starts, nothing, spread) for spread in ways]
-    best = max(modes, key=lambda each: each.evidence.max())
-    at = int(np.argmax(best.evidence))
-    log_ratio = best.evidence[at] - np.log(len(ways)) - _find_modes(found, starts[:1], nothing, calm).evidence[0]
-    return float(log_ratio) + log_prior, best.velocity[at]
+    many = len(starts)
+    spread = np.concatenate([np.repeat(ways, many, axis=0), calm[None]])
+    every = _find_modes(found, np.concatenate([np.tile(starts, (len(ways), 1)), starts[:1]]), np.zeros(3), spread)
+    at = int(np.argmax(every.evidence[:-1]))
+    log_ratio = every.evidence[at] - np.log(len(ways)) - every.evidence[-1]
+    return float(log_ratio) + log_prior, every.velocity[at]
 
 
 def weigh_climb(found: Rates, calm: float, log_prior: float) -> tuple[float, float]:
@@ -149,8 +149,8 @@ def _find_climb(found: Rates, climb: Floats, variance: float) -> tuple[Floats, F
     variance, with Laplace's log evidences (S,) there."""
     nowhere, up = np.zeros((1, 2)), found.toward[:, 2]
     for last in (False,) * 6 + (True,):
-        either, likely, spread = _likelihoods(found, nowhere, climb)
-        weight = (likely / spread).sum(axis=0) / found.each(either)
+        either, likely, precision = _likelihoods(found, nowhere, climb)
+        weight = (likely * precision).sum(axis=0) / found.each(either)
         normal = (weight @ up**2 + 1.0 / variance)[:, None]
         if last:
             break
@@ -166,8 +166,8 @@ def agreed_velocity(found: Rates) -> Floats:
 
 
 def _log_normal(off: Floats, spread: Floats) -> Floats:
-    """Log densities (S,) of offsets (S, 2) under a centred Gaussian of covariance (2, 2)."""
-    inside = np.vecdot(off, np.linalg.solve(spread, off.T).T)
+    """Log densities (S,) of offsets (S, 2) under centred Gaussians of covariances (2, 2) or (S, 2, 2)."""
+    inside = np.vecdot(off, np.linalg.solve(spread, off[..., None])[..., 0])
     return -0.5 * inside - 0.5 * np.linalg.slogdet(spread)[1] - np.log(2.0 * np.pi)
 
 
@@ -197,7 +197,7 @@ def _agreed_by_two(found: Rates, told: Floats) -> tuple[Floats, Floats]:
     x = (aim[first] * across[second] - aim[second] * across[first]) / det
     y = (aim[second] * along[first] - aim[first] * along[second]) / det
     slow = np.hypot(x, y) < 3.0 * CONSTANTS.walk
-    every = np.concatenate([told[None, :2], np.stack([x, y], axis=1)[slow]])
+    every = np.concatenate([told[None, :2], np.array([x[slow], y[slow]]).T])
     return every, np.log(_likelihoods(found, every, told[2])[0]).sum(axis=1)
 
 
@@ -222,39 +222,43 @@ NEAR, MOST = 0.01, 8
 
 def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple[Floats, Floats, Floats]:
     """Likelihoods (S, T) of the tracks' rates of length under horizontal velocities (S, 2) and vertical ones (S, 1) or
-    one for all, and those (2, S, E) of the two ways to agree, from each direction, with their variances (2, S, E)."""
+    one for all, and those (2, S, E) of the two ways to agree, from each direction, with one over their variances (2, S,
+    E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     # a direction errs in all of the motion, what the positions have taken out of the lengths included
     speed = velocity if found.believed is None else velocity + found.believed
-    variance = found.variance + found.blur**2 * np.vecdot(speed, speed)[:, None]
+    square = np.vecdot(speed, speed)
+    variance = found.variance + found.blur**2 * square[:, None]
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
-    either_way = variance + np.array([0.0, found.turning**2])[:, None, None]
-    likely = 0.25 * found.share * np.exp(-0.5 * left**2 / either_way) / np.sqrt(2.0 * np.pi * either_way)
+    precision = 1.0 / (variance + np.array([0.0, found.turning**2])[:, None, None])
+    likely = np.exp(-0.5 * left**2 * precision) * np.sqrt(precision)
+    likely *= 0.25 / np.sqrt(2.0 * np.pi) * found.share
     close = found.mixed(likely.sum(axis=0))
     other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
-        wide = either_way[1] + 4.0 / 3.0 * (np.vecdot(speed, speed)[:, None] + climb**2)
-        still = np.exp(-0.5 * found.whole**2 / wide) / np.sqrt(2.0 * np.pi * wide)
+        narrow = 1.0 / (variance + (found.turning**2 + 4.0 / 3.0 * (square[:, None] + climb**2)))
+        still = np.exp(-0.5 * found.whole**2 * narrow) * np.sqrt(narrow / (2.0 * np.pi))
         other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
-    return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, either_way
+    return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, precision
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:
     """Nearest maxima of the velocity's posterior from initial velocities (S, 2), under a prior about `told` (3,) of
-    covariance `spread` (2, 2), with Laplace's evidence there."""
+    covariance `spread` (2, 2) or (S, 2, 2), with Laplace's evidence there."""
     flat, rate = found.toward[:, :2], found.rate - found.toward[:, 2] * told[2]
     v, prior, squares = start, np.linalg.inv(spread), (flat[:, :, None] * flat[:, None, :]).reshape(-1, 4)
+    held, pull = prior.reshape(-1, 4), prior @ told[:2]
     for last in (False,) * 6 + (True,):
-        either, likely, variance = _likelihoods(found, v, told[2])
-        weight = (likely / variance).sum(axis=0) / found.each(either)  # with which the tracks agree
-        one, both, _, two = (weight @ squares + prior.ravel()).T  # the normal matrix's numbers
+        either, likely, precision = _likelihoods(found, v, told[2])
+        weight = (likely * precision).sum(axis=0) / found.each(either)  # with which the tracks agree
+        one, both, _, two = (weight @ squares + held).T  # the normal matrix's numbers
         det = one * two - both**2
         if last:
             break
-        x, y = ((weight * rate) @ flat + prior @ told[:2]).T
-        v = np.stack([two * x - both * y, one * y - both * x], axis=1) / det[:, None]
+        x, y = ((weight * rate) @ flat + pull).T
+        v = (np.array([two * x - both * y, one * y - both * x]) / det).T
     evidence = np.log(either).sum(axis=1) + np.log(2.0 * np.pi) - 0.5 * np.log(det)
     covariance = np.stack([two, -both, -both, one], axis=1).reshape(-1, 2, 2) / det[:, None, None]
     return _Modes(v, covariance, evidence + _log_normal(v - told[:2], spread))

@@ -111,6 +111,8 @@ class Lengths(NamedTuple):
     """(E,) as in `Rates`."""
     owner: Integers | None
     """(E,) track or path of each direction; None where each has one."""
+    enough: int
+    """Number of components from which on a line is fitted."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -119,8 +121,8 @@ class Lengths(NamedTuple):
 
 def enough_measured(cycle: Integers) -> int:
     """Measurements of a track from which on it has a rate of length, where components (N,) were measured in these
-    cycles."""
-    return min(MEASURED, max(EARLY, len(np.unique(cycle))))
+    cycles, in the order of time."""
+    return min(MEASURED, max(EARLY, int(np.count_nonzero(cycle[1:] != cycle[:-1])) + 1))
 
 
 def lengths(heard: Heard) -> Lengths:
@@ -152,6 +154,7 @@ def lengths(heard: Heard) -> Lengths:
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
         length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
         np.hypot(blur, 2.0 * np.sqrt(doubt)), owner if (np.diff(owner) < 1).any() else None,
+        enough_measured(log.cycle[log.cycle >= first]),
     )  # fmt: skip
 
 
@@ -185,9 +188,7 @@ def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], F
     total, weighted = found.total, found.weight * x
     s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
     spread = s * sxx - sx**2
-    cycle = found.heard.log.cycle
-    many = enough_measured(cycle[cycle > cycle.max(initial=0) - len(found.heard.place)])
-    enough = (found.number >= many) & (spread > 1e-9 * s * s * found.heard.step**2)
+    enough = (found.number >= found.enough) & (spread > 1e-9 * s * s * found.heard.step**2)
     spread = np.where(enough, spread, 1.0)
     slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
     return slopes, CONSTANTS.crowd * s / spread, enough

@@ -8,7 +8,6 @@ estimate, and, more leniently, every `PAST` cycles, where to be wrong costs the 
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion, length_rates
 from rislam_rt.slam.window.smoother import motion, window_gaussian
@@ -89,7 +88,7 @@ def weigh_manoeuvre(
     found, log_odds, change = length_rates.accelerations(told, steps), -np.inf, np.zeros(3)
     if found.number < egomotion.FEWEST:
         return log_odds, change
-    calm, facing = _acceleration_covariance(state.window, steps), rotation_z(state.heading[-1])[:2, 0]
+    calm, facing = _acceleration_covariance(state.window, steps), [np.cos(state.heading[-1]), np.sin(state.heading[-1])]
     starts = egomotion.possible_changes(found, log_prior[0])
     if starts is not None:
         ways = [calm[:2, :2] + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]

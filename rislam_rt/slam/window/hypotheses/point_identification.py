@@ -174,7 +174,7 @@ def _history(context: WindowState, at: Integers, table: Hypotheses, fits: Fits, 
     return found
 
 
-LOOKS = 60
+LOOKS = 24
 """Observations weighed at a time: numpy's calls cost no more than the numbers then, which stay in the cache."""
 
 

@@ -23,7 +23,7 @@ def correct_horizon_bias(seen: Floats, std: Floats, left: Floats, slopes: Floats
 
     Where noise is not small against the disc, as along an axis without aperture, they stay.
     """
-    radius, most = np.hypot(seen[:, 1], seen[:, 2]), REACH * std[:, 1:].max(axis=1)
+    radius, most = np.hypot(seen[:, 1], seen[:, 2]), REACH * np.maximum(std[:, 1], std[:, 2])
     near = ((radius + most > 1.0) & (most < 1.0)).nonzero()[0]
     out = seen[near, 1:] / radius[near, None]
     wide = np.sqrt(np.vecdot(out**2, std[near, 1:] ** 2))
@@ -31,5 +31,6 @@ def correct_horizon_bias(seen: Floats, std: Floats, left: Floats, slopes: Floats
     beyond = scipy.special.ndtr(-deep)
     lost = wide * (np.exp(-0.5 * deep**2) / np.sqrt(2.0 * np.pi) - deep * beyond)
     left[near, 1:] += lost[:, None] * out
-    along = (out[:, None] @ slopes[near, 1:])[:, 0]
-    slopes[near, 1:] -= (beyond[:, None] * out)[..., None] * along[:, None]
+    moves = slopes[near, 1:]
+    along = out[:, :1] * moves[:, 0] + out[:, 1:] * moves[:, 1]
+    slopes[near, 1:] = moves - (beyond[:, None] * out)[..., None] * along[:, None]

@@ -9,6 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.panel_evidence import STRENGTHS, panel_rows, ris_probabilities, strength_moments
+from rislam_rt.slam.predicted_returns import NONE
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
 
 
@@ -76,8 +77,14 @@ class WindowTable(_Features):
 
     def rows(self, idents: Integers) -> Integers:
         """Rows of the landmark table for features of given idents; negative ones (`TX`, `NONE`) stay as they are."""
-        place = np.searchsorted(self.ident, idents)
-        return np.where(idents < 0, idents, place)
+        return np.where(idents < 0, idents, self._row_of[np.maximum(idents, 0)])
+
+    @cached_property
+    def _row_of(self) -> Integers:
+        """Row in the landmark table of each feature by its ident."""
+        found = np.full(max(self.next_ident, 1), NONE)
+        found[self.ident] = np.arange(len(self.ident))
+        return found
 
 
 def empty_table(panels: int = 1) -> WindowTable:

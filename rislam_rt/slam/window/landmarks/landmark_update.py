@@ -98,8 +98,9 @@ def with_scatter(visibility: VisibilityObservations, idents: Integers, scatter: 
     """Record of paths' occlusion and scatter with the mean squared residuals `scatter` (N,) of known paths of forms
     (N, 5) by idents, of which the last of each form counts."""
     code, found = (idents + 1) @ DIGITS, visibility.scatter.copy()
-    known = np.isin(code, visibility.code)
-    found[np.searchsorted(visibility.code, code[known])] = scatter[known]
+    place = np.searchsorted(visibility.code, code)
+    known = np.append(visibility.code, -1)[place] == code
+    found[place[known]] = scatter[known]
     return visibility._replace(scatter=found)
 
 

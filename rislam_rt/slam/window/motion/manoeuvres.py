@@ -66,7 +66,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
 def _log_borne_out(before: WindowState, after: WindowState, begin: int) -> float:
     """Log likelihood ratio of what is heard over walls alone since a cycle, by the motion `after` against that `before`
     a manoeuvre; no path tells more than that it is another than it was held for, which is rare (`max_log_ratio`)."""
-    ratio = _log_returns(after, begin, predictions(after, 0)) - _log_returns(before, begin, predictions(before, 0))
+    ratio = _log_returns(after, begin) - _log_returns(before, begin)
     return float(np.clip(ratio, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio).sum())
 
 
@@ -82,11 +82,12 @@ def _with_scatter_relearnt(state: WindowState, until: int) -> WindowState:
     return relinearise(state._replace(visibility=visibility), 0, found)[0]
 
 
-def _reweighed(state: WindowState, until: int, found: Predictions) -> WindowState:
+def _reweighed(state: WindowState, until: int, found: Predictions, *, moved: bool = True) -> WindowState:
     """State whose log weighs wall returns by their residuals, of what is `found`, in the first `until` cycles of the
-    window."""
+    window: of the errors as they are expected, or, unless the estimate has `moved` with them, of the residuals alone,
+    which are less."""
     state, left = levelled(state, 0, found)
-    spread = prediction_variance(state.window, left.slot, left.slopes)
+    spread = prediction_variance(state.window, left.slot, left.slopes) if moved else 0.0
     left = left._replace(square=squares(left.row, left.left, state.log, spread))
     return state._replace(log=reweigh_wall_returns(state.log, left, state.window.num_poses, until))
 
@@ -101,10 +102,10 @@ def with_climb(state: WindowState) -> WindowState:
     window, steps, learnt = state.window, int(LASTED[-1]), state.config.motion == "learnt"
     if state.cycle % STRIDE or not learnt or not state.scene.use_vt or len(window.step) <= steps:
         return state
-    found = predictions(state, 0)
-    trial = _scattering_as_before(state, steps, found)
-    if trial is state:
+    calmer = _scattering_as_before(state, steps)
+    if calmer is None:
         return state
+    trial, found = calmer
     for linearised in (found, None):
         trial = relinearise(trial, 0, linearised)[0]
         trial = trial._replace(window=solve_livelier(trial.window, steps + 1, upwards=True))
@@ -112,29 +113,33 @@ def with_climb(state: WindowState) -> WindowState:
     inner = vertical_information(trial.window).information[last, last]
     free = np.linalg.slogdet(np.eye(steps + 1) + CONSTANTS.liveliest**2 * inner)[1]
     free += float(np.sum(trial.window.accel[last, 2] ** 2)) / CONSTANTS.liveliest**2
-    ratio = _log_returns(trial, begin, predictions(trial, 0)) - _log_returns(state, begin, found)
+    ratio = _log_returns(trial, begin) - _log_returns(state, begin)
     log_ratio = float(ratio.sum()) - 0.5 * free
     return trial if log_ratio + CONSTANTS.log_rare - CONSTANTS.log_upright > CONSTANTS.log_born else state
 
 
-def _scattering_as_before(state: WindowState, steps: int, found: Predictions) -> WindowState:
-    """State whose returns over walls alone scatter no more than they did before the last `steps`, by what is
-    `found`; the same state if none has come to scatter by more than still fits (`crowd`)."""
-    log = state.log
-    before = _reweighed(state, state.window.num_poses - 1 - steps, found).log
+def _scattering_as_before(state: WindowState, steps: int) -> tuple[WindowState, Predictions] | None:
+    """State whose returns over walls alone scatter no more than they did before the last `steps`, and its predictions;
+    None if none has come to scatter by more than still fits (`crowd`)."""
+    log, until = state.log, state.window.num_poses - 1 - steps
     rows = (log.form[:, 0, 0] == TX).nonzero()[0]
-    fewer = np.minimum(log.scatter(rows), before.scatter(rows))
-    if not (log.scatter(rows) > CONSTANTS.crowd * fewer).any():
-        return state
+    now = log.scatter(rows)
+    for exact in (False, True):  # most often the residuals alone show that none has
+        found = predictions(state, 0, slopes=exact)
+        before = _reweighed(state, until, found, moved=exact).log
+        fewer = np.minimum(now, before.scatter(rows))
+        if not (now > CONSTANTS.crowd * fewer).any():
+            return None
     visibility = with_scatter(state.visibility, log.form[rows, 0], fewer)
-    return state._replace(log=log._replace(extra=np.minimum(log.extra, before.extra)), visibility=visibility)
+    log = log._replace(extra=np.minimum(log.extra, before.extra))
+    return state._replace(log=log, visibility=visibility), found
 
 
-def _log_returns(state: WindowState, begin: int, found: Predictions) -> Floats:
+def _log_returns(state: WindowState, begin: int) -> Floats:
     """Log likelihoods (P,), without their constants, of the lengths of returns over walls alone since a cycle, path by
-    path, as they are `found` at the estimate; each path scatters by a variance of its own, of which beforehand no more
-    is known than that it fits (`crowd`)."""
-    log, left = state.log, levelled(state, 0, found)[1]
+    path, at the estimate; each path scatters by a variance of its own, of which beforehand no more is known than that
+    it fits (`crowd`)."""
+    log, left = state.log, levelled(state, 0, predictions(state, 0, slopes=False))[1]
     left = left.take((log.form[left.row, 0, 0] == TX) & (log.cycle[left.row] >= begin))
     _, which = unique_forms(log.form[left.row, 0])
     square = left.left[:, 0] ** 2 * (1.0 + log.extra[left.row, 0] / log.std[left.row, 0] ** 2)

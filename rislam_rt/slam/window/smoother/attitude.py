@@ -67,9 +67,8 @@ def levelled(cosines: Floats, rotation: Floats) -> Floats:
     one, two, three = rotation.T
     # the first two numbers of r + w x r + w x (w x r) / 2
     along, across, rise = two * up - three * y, three * x - one * up, one * y - two * x
-    return np.stack(
-        [x + along + 0.5 * (two * rise - three * across), y + across + 0.5 * (three * along - one * rise)], axis=1
-    )
+    found = x + along + 0.5 * (two * rise - three * across), y + across + 0.5 * (three * along - one * rise)
+    return np.array(found).T
 
 
 def spread(cosines: Floats, covariance: Floats) -> Floats:

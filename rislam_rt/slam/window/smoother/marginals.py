@@ -11,21 +11,18 @@ def prediction_variance(window: Window, slot: Integers, slopes: Floats) -> Float
     """Marginal variance (N, 3) of predictions for poses in slots (N,), by slopes (N, 3, 4 + 3F) with respect to pose
     and features."""
     size, first = len(window.head), int(slot.min(initial=window.num_poses - 1))
-    along, free = pose_design(window)[first:], window.accel.shape[1]
-    design = np.zeros((window.num_poses - first, POSE, len(window.covariance)))
-    design[:, TURN, 6] = 1.0
-    design[:, :free, :HEAD], design[:, :free, size:] = along[..., :HEAD], along[..., HEAD:]
-    wide = (design.reshape(-1, len(window.covariance)) @ window.covariance).reshape(design.shape)
-    slot = slot - first
-    pose, cross, inner = (
-        wide @ np.swapaxes(design, 1, 2),
-        wide[:, :, HEAD:size],
-        window.covariance[HEAD:size, HEAD:size],
-    )
-    by_pose, by_map = slopes[..., :POSE], slopes[..., POSE:]
-    flat = by_map.reshape(3 * len(by_map), size - HEAD)
-    found = np.vecdot(by_pose @ pose[slot], by_pose) + 2.0 * np.vecdot(by_pose @ cross[slot], by_map)
-    return np.asarray(found + np.vecdot(flat @ inner, flat).reshape(found.shape))
+    design, covariance, slot = pose_design(window)[first:], window.covariance, slot - first
+    along = np.zeros((len(design), POSE, design.shape[2]))
+    along[:, TURN, 6] = 1.0
+    along[:, : design.shape[1]] = design
+    wide = mapped(along.reshape(-1, along.shape[2]), covariance).reshape(len(along), POSE, -1)
+    pose = wide[..., :HEAD] @ np.swapaxes(along[..., :HEAD], 1, 2)
+    pose += wide[..., size:] @ np.swapaxes(along[..., HEAD:], 1, 2)
+    # the variance by the pose, and twice the covariance with what is by the features
+    joint = np.concatenate([pose, 2.0 * wide[..., HEAD:size]], axis=2)
+    found = np.vecdot(slopes[..., :POSE] @ joint[slot], slopes)
+    flat = slopes[..., POSE:].reshape(3 * len(slopes), size - HEAD)
+    return np.asarray(found + np.vecdot(flat @ covariance[HEAD:size, HEAD:size], flat).reshape(found.shape))
 
 
 def way_variance(window: Window, one: Integers, two: Integers) -> Floats:

@@ -91,8 +91,11 @@ def principal_axes(spread: Floats) -> tuple[Floats, Floats]:
     angle = 0.5 * np.arctan2(2.0 * both, one - two)
     large = 0.5 * (one + two) + np.hypot(0.5 * (one - two), both)
     cos, sin = np.cos(angle), np.sin(angle)
-    vector = np.stack([cos, -sin, sin, cos], axis=-1)
-    return np.stack([large, (one * two - both**2) / large], axis=-1), vector.reshape(*one.shape, 2, 2)
+    found, vector = np.empty((*one.shape, 2)), np.empty(spread.shape)
+    found[..., 0], found[..., 1] = large, (one * two - both**2) / large
+    vector[..., 0, 0] = vector[..., 1, 1] = cos
+    vector[..., 0, 1], vector[..., 1, 0] = -sin, sin
+    return found, vector
 
 
 def forward(before: Floats, log_like: Floats, stay: float) -> Floats:

@@ -126,8 +126,7 @@ def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypa
 def test_no_path_tells_more_than_that_it_is_another(monkeypatch):
     """Each counts for a rare event at most, for and against, in the cycles that the manoeuvre has lasted."""
     returns, since = iter([np.array([-50.0, -60.0, 2.0, 30.0]), np.array([0.0, -1.0, 1.0, 1.0])]), []
-    monkeypatch.setattr(manoeuvres, "predictions", lambda *_: None)
-    monkeypatch.setattr(manoeuvres, "_log_returns", lambda _, begin, __: since.append(begin) or next(returns))
+    monkeypatch.setattr(manoeuvres, "_log_returns", lambda _, begin: since.append(begin) or next(returns))
     found = manoeuvres._log_borne_out(None, None, 22)
     assert found == pytest.approx(2.0 * CONSTANTS.log_rare + 1.0 - CONSTANTS.log_rare, rel=1e-12)
     assert since == [22, 22]
