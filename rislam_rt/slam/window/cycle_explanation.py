@@ -219,8 +219,8 @@ def _follow(
     """Continue, begin and end tracks with the components of a cycle that no path of the map explains."""
     speed = float(np.linalg.norm(view.mean[3:6]))
     found = _predicted(state, view.mean[3:6], dt, turn, bend)
-    late = found.last == state.cycle - 1
-    if state.config.motion == "learnt" and state.window.covariance[-1, -1] > 0.0:
+    late, learnt = found.last == state.cycle - 1, state.config.motion == "learnt"
+    if learnt and state.window.covariance[-1, -1] > 0.0:
         found, rows, picks = tracks.match_over_motions(
             found, lambda: (_predicted(state, view.mean[3:6], dt, turn, CONSTANTS.liveliest), log_manoeuvre(state)),
             observed, free, state.cycle, state.config.new_density,
@@ -237,8 +237,9 @@ def _follow(
     left[free], left[picks] = True, False
     spare = left.nonzero()[0]
     reach = np.maximum(observed.seen[spare, 0], 0.5)
-    # tracks are witnesses of the motion: none is presumed to know the one that is believed in
-    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * np.hypot(speed, CONSTANTS.walk)
+    # tracks are witnesses of the motion: none is presumed to know the one that is believed in, unless it is told
+    doubt = CONSTANTS.walk if learnt else float(np.sqrt(np.trace(view.covariance[3:6, 3:6])))
+    rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * np.hypot(speed, doubt)
     if len(state.level) > 2:  # what turns without a compass turns all that it sees
         rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
     found, fresh = tracks.start(found, observed, spare, rate, state.cycle)
@@ -247,7 +248,11 @@ def _follow(
     track[base + picks], track[base + spare] = found.ident[rows], fresh
     level = horizon.tilts.weight.sum(axis=1)
     above = level_above(tracks.nearly_level(found), found.rises, prior_tilts(state.sway))
-    found = found.keep(tracks.alive(found, state.cycle, above, level))
+    keep = tracks.alive(found, state.cycle, above, level)
+    if not learnt:
+        recent = state.cycle - found.last <= CONSTANTS.window
+        keep |= recent & tracks.recognisable(found, state.cycle, state.config.new_density)
+    found = found.keep(keep)
     log = state.log._replace(track=track)
     return _Followed(found, log, due, int(late[rows].sum()), level)
 

@@ -37,7 +37,7 @@ from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import LASTED, LATELY, REFRESH
+from rislam_rt.slam.window.solver_limits import CLIMBED, LATELY, REFRESH
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -169,7 +169,7 @@ def _associate_over_motions(
     lively, window, best = [0.0, 0.0], state.window, view_of(state.window)
     learnt = state.config.motion == "learnt"  # a motion that is told stays told
     for axis in range(2 if learnt and len(best.groups.leader) and len(window.step) else 0):
-        steps = (LATELY, int(LASTED[-1]))[axis]
+        steps = (LATELY, CLIMBED)[axis]
         solved = motion_learning.livelier(window.solved, steps, upwards=axis == 1)
         now = window_gaussian.now_under(window, solved, (best.mean, best.covariance))
         prior = CONSTANTS.log_rare - axis * CONSTANTS.log_upright  # upwards, of a floor that is not level besides

@@ -25,9 +25,10 @@ NEARBY = 2.0
 """Distance [m] beyond which two hypothetical features are not compared."""
 LATELY = 5
 """Number of last steps that a manoeuvre may cover: one that began within half a second."""
-LASTED = np.array([3, 5, 10])
-"""Numbers of last steps over which a manoeuvre is looked for that only tracks tell of; the most of them over which a
-climb is looked for that returns tell of."""
+LASTED = np.array([3, 5, 10, 20])
+"""Numbers of last steps over which a manoeuvre is looked for that only tracks tell of."""
+CLIMBED = 10
+"""Number of last steps over which a climb is looked for that returns tell of."""
 AGO = np.array([0, 3, 5, 10, 20])
 """Numbers of steps ago at which a lively segment may have begun or ended."""
 DRAWS = 12

@@ -237,10 +237,10 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
     close = found.mixed(likely.sum(axis=0))
     other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
-        # a length changes by up to twice the agent's speed, evenly, if all is at rest but for rare events
+        # a length changes by up to twice the agent's speed, evenly, if all is at rest and its track keeps to its path
         narrow = 1.0 / (variance + (found.turning**2 + 4.0 / 3.0 * (square[:, None] + climb**2)))
         still = np.exp(-0.5 * found.whole**2 * narrow) * np.sqrt(narrow / (2.0 * np.pi))
-        other = CONSTANTS.rare * other + (1.0 - CONSTANTS.rare) * still
+        other = found.astray * other + (1.0 - found.astray) * still
     return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, precision
 
 

@@ -41,6 +41,8 @@ class _PlainRates(NamedTuple):
     believed: Floats | None = None
     """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
     rest may have any rate."""
+    astray: Floats | float = CONSTANTS.rare
+    """(E,) probability of a rate that no thing at rest gives: the track changed paths, or something moves by itself."""
 
 
 class Rates(_PlainRates):
@@ -179,16 +181,35 @@ def accelerations(found: Lengths, steps: int) -> Rates:
     way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
     way -= way.mean()
     believed = way @ place[:, :2] / (way @ way)
-    return _rates(found, fine, (rate, variance, whole), 0.5 * (steps * step) ** 2, believed)
+    astray = CONSTANTS.rare * (_changed_paths(found, by, rate, variance) + CONSTANTS.rare)
+    return _rates(found, fine, (rate, variance, whole), 0.5 * (steps * step) ** 2, believed)._replace(
+        astray=astray[fine]
+    )
+
+
+def _changed_paths(found: Lengths, x: Floats, slope: Floats, variance: Floats) -> Floats:
+    """Likelihoods (E,) of what lengths leave beside their line fits over `x` (N,), of slopes (E,) within variances, if
+    tracks changed paths in between, against if they did not.
+
+    A line through a step leaves a third of what it explains at least, as in the middle; each path scatters by no more
+    than fits (`crowd`).
+    """
+    total, weight = found.total, found.weight
+    s = total(weight)
+    off = found.left - slope[found.which] * x
+    beside = total(weight * (off - (total(weight * off) / s)[found.which]) ** 2)
+    explained = CONSTANTS.crowd * slope**2 / variance
+    return np.exp(-0.5 * np.maximum(explained / 3.0 - beside, 0.0) / CONSTANTS.crowd)
 
 
 def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], Floats, Booleans]:
     """Slopes (E,) of weighted line fits over `x` (N,) to each of some values (N,), their variance (E,), and whether
-    there are enough components (E,) for a fit."""
+    there are enough components (E,) for a fit, which come from within the unit disc."""
     total, weighted = found.total, found.weight * x
     s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
     spread = s * sxx - sx**2
     enough = (found.number >= found.enough) & (spread > 1e-9 * s * s * found.heard.step**2)
+    enough &= np.vecdot(found.toward[:, :2], found.toward[:, :2]) <= 4.0 + 1e-9  # at the rim, but for rounding
     spread = np.where(enough, spread, 1.0)
     slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
     return slopes, CONSTANTS.crowd * s / spread, enough
@@ -201,7 +222,6 @@ def _rates(
     """Rates of those lengths (E,) that are `fine`, from `fits`: their rates, the variances, and the rates of measured
     lengths, over a `unit` [s or s^2]."""
     toward, heard = found.toward, found.heard
-    fine = fine & (np.vecdot(toward[:, :2], toward[:, :2]) <= 4.0 + 1e-9)  # at the rim, but for rounding
     rate, variance, whole = (each[fine] for each in fits)
     bend, bend_variance = (each[fine] for each in bends) if bends else (None, None)
     turning = heard.baseline * float(np.abs(np.diff(heard.heading)).sum()) / unit

@@ -20,7 +20,7 @@ from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
-from rislam_rt.slam.window.solver_limits import LASTED, STRIDE
+from rislam_rt.slam.window.solver_limits import CLIMBED, LASTED, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -99,7 +99,7 @@ def with_climb(state: WindowState) -> WindowState:
     While a floor is held for level, what a climb does to the returns from above is held for neighbours' pull, whose
     variance would go on holding the height. So both are weighed: the climb with the scatter from before it began.
     """
-    window, steps, learnt = state.window, int(LASTED[-1]), state.config.motion == "learnt"
+    window, steps, learnt = state.window, CLIMBED, state.config.motion == "learnt"
     if state.cycle % STRIDE or not learnt or not state.scene.use_vt or len(window.step) <= steps:
         return state
     calmer = _scattering_as_before(state, steps)
