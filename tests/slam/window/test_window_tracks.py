@@ -1,7 +1,14 @@
 """How long a track that is missed is waited for."""
 
-import numpy as np
+from pathlib import Path
 
+import numpy as np
+import pytest
+
+from rislam_rt import slam
+from rislam_rt.model import Measurement, RadioConfig, SensorModel
+from rislam_rt.scene import load_scene
+from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.landmarks.horizon_detection import level_above, prior_tilts
@@ -42,3 +49,35 @@ def test_tracks_go_on_as_in_a_manoeuvre_if_that_is_likelier_for_all_of_them():
         assert both is (lively if followed else calm)
         np.testing.assert_array_equal(rows, picks)
         assert len(rows) == (4 if followed else 4 - moved)
+
+
+@pytest.mark.parametrize("told", ["told", "learnt"])
+def test_a_faint_path_keeps_its_track_where_the_motion_is_told(told):
+    """Heard in one cycle of five among false components, for 12 s: of a motion that is learnt no rate is known, and
+    what is heard again after half a second may be anything; else it is where it is predicted."""
+    rng, config = np.random.default_rng(3), SlamConfig(filter="window", use_vt=False, motion=told)
+    body, radio = load_scene(Path(__file__).parents[3] / "scenes" / "paper_room").agent.body, RadioConfig()
+    velocity, point = np.array([0.1, 0.0, 0.0]), np.array([1.0, 1.2, 2.0])
+    start = StartPrior(np.zeros(3), velocity, 0.0)
+    state, owners = slam.init(start, body, None, SensorModel(radio), config, rng=rng), []
+    for cycle in range(120):
+        ends = 0.1 * cycle * velocity + np.stack([body.tx_offset, body.rx_offset])
+        legs = point - ends
+        far = np.linalg.norm(legs, axis=1)
+        unit = rng.standard_normal((1, 3))
+        seen = np.append(rng.uniform(1.0, 20.0), unit[0, :2] / np.linalg.norm(unit))[None]
+        if rng.random() < 0.2:
+            seen = np.concatenate([seen, np.append(far.sum(), legs[1, :2] / far[1])[None]])
+            seen[1] += rng.normal(0.0, [0.03, 0.06, 0.06])
+        number = len(seen)
+        heard = Measurement(
+            seen[:, 0] / 299792458.0, seen[:, 1:], np.full(number, 5e-6), np.full(number, 1e-10),
+            np.full((number, 2), 0.06), np.full(number, 1e-6),
+        )  # fmt: skip
+        state, _ = slam.step(state, heard, None, 0.1 * (cycle > 0), 0.0, config, rng=rng)
+        rows = (state.log.cycle == cycle).nonzero()[0]
+        if number > 1:
+            at = rows[np.argmin(np.abs(state.log.seen[rows, 0] - seen[1, 0]))]
+            owners.append(int(state.log.track[at]))
+    assert len(set(owners[:8])) == 1 if told == "told" else len(set(owners)) > 10
+    assert (-1 in owners) == (told == "told")  # born
