@@ -225,8 +225,8 @@ class _SweepState:
             self.tell(SweepProgress(done, failed, len(states), self.cost(), last))
 
     def write(self) -> None:
-        """Write the table of all cells as a sweep runs, and draw the figures of the results so far, unless the old ones
-        are kept or no cell has ended since."""
+        """Write, while a sweep runs, the table of all its cells, and draw the figures of the results so far, unless the
+        old ones are kept or no cell has ended since."""
         if self.keep or self.written:
             return
         begin = monotonic()

@@ -39,7 +39,8 @@ class Sounding(NamedTuple):
 
 
 def build_sounding(num_tones: int, radio: RadioConfig, *, element_exact: bool = False) -> Sounding:
-    """Sounding of a radio: frequencies of `num_tones` tones, and element positions of its array."""
+    """Sounding in which paths' signals are computed: frequencies of a radio's `num_tones` tones, and positions of its
+    array's elements."""
     x = radio.array.positions(1.0).reshape(radio.array.rows, radio.array.cols, 3)
     squint = radio.bandwidth / radio.carrier if element_exact else 0.0
     return Sounding(subcarrier_frequencies(num_tones, 1.0), x[:, 0, 0], x[0, :, 1], squint)

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from rislam_rt.model import SchemeResult
 from rislam_rt.slam.step_info import LossCause, StepOutcome
 
 WORDS = {
@@ -46,6 +47,13 @@ class LossTally:
         first = None if self.first is None else self.first - start
         causes = {cause.name.lower(): count for cause, count in self.causes.most_common()}
         return {"times": self.causes.total(), "first_s": first, "causes": causes}
+
+
+def loss_scores(scheme: SchemeResult) -> dict[str, Any]:
+    """Score of divergence by the filter's own word: how often it began to hold itself for lost, when, and why."""
+    tally = LossTally()
+    tally.add(scheme.time, scheme.outcome, scheme.info.get("cause"))
+    return tally.scores(float(scheme.time[0]))
 
 
 def is_unnoticed(scores: Mapping[str, Any]) -> bool:

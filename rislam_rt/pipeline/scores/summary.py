@@ -11,7 +11,7 @@ from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
-from rislam_rt.pipeline.scores.loss_causes import LossTally
+from rislam_rt.pipeline.scores.loss_causes import loss_scores
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
@@ -88,13 +88,6 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "over_budget": over_budget(seconds, result.config["budget"]),
         "seconds": float(scheme.seconds.sum()),
     }
-
-
-def loss_scores(scheme: SchemeResult) -> dict[str, Any]:
-    """Score of divergence by the filter's own word: how often it began to hold itself for lost, when, and why."""
-    tally = LossTally()
-    tally.add(scheme.time, scheme.outcome, scheme.info.get("cause"))
-    return tally.scores(float(scheme.time[0]))
 
 
 def relative_errors(scheme: SchemeResult, truth: Floats, begin: Floats) -> Floats | None:

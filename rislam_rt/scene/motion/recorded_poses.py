@@ -126,7 +126,7 @@ def _check_lengths(lines: Sequence[Sequence[str]]) -> None:
 
 
 def _in_radians(heading: Floats) -> Floats:
-    """Recorded headings (K,) [rad] as they are, unless they can only be degrees."""
+    """Headings (K,) of recorded poses [rad] as they are, unless they can only be degrees."""
     largest = float(heading[np.argmax(np.abs(heading))])
     if abs(largest) > MAX_HEADING:
         mend = "call the column 'heading_deg' if these are degrees, or bring them to -pi to pi"

@@ -126,7 +126,8 @@ class _XmlMaterials:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """Material of a shape of an XML scene file: its own, or the one it refers to; None where nothing reflects."""
+        """Material, as an XML scene is read, of one of its shapes: its own, or the one it refers to; None where nothing
+        reflects."""
         for own in children(shape, "bsdf"):
             return self._noted(read_material(own)).material
         for reference in children(shape, "ref"):

@@ -189,7 +189,8 @@ def excess_now(window: Window) -> Floats:
 
 
 def _excess(window: Window, rows: Floats) -> Floats:
-    """Excess covariance (6, 6) of the present, from its covariance (7, D) with all of the window's unknowns."""
+    """Excess covariance (6, 6) of the window's present pose and velocity, from its covariance (7, D) with all of the
+    window's unknowns."""
     size = len(window.head)
     whole, late = rows[:6, :size], rows[:6, size:]
     pushed = late * np.sqrt(_surplus(window.solved, window.variance)).ravel()
