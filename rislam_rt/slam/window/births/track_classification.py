@@ -10,14 +10,17 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.hypotheses.hypotheses import (
+    BESIDE,
     IS_IMAGE,
     TWO_WALLS,
+    WALL,
     WALLS,
     Hypotheses,
     KnownFeatures,
     hypotheses,
 )
 from rislam_rt.slam.window.hypotheses.hypothesis_evidence import (
+    LEVEL_RISE,
     MORE_UNKNOWN,
     concurrent,
     direction_beliefs,
@@ -159,7 +162,7 @@ def decide_tracks(
 
     Of these `told` gives track, log evidence, and the number of the panel that they run over, -1 for none.
 
-    `track_rows` are the tracks' rows of the log, `owner` (E,) the track of each summary; `lonely` (T, 3) is the log
+    `track_rows` are the tracks' rows of the log, `owner` (E,) the track of each summary; `lonely` (T, 4) is the log
     probability that so few single-bounce returns are heard beside a return over two unknown walls of each kind of pair,
     `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
@@ -178,12 +181,17 @@ def decide_tracks(
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += log_shared(table, fits, evidence, none, explained, summary.middle, concurrent(context, track_rows))
+    echo = (
+        log_echo_over_floor(table, fits, evidence, summary.middle, lonely)
+        if scene.use_vt
+        else np.full(len(none), -np.inf)
+    )
     decisions, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(summary.seen)):
         own = (track == row).nonzero()[0]
         own_told = [i for i, (which, _) in enumerate(explained) if which == row]
         weight = np.concatenate([[none[row]], evidence[own], [explained[i][1] for i in own_told]])
-        total = np.logaddexp.reduce(weight)
+        total = np.logaddexp(np.logaddexp.reduce(weight), echo[row])
         shares[own_told] = np.exp(weight[1 + len(own) :] - total)
         best = int(np.argmax(weight[: 1 + len(own)]))
         same = _alike(table, fits, own, own[best - 1]) if best else np.zeros(0, dtype=np.bool_)
@@ -208,6 +216,21 @@ def decide_tracks(
             )
         )  # fmt: skip
     return decisions, shares
+
+
+def log_echo_over_floor(table: Hypotheses, fits: Fits, evidence: Floats, middle: Floats, lonely: Floats) -> Floats:
+    """Log evidence (T,), to classify tracks, of what comes over the floor and a lower ceiling, which changes its length
+    nearly as the single return of a higher ceiling does: of a wall on the path more, beside which the ceiling's own
+    return should be heard (`lonely`).
+
+    Of level ceilings `TWO_WALLS` says so; where the ceiling slopes, the two walls are neither opposite nor at right
+    angles.
+    """
+    span = fits.place - middle
+    above = np.isin(table.kind, (WALL, BESIDE)) & (span[:, 2] > LEVEL_RISE * np.linalg.norm(span, axis=1))
+    found = np.full(len(lonely), -np.inf)
+    np.logaddexp.at(found, table.trials.track[above], evidence[above])
+    return np.asarray(found + 2.0 * CONSTANTS.wall_ratio + lonely[:, 3])
 
 
 def log_no_kind(seen: Floats, use_vt: bool) -> Floats:

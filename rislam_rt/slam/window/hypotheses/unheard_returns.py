@@ -124,8 +124,9 @@ def log_silence(shows: Floats, present: Booleans) -> float:
 
 
 def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
-    """Log probability (T, 3) that so few single-bounce returns are heard beside each track, were it a return over two
-    unknown walls: opposite ones, two upright ones, or an upright and a level one (as `hypotheses` has them).
+    """Log probability (T, 4) that so few single-bounce returns are heard beside each track, were it a return over two
+    unknown walls: opposite ones, two upright ones, an upright and a level one (as `hypotheses` has them), or the floor
+    and a ceiling that may slope.
 
     Two walls shift the Tx by the sum of what each does. At right angles, a single return of theirs is one leg of a
     right angle; something may stand in its way. Of opposite walls both come along the same line, over the very ways
@@ -158,7 +159,11 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     if context.scene.radio.array.pattern == "upper":
         opposite += looked.ray[: len(rows), 2] > 1.0 - LEG
     along_one = np.log1p(-CONSTANTS.shown) * (2 - np.minimum(opposite, 2))
-    return np.stack([along_one, square, square], axis=1)
+    # whose own return, nearly along the track's line, may be pulled and fade: so it was not born before, or aslant
+    lower = (reach < looked.length[:, None] - 2.0 * CONSTANTS.depth) & (along > 1.0 - LEG)
+    ceiling = np.zeros(len(rows), dtype=np.bool_)
+    np.logical_or.at(ceiling, looked.track, lower.any(axis=1))
+    return np.stack([along_one, square, square, np.where(ceiling, 0.0, np.log1p(-CONSTANTS.shown))], axis=1)
 
 
 class Bearings(NamedTuple):

@@ -46,7 +46,7 @@ def test_a_corner_has_the_single_returns_of_its_walls_beside_it(heard, expected)
     """All are as loud as mirrors."""
     rays = np.array([[0.96, 0.28], [-0.28, 0.96], np.array([[0.96, -0.28], [0.28, 0.96]]) @ CORNER / np.hypot(*CORNER)])
     context = _context(heard, rays, np.full((3, 2), 1e-3))
-    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0, 1:] == pytest.approx([expected, expected])
+    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0, 1:3] == pytest.approx([expected, expected])
 
 
 @pytest.mark.parametrize(("heard", "expected"), EVERY)
@@ -55,7 +55,7 @@ def test_walls_on_the_arrays_own_lines_are_heard_beside_their_corner(heard, expe
     no direction. So the corner's return was the first wall of a hall, one that slants."""
     rays = np.array([[1.0, 0.0], [0.0, 1.0], CORNER / np.hypot(*CORNER)])
     context = _context(heard, rays, [[1.0, 1e-3], [1e-3, 1.0], [1e-3, 1e-3]])
-    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0, 1:] == pytest.approx([expected, expected])
+    assert missing_legs(context, np.array([2]), np.zeros(HEAD))[0, 1:3] == pytest.approx([expected, expected])
 
 
 def test_what_is_heard_from_both_ends_has_two_bearings():
@@ -90,3 +90,38 @@ def test_opposite_walls_have_single_returns_that_make_up_the_return_over_both(le
     context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
     found = missing_legs(context, np.array([count - 1]), np.zeros(HEAD))[0, 0]
     assert found == pytest.approx(missing * np.log1p(-CONSTANTS.shown))
+
+
+@pytest.mark.parametrize(
+    ("length", "aslant", "heard"), [(5.8, 0.2, True), (5.8, 0.5, False), (9.0, 0.0, False)],
+    ids=["a pulled return", "another direction", "a longer way"],
+)  # fmt: skip
+def test_an_echo_over_the_floor_has_its_ceilings_own_return_beside_it(length, aslant, heard):
+    """However faint: merged with others it fades, its direction is pulled, and the echo is the clearer of both."""
+    state = np.array([[length, aslant, 0.0], [7.8, 0.0, 0.0]])
+    log = empty_log()._replace(cycle=np.zeros(2, dtype=int), seen=state, std=np.full((2, 3), 1e-3), track=np.arange(2))
+    tracks = SimpleNamespace(
+        hits=np.full(2, 9), mean=np.stack([state, 0.0 * state], axis=-1), log_amplitude=np.array([-12.0, -8.0]),
+        ident=np.arange(2),
+    )  # fmt: skip
+    landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
+    scene = SimpleNamespace(radio=RadioConfig())
+    context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
+    found = missing_legs(context, np.array([1]), np.zeros(HEAD))[0, 3]
+    assert found == pytest.approx(0.0 if heard else np.log1p(-CONSTANTS.shown))
+
+
+def test_an_echo_over_the_floor_passes_for_a_higher_ceiling():
+    """Over 0.8 m below a ceiling that slopes by 2 degrees, the lengths over floor and ceiling are those of one plane,
+    which slopes by as much as the direction says but for 0.01; over opposite walls they would not change at all."""
+    normal, height, agent = np.array([np.sin(0.035), 0.0, np.cos(0.035)]), 3.9, np.array([0.0, 0.0, 1.0])
+    place = agent + np.linspace(0.0, 0.8, 9)[:, None] * [1.0, 0.0, 0.0]
+    below = place * [1.0, 1.0, -1.0]
+    image = below + 2.0 * (height - below @ normal)[:, None] * normal
+    ray = image - place
+    length = np.linalg.norm(ray, axis=1)
+    toward = ray[0] / length[0]
+    assert np.ptp(length) > 0.05
+    single = np.linalg.lstsq(np.column_stack([np.ones(9), place[:, 0]]), length, rcond=None)[0]
+    assert np.abs(length - single[0] - single[1] * place[:, 0]).max() < 1e-4
+    assert abs(-0.5 * single[1] - toward[0]) < 0.01  # sine of the slope: by the lengths, and by the direction
