@@ -191,15 +191,34 @@ def _changed_paths(found: Lengths, x: Floats, slope: Floats, variance: Floats) -
     """Likelihoods (E,) of what lengths leave beside their line fits over `x` (N,), of slopes (E,) within variances, if
     tracks changed paths in between, against if they did not.
 
-    A line through a step leaves a third of what it explains at least, as in the middle; each path scatters by no more
-    than fits (`crowd`).
+    Of a step between two components a line leaves at least so much of what it explains as it does of the step that it
+    fits best; each path scatters by no more than fits (`crowd`).
     """
     total, weight = found.total, found.weight
     s = total(weight)
     off = found.left - slope[found.which] * x
     beside = total(weight * (off - (total(weight * off) / s)[found.which]) ** 2)
     explained = CONSTANTS.crowd * slope**2 / variance
-    return np.exp(-0.5 * np.maximum(explained / 3.0 - beside, 0.0) / CONSTANTS.crowd)
+    best = np.clip(_best_step(found, x), 1e-9, 1.0)
+    return np.exp(-0.5 * np.maximum(explained * (1.0 - best) / best - beside, 0.0) / CONSTANTS.crowd)
+
+
+def _best_step(found: Lengths, x: Floats) -> Floats:
+    """Largest share (E,) of the square of a step of lengths between two components that a line over `x` (N,) explains,
+    wherever the step is."""
+    order = np.lexsort((found.time, found.which))
+    which, weight, x = found.which[order], found.weight[order], x[order]
+    s, sx, sxx = (np.bincount(which, weight * x**power, len(found.number)) for power in range(3))
+    before, way = np.cumsum(weight), np.cumsum(weight * x)
+    start = np.append(0, np.cumsum(found.number)[:-1])[which]
+    before, way = (value - np.append(0.0, value)[start] for value in (before, way))
+    s, sx, sxx = s[which], sx[which], sxx[which]
+    parted, spread = before * (s - before), s * sxx - sx**2
+    fine = (parted > 1e-9 * s**2) & (spread > 0.0)
+    share = np.where(fine, (way * s - before * sx) ** 2 / np.where(fine, parted * spread, 1.0), 0.0)
+    best = np.zeros(len(found.number))
+    np.maximum.at(best, which, share)
+    return best
 
 
 def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], Floats, Booleans]:

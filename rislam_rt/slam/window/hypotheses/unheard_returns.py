@@ -15,6 +15,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.predicted_returns import poses_of, reflect
 from rislam_rt.slam.window.hypotheses.hypotheses import Hypotheses
+from rislam_rt.slam.window.hypotheses.hypothesis_evidence import LEVEL_RISE
 from rislam_rt.slam.window.hypotheses.path_feasibility import over_known
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.horizon_detection import above_within, elevations
@@ -131,12 +132,14 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     Two walls shift the Tx by the sum of what each does. At right angles, a single return of theirs is one leg of a
     right angle; something may stand in its way. Of opposite walls both come along the same line, over the very ways
     that the track goes: nothing blocks one alone, and their lengths add up to the track's. All are brighter than the
-    track, the floor's is never heard, and they are compared as they are now: near a corner they change fast.
+    track, the floor's is never heard, and they are compared as they are now: near a corner they change fast. Beside an
+    echo over the floor the ceiling's own return is asked for by length and direction alone, however faint.
     """
     every, looked = context.tracks, bearings(context, rows, mean)
     shine = every.log_amplitude[rows[looked.track]] + np.log(looked.length)
     old = (every.hits >= 3).nonzero()[0]
     away, reach, owner = bearings(context, old, mean)
+    tracks = len(away)
     shines, walls = every.log_amplitude[old[owner]] + np.log(reach), context.landmarks.walls
     if len(walls):
         place, anchor = mean[HEAD:].reshape(-1, 3)[walls], context.landmarks.anchor[walls]
@@ -163,7 +166,10 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     lower = (reach < looked.length[:, None] - 2.0 * CONSTANTS.depth) & (along > 1.0 - LEG)
     ceiling = np.zeros(len(rows), dtype=np.bool_)
     np.logical_or.at(ceiling, looked.track, lower.any(axis=1))
-    return np.stack([along_one, square, square, np.where(ceiling, 0.0, np.log1p(-CONSTANTS.shown))], axis=1)
+    echo = np.where(ceiling, 0.0, np.log1p(-CONSTANTS.shown))
+    if context.scene.radio.array.pattern != "upper" or (away[tracks:, 2] < -LEVEL_RISE).any():
+        echo[:] = -np.inf  # the floor is heard itself, or known: then the map says what comes over it
+    return np.stack([along_one, square, square, echo], axis=1)
 
 
 class Bearings(NamedTuple):

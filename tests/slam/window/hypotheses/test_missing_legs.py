@@ -1,5 +1,6 @@
 """Single returns of two walls: those that are heard where the pair is heard now."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,6 +18,10 @@ LENGTH = 2.0 * np.append(CORNER, np.hypot(*CORNER))
 """[m] of the two walls' own returns and of the corner's."""
 EVERY = [([0, 1], 0.0), ([0], np.log1p(-CONSTANTS.steady)), ([], CONSTANTS.log_rare)]
 """Which of the walls' own returns are heard, and what that tells of the corner's."""
+
+
+MISSED = np.log1p(-CONSTANTS.shown)
+"""Log probability that a return is missed where nothing blocks it."""
 
 
 def _context(heard, rays, spreads):
@@ -93,10 +98,12 @@ def test_opposite_walls_have_single_returns_that_make_up_the_return_over_both(le
 
 
 @pytest.mark.parametrize(
-    ("length", "aslant", "heard"), [(5.8, 0.2, True), (5.8, 0.5, False), (9.0, 0.0, False)],
-    ids=["a pulled return", "another direction", "a longer way"],
+    ("length", "aslant", "floor", "pattern", "expected"),
+    [(5.8, 0.2, False, "upper", 0.0), (5.8, 0.5, False, "upper", MISSED), (9.0, 0.0, False, "upper", MISSED),
+     (7.6, 0.0, False, "upper", MISSED), (5.8, 0.2, True, "upper", -np.inf), (5.8, 0.2, False, "isotropic", -np.inf)],
+    ids=["a pulled return", "another direction", "a longer way", "as high", "a known floor", "a floor that is heard"],
 )  # fmt: skip
-def test_an_echo_over_the_floor_has_its_ceilings_own_return_beside_it(length, aslant, heard):
+def test_an_echo_has_its_ceilings_own_return_beside_it(length, aslant, floor, pattern, expected):
     """However faint: merged with others it fades, its direction is pulled, and the echo is the clearer of both."""
     state = np.array([[length, aslant, 0.0], [7.8, 0.0, 0.0]])
     log = empty_log()._replace(cycle=np.zeros(2, dtype=int), seen=state, std=np.full((2, 3), 1e-3), track=np.arange(2))
@@ -104,24 +111,9 @@ def test_an_echo_over_the_floor_has_its_ceilings_own_return_beside_it(length, as
         hits=np.full(2, 9), mean=np.stack([state, 0.0 * state], axis=-1), log_amplitude=np.array([-12.0, -8.0]),
         ident=np.arange(2),
     )  # fmt: skip
-    landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
-    scene = SimpleNamespace(radio=RadioConfig())
+    walls, radio = np.arange(1 if floor else 0), RadioConfig()
+    landmarks = SimpleNamespace(walls=walls, anchor=np.zeros((len(walls), 3)))
+    scene = SimpleNamespace(radio=replace(radio, array=replace(radio.array, pattern=pattern)))
     context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
-    found = missing_legs(context, np.array([1]), np.zeros(HEAD))[0, 3]
-    assert found == pytest.approx(0.0 if heard else np.log1p(-CONSTANTS.shown))
-
-
-def test_an_echo_over_the_floor_passes_for_a_higher_ceiling():
-    """Over 0.8 m below a ceiling that slopes by 2 degrees, the lengths over floor and ceiling are those of one plane,
-    which slopes by as much as the direction says but for 0.01; over opposite walls they would not change at all."""
-    normal, height, agent = np.array([np.sin(0.035), 0.0, np.cos(0.035)]), 3.9, np.array([0.0, 0.0, 1.0])
-    place = agent + np.linspace(0.0, 0.8, 9)[:, None] * [1.0, 0.0, 0.0]
-    below = place * [1.0, 1.0, -1.0]
-    image = below + 2.0 * (height - below @ normal)[:, None] * normal
-    ray = image - place
-    length = np.linalg.norm(ray, axis=1)
-    toward = ray[0] / length[0]
-    assert np.ptp(length) > 0.05
-    single = np.linalg.lstsq(np.column_stack([np.ones(9), place[:, 0]]), length, rcond=None)[0]
-    assert np.abs(length - single[0] - single[1] * place[:, 0]).max() < 1e-4
-    assert abs(-0.5 * single[1] - toward[0]) < 0.01  # sine of the slope: by the lengths, and by the direction
+    mean = np.concatenate([np.zeros(HEAD), *([[0.0, 0.0, -2.0]] if floor else [])])
+    assert missing_legs(context, np.array([1]), mean)[0, 3] == pytest.approx(expected)
