@@ -220,8 +220,8 @@ def decide_tracks(
 
 def log_echo_over_floor(table: Hypotheses, fits: Fits, evidence: Floats, middle: Floats, lonely: Floats) -> Floats:
     """Log evidence (T,), to classify tracks, of what comes over the floor and a lower ceiling, which changes its length
-    nearly as the single return of a wall nearly overhead does: of a wall on the path more, beside which the ceiling's own
-    return should be heard (`lonely`).
+    nearly as the single return of a wall nearly overhead does: of a wall on the path more, beside which the ceiling's
+    own return should be heard (`lonely`).
 
     Of level ceilings `TWO_WALLS` says so; where the ceiling slopes, the two walls are neither opposite nor at right
     angles.
