@@ -65,10 +65,10 @@ def _mend(radio: RadioConfig, receiver: ReceiverConfig, latest: float) -> str:
     """Setting under which late paths, up to the `latest` [s], are heard, and what it costs."""
     delay = STEP * float(np.ceil(latest / STEP))
     if receiver.estimator == "bound":
-        return f"give receiver.max_delay = {delay:.3g}"
+        return f"give receiver.max_delay = {delay:.9g}"
     if SPARE * radio.bandwidth * delay > MOST_TONES:
         return "lead the way nearer to what is far, or take less bandwidth: no sounding has a tone for each such delay"
-    told, count = f"give receiver.max_delay = {delay:.3g}", receiver.num_subcarriers
+    told, count = f"give receiver.max_delay = {delay:.9g}", receiver.num_subcarriers
     if count and count < SPARE * radio.bandwidth * delay:
         told += " and receiver.num_subcarriers = 0"
         count = 0

@@ -68,7 +68,8 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
     names = [name for name in scores["landmarks"] if "cycles_identified" not in scores["landmarks"][name]]
     held = sum(scores["landmarks"][name]["final_m"] is not None for name in names)
     parts.append(f"{held} of {len(names)} scatterers")
-    parts.append(f"{found_of_heard(scores['walls'])} walls that were heard")
+    walls = found_of_heard(scores["walls"])  # of a run in slices, whatever was heard
+    parts.append(f"{walls} walls" + (" that were heard" if " of " in walls else ""))
     return "; ".join(parts)
 
 

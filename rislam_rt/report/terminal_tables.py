@@ -65,16 +65,16 @@ def _wall_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """Rows of a terminal table: how many walls each scheme found of those heard for `HEARD` seconds, and ghosts; each
     wall that was heard or found; how many there are else. Walls in one plane are one."""
     found = [f"{found_of_heard(s['walls'])}{_ghosts(s['ghost_walls'])}" for s in schemes]
-    rows, others = [["walls found of those heard", *found]], 0
+    asked = all(plane.heard is not None for s in schemes for plane in plane_scores(s["walls"]))
+    rows, others = [["walls found of those heard" if asked else "walls found", *found]], 0
     for planes in zip(*(plane_scores(s["walls"]) for s in schemes), strict=True):
         if not any(plane.heard or plane.found for plane in planes):
             others += 1
             continue
         first, *more = planes[0].names
         rows.append([f"wall {first}{f' (+{len(more)} in its plane)' if more else ''}", *map(_wall, planes)])
-    return rows + (
-        [[counted(others, "other wall"), *(f"not heard for {HEARD:g} s" for _ in schemes)]] if others else []
-    )
+    why = f"not heard for {HEARD:g} s" if asked else "not found"
+    return rows + ([[counted(others, "other wall"), *(why for _ in schemes)]] if others else [])
 
 
 def _ghosts(count: int) -> str:

@@ -46,8 +46,8 @@ def test_walls_in_one_plane_are_one_and_a_wall_that_was_found_is_shown():
 def test_a_run_in_slices_lists_what_it_found():
     unasked = {"audible_s": None}
     walls = _wall_rows(a=_scheme(near=FOUND | unasked, far=MISSED | unasked))
-    assert walls[:2] == [["walls found of those heard", "1"], ["wall near", "1.0 cm, 0.1°"]]
-    assert walls[2][0] == "1 other wall"
+    assert walls[:2] == [["walls found", "1"], ["wall near", "1.0 cm, 0.1°"]]
+    assert walls[2] == ["1 other wall", "not found"]  # whether it was heard is not known
 
 
 def test_the_shape_of_the_path_and_what_was_associated_have_rows_of_their_own():

@@ -131,9 +131,10 @@ def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding
 def _hung(triangles: Floats, panel: RisPanel) -> Integers:
     """Numbers of its host's triangles (T, 3, 3) that a RIS panel lies on, or hangs before by at most `THICKEST`."""
     normal, offset = triangle_planes(triangles)
-    height = normal @ panel.center - offset
-    before = height * np.copysign(1.0, normal @ panel.spec.normal)
-    near = np.flatnonzero((before >= -MIN_CLEARANCE) & (before <= THICKEST))
+    height, facing = normal @ panel.center - offset, normal @ panel.spec.normal
+    before = np.where(np.abs(facing) > 0.5, height * np.copysign(1.0, facing), np.abs(height))
+    thickest = np.where(np.abs(facing) > 0.5, THICKEST, MIN_CLEARANCE)  # what stands across it has nothing hung before
+    near = np.flatnonzero((before >= -MIN_CLEARANCE) & (before <= thickest))
     feet = panel.center - height[near, None] * normal[near]
     on = [len(touching(foot[None], triangles[t][None], MIN_CLEARANCE)[0]) for foot, t in zip(feet, near, strict=True)]
     return near[np.array(on, dtype=np.int64) > 0]
@@ -143,8 +144,8 @@ def _off_host(triangles: Floats, panel: RisPanel) -> tuple[str, str]:
     """Message that a RIS panel is off its host of these triangles (T, 3, 3), and how to mend it: the center to give,
     if there is one in the plane that is nearest."""
     normal, offset = triangle_planes(triangles)
-    height = normal @ panel.center - offset
-    nearest = int(np.argmin(np.abs(height)))
+    height, across = normal @ panel.center - offset, np.abs(normal @ panel.spec.normal) <= 0.5
+    nearest = int(np.argmin(np.where(across & ~across.all(), np.inf, np.abs(height))))
     foot, gap = panel.center - height[nearest] * normal[nearest], float(abs(height[nearest]))
     beside = not len(touching(foot[None], triangles, MIN_CLEARANCE)[0])
     if gap <= MIN_CLEARANCE or (beside and gap <= THICKEST):

@@ -197,8 +197,9 @@ def start(
 
 
 def recognisable(tracks: WindowTracks, cycle: int, strangers: float) -> Booleans:
-    """Whether a component where each track (T,) is predicted would be held for its continuation rather than for a new
-    path, of which `strangers` are to be expected per metre, unit of each cosine and e-fold of amplitude."""
+    """Whether a component where each track (T,) is predicted, measured without error, would be held for its
+    continuation rather than for a new path, of which `strangers` are to be expected per metre, unit of each cosine and
+    e-fold of amplitude."""
     heard, variance = share(tracks, cycle), tracks.covariance[..., 0, 0].prod(axis=1) * WANDER**2
     log_odds = np.log(heard / (1.0 + CONSTANTS.rare - heard))
     return np.asarray(log_odds - 0.5 * np.log((2.0 * np.pi) ** 4 * variance) > np.log(strangers))
