@@ -196,7 +196,8 @@ def _bounds(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any
     limits = [gain["bound_gain"] for gain in known if gain not in above and gain["bound_gain"] is not None]
     if not limits:
         return ""
-    return f"There the bounds differ by {100 * min(limits):.0f} to {100 * max(limits):.0f} %."
+    low, high = (f"{100 * limit:.0f}" for limit in (min(limits), max(limits)))
+    return f"There the bounds differ by {low if low == high else f'{low} to {high}'} %."
 
 
 def _judgement(held: Sequence[bool], some: bool) -> str:
