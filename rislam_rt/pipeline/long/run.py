@@ -108,21 +108,38 @@ def read_any(folder: Path) -> LongRun:
     ConfigError
         The folder is not a completed run.
     """
-    about = run_folder.read_marker(folder) if (folder / run_folder.RUN_FILE).is_file() else {}
-    if "config" in about:
-        check_settings(folder, about["config"])
-    if "slices" not in about:
+    about = checked_slices(folder)
+    if about is None:
         result = run_folder.read_run(folder)
         return LongRun(summarise(result), result)
-    if about["state"] != run_folder.DONE:
-        raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
-    run_folder.check_files(folder, about)
     with run_folder.reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
         return _gather(folder, scene, about, about["identity"])
 
 
-def check_settings(folder: Path, config: Mapping[str, Any]) -> None:
+def checked_slices(folder: Path) -> dict[str, Any] | None:
+    """Marker of a completed run in slices, whose settings this version knows and whose files are as they were written;
+    None if the run is not in slices.
+
+    Raises
+    ------
+    ResultError
+        A file is missing, damaged or changed; another version wrote it, with settings that this one lacks.
+    ConfigError
+        The run is not completed.
+    """
+    about = run_folder.read_marker(folder) if (folder / run_folder.RUN_FILE).is_file() else {}
+    if "config" in about:
+        _check_settings(folder, about["config"])
+    if "slices" not in about:
+        return None
+    if about["state"] != run_folder.DONE:
+        raise ConfigError(f"{folder}: not a completed run; the command that began it goes on with it")
+    run_folder.check_files(folder, about)
+    return about
+
+
+def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
     """Check that this version knows all settings of a run read from `folder`, as its bounds are computed from them."""
     try:
         PipelineSpec.model_validate(dict(config))

@@ -10,7 +10,7 @@ import numpy as np
 from rislam_rt.errors import ConfigError, ResultError, StoreError
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline.long import slices
-from rislam_rt.pipeline.long.run import check_settings
+from rislam_rt.pipeline.long.run import checked_slices
 from rislam_rt.pipeline.recordings.inputs import PADDING, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.store import run_folder
 from rislam_rt.scene import load_scene
@@ -35,12 +35,9 @@ def read_whole(folder: Path) -> SlamResult:
     ConfigError
         The folder is not a completed run.
     """
-    about = run_folder.read_marker(folder) if (folder / run_folder.RUN_FILE).is_file() else {}
-    if "config" in about:
-        check_settings(folder, about["config"])
-    if "slices" not in about or about["state"] != run_folder.DONE:
+    about = checked_slices(folder)
+    if about is None:
         return run_folder.read_run(folder)
-    run_folder.check_files(folder, about)
     with run_folder.reading_run(folder):
         scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
         schemes: dict[str, Any] = {}

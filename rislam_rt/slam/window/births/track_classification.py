@@ -181,11 +181,7 @@ def decide_tracks(
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += log_shared(table, fits, evidence, none, explained, summary.middle, concurrent(context, track_rows))
-    echo = (
-        log_echo_over_floor(table, fits, evidence, summary.middle, lonely)
-        if scene.use_vt
-        else np.full(len(none), -np.inf)
-    )
+    echo = log_echo_over_floor(table, fits, evidence, summary.middle, lonely)
     decisions, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(summary.seen)):
         own = (track == row).nonzero()[0]

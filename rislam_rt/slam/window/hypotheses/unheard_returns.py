@@ -167,8 +167,11 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     ceiling = np.zeros(len(rows), dtype=np.bool_)
     np.logical_or.at(ceiling, looked.track, lower.any(axis=1))
     echo = np.where(ceiling, 0.0, np.log1p(-CONSTANTS.shown))
-    if context.scene.radio.array.pattern != "upper" or (away[tracks:, 2] < -LEVEL_RISE).any():
-        echo[:] = -np.inf  # the floor is heard itself, or known: then the map says what comes over it
+    scene, floor = context.scene, (away[tracks:, 2] < -LEVEL_RISE).any()
+    if floor or not scene.use_vt or scene.radio.array.pattern != "upper":
+        echo[
+            :
+        ] = -np.inf  # the floor is known or heard itself, and the map says what comes over it; or nothing is asked
     return np.stack([along_one, square, square, echo], axis=1)
 
 

@@ -42,7 +42,7 @@ def _context(heard, rays, spreads):
         ident=np.arange(3),
     )  # fmt: skip
     landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
-    scene = SimpleNamespace(radio=RadioConfig())
+    scene = SimpleNamespace(radio=RadioConfig(), use_vt=True)
     return SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
 
 
@@ -91,7 +91,7 @@ def test_opposite_walls_have_single_returns_that_make_up_the_return_over_both(le
         ident=np.arange(count),
     )  # fmt: skip
     landmarks = SimpleNamespace(walls=np.zeros(0, dtype=np.int64), anchor=np.zeros((0, 3)))
-    scene = SimpleNamespace(radio=RadioConfig())
+    scene = SimpleNamespace(radio=RadioConfig(), use_vt=True)
     context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
     found = missing_legs(context, np.array([count - 1]), np.zeros(HEAD))[0, 0]
     assert found == pytest.approx(missing * np.log1p(-CONSTANTS.shown))
@@ -113,7 +113,7 @@ def test_an_echo_has_its_ceilings_own_return_beside_it(length, aslant, floor, pa
     )  # fmt: skip
     walls, radio = np.arange(1 if floor else 0), RadioConfig()
     landmarks = SimpleNamespace(walls=walls, anchor=np.zeros((len(walls), 3)))
-    scene = SimpleNamespace(radio=replace(radio, array=replace(radio.array, pattern=pattern)))
+    scene = SimpleNamespace(radio=replace(radio, array=replace(radio.array, pattern=pattern)), use_vt=True)
     context = SimpleNamespace(tracks=tracks, heading=np.zeros(1), landmarks=landmarks, log=log, scene=scene)
     mean = np.concatenate([np.zeros(HEAD), *([[0.0, 0.0, -2.0]] if floor else [])])
     assert missing_legs(context, np.array([1]), mean)[0, 3] == pytest.approx(expected)
