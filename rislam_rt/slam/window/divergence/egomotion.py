@@ -226,9 +226,11 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
     E)."""
     left = found.rate - found.toward[:, 2] * climb - velocity @ found.toward[:, :2].T
     # a direction errs in all of the motion, what the positions have taken out of the lengths included
-    speed = velocity if found.believed is None else velocity + found.believed
-    square = np.vecdot(speed, speed)
-    variance = found.variance + found.blur**2 * square[:, None]
+    speed, rise = velocity, np.asarray(climb)
+    if found.believed is not None:
+        speed, rise = velocity + found.believed[:2], climb + found.believed[2]
+    square, rise = np.vecdot(speed, speed)[:, None], rise**2
+    variance = found.variance + found.blur**2 * square + found.lean**2 * rise
     # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
     # every other one of them over more than one wall, where a turn of the body changes the length as well
     precision = 1.0 / (variance + np.array([0.0, found.turning**2])[:, None, None])
@@ -238,7 +240,7 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
     other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
         # a length changes by up to twice the agent's speed, evenly, if all is at rest and its track keeps to its path
-        narrow = 1.0 / (variance + (found.turning**2 + 4.0 / 3.0 * (square[:, None] + climb**2)))
+        narrow = 1.0 / (variance + (found.turning**2 + 4.0 / 3.0 * (square + rise)))
         still = np.exp(-0.5 * found.whole**2 * narrow) * np.sqrt(narrow / (2.0 * np.pi))
         other = found.astray * other + (1.0 - found.astray) * still
     return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, precision

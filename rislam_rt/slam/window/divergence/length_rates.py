@@ -39,8 +39,8 @@ class _PlainRates(NamedTuple):
     owner: Integers | None = None
     """(E,) track or path of each direction; None where each has one."""
     believed: Floats | None = None
-    """(2,) horizontal motion of the agent beside the one that is asked for; None where what is no path of a thing at
-    rest may have any rate."""
+    """(3,) motion of the agent beside the one that is asked for; None where what is no path of a thing at rest may have
+    any rate."""
     astray: Floats | float = CONSTANTS.rare
     """(E,) probability of a rate that no thing at rest gives: the track changed paths, or something moves by itself."""
 
@@ -66,6 +66,13 @@ class Rates(_PlainRates):
     def share(self) -> Floats:
         """(E,) probability of each direction beforehand: a half where there are two."""
         return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
+
+    @cached_property
+    def lean(self) -> Floats:
+        """(E,) error of the rate by that of the direction's elevation, as a share of the vertical speed: what errs in the
+        cosines by `blur` errs in the elevation's sine by the more, the lower it is."""
+        up = np.maximum(0.25 * self.toward[:, 2] ** 2, np.maximum(0.5 * self.blur, 1e-12))
+        return self.blur * np.sqrt(np.maximum(1.0 - up, 0.0) / up)
 
     @cached_property
     def kept(self) -> Floats:
@@ -168,7 +175,7 @@ def rates(found: Lengths) -> Rates:
     (rate,), variance, fine = _slopes(found, found.time, found.left)
     rate = rate + found.toward @ velocity
     bends = _bends(found, float(velocity @ velocity))
-    return _rates(found, fine, (rate, variance, rate), time, np.zeros(2), bends)
+    return _rates(found, fine, (rate, variance, rate), time, np.zeros(3), bends)
 
 
 def accelerations(found: Lengths, steps: int) -> Rates:
@@ -180,7 +187,7 @@ def accelerations(found: Lengths, steps: int) -> Rates:
     (rate, whole), variance, fine = _slopes(found, by, found.left, found.length)
     way = 0.5 * (step * np.maximum(np.arange(steps + 1 - len(place), steps + 1), 0.0)) ** 2
     way -= way.mean()
-    believed = way @ place[:, :2] / (way @ way)
+    believed = way @ place / (way @ way)
     astray = CONSTANTS.rare * (_changed_paths(found, by, rate, variance) + CONSTANTS.rare)
     return _rates(found, fine, (rate, variance, whole), 0.5 * (steps * step) ** 2, believed)._replace(
         astray=astray[fine]

@@ -166,7 +166,7 @@ def test_a_climb_is_told_by_the_rates_of_all_lengths():
     """Two ways: Laplace's evidence at the likeliest climb, against the integral over all climbs."""
     rng = np.random.default_rng(5)
     for climb in (0.4, -0.9):
-        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(2))
+        found = _rates(np.array([0.0, 0.0, climb]), rng)._replace(believed=np.zeros(3))
         log_odds, told = egomotion.weigh_climb(found, 1e-8, 0.0)
         assert told == pytest.approx(climb, abs=4.0 * 0.01 / np.sqrt(np.sum(found.toward[4:, 2] ** 2)))
         every = np.linspace(-3.0, 3.0, 60001)[:, None]
@@ -181,7 +181,7 @@ def test_a_climb_is_told_by_the_rates_of_all_lengths():
 def test_no_climb_is_told_by_the_rates_of_a_level_motion():
     """Posterior odds above 1 at prior odds of 1 in 10 come up in less than 1 of 10 runs (Markov's inequality)."""
     rng = np.random.default_rng(6)
-    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(2)) for _ in range(200)]
+    every = [_rates(np.zeros(3), rng)._replace(believed=np.zeros(3)) for _ in range(200)]
     wrong = sum(egomotion.weigh_climb(found, 1e-8, np.log(0.1))[0] > 0.0 for found in every)
     assert wrong < 20
 
@@ -190,7 +190,7 @@ def test_what_is_at_rest_changes_its_length_by_no_more_than_twice_the_agents_spe
     """Two tracks of many agree on a motion; were the others' rates just any, two would be chance."""
     toward = -2.0 * np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 1.0, 0.0]])
     rate = np.array([-1.6, -0.96, 0.0])
-    rest = Rates(toward, rate, np.full(3, 0.02**2), np.zeros(3), rate, believed=np.zeros(2))
+    rest = Rates(toward, rate, np.full(3, 0.02**2), np.zeros(3), rate, believed=np.zeros(3))
     free = rest._replace(believed=None)
     bounded, any_rate = (_weigh_change(each, 1e-4)[0] for each in (rest, free))
     assert bounded > any_rate + 3.0

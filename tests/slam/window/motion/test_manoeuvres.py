@@ -15,7 +15,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import filter as window_filter
-from rislam_rt.slam.window.divergence import length_rates, motion_agreement
+from rislam_rt.slam.window.divergence import egomotion, length_rates, motion_agreement
 from rislam_rt.slam.window.motion import manoeuvres
 from rislam_rt.slam.window.motion.motion_learning import solve_livelier
 from rislam_rt.slam.window.smoother import motion as motion_modes
@@ -23,6 +23,7 @@ from rislam_rt.slam.window.smoother import motion as motion_modes
 ROOM, COUNT = Path(__file__).parents[4] / "scenes" / "paper_room", 28
 CONFIG = SlamConfig(filter="window", use_vt=True)
 RECEIVER = ReceiverConfig("bound", alternation=False)
+NOWHERE = np.zeros((1, 2))
 NOTHING = Measurement(*(np.zeros((0, 2) if at in (1, 4) else 0) for at in range(6)))
 
 
@@ -222,3 +223,37 @@ def test_steady_motion_is_no_manoeuvre(dark, monkeypatch):
         state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, 0.2, CONFIG, rng=rng)
     assert len(found) > 8
     assert max(odds for odds, _ in found) < 0.0
+
+
+@pytest.mark.parametrize("seed", [0, 6, 7])
+def test_who_takes_off_where_the_map_knows_the_height_is_followed(seed):
+    """At 0.8 m/s^2 from rest, straight up: what the map explains follows the climb, and the tracks that are left are
+    those that keep their lengths, as what goes over floor and ceiling does."""
+    time = np.maximum(0.1 * (np.arange(30) - 10), 0.0)
+    rise = np.where(time < 1.0, 0.4 * time**2, 0.8 * time - 0.4)
+    place, up = np.array([1.5, 1.5, 0.4]) + rise[:, None] * [0.0, 0.0, 1.0], np.minimum(0.8 * time, 0.8)
+    off, _ = follow(place, up[:, None] * [0.0, 0.0, 1.0], 0.6, seed)
+    # while the climb that is believed in did not count as motion of the agent, its steps were taken back: 0.4 m
+    assert np.abs(off[17:, 2]).max() < 5e-3
+
+
+def test_only_the_whole_motion_blurs_a_rate():
+    """Whether a climb is believed in or asked for, a path is as likely."""
+    rng = np.random.default_rng(0)
+    toward = -2.0 * np.array([[0.6, 0.0, 0.8], [0.0, 0.98, 0.2], [-0.3, 0.3, 0.9]])
+    rate, whole, climb = rng.standard_normal(3), rng.standard_normal(3), 0.4 + rng.standard_normal((5, 1))
+    rest = length_rates.Rates(toward, rate, np.full(3, 0.01), np.full(3, 0.05), whole, believed=np.zeros(3), astray=0.1)
+    told = rest._replace(rate=rate - toward[:, 2] * 0.7, believed=np.array([0.0, 0.0, 0.7]))
+    found, expected = (egomotion._likelihoods(*of)[0] for of in ((told, NOWHERE, climb - 0.7), (rest, NOWHERE, climb)))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_a_low_return_tells_less_of_a_climb():
+    """An error of its cosines is one of its elevation's sine by the cotangent of the elevation; level ones tell what
+    their own error lets them."""
+    up, blur = np.array([1.0, 0.8, 0.2, 0.0]), 0.02
+    toward = -2.0 * np.stack([np.sqrt(1.0 - up**2), np.zeros(4), up], axis=1)
+    found = length_rates.Rates(toward, np.zeros(4), np.ones(4), np.full(4, blur), np.zeros(4))
+    angle = np.arcsin(np.maximum(up, np.sqrt(0.5 * blur)))
+    np.testing.assert_allclose(found.lean, blur / np.tan(angle), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(found._replace(blur=np.zeros(4)).lean, 0.0)
