@@ -39,7 +39,7 @@ LABELS = (
     "TX", "NONE", "UNTOLD", "OTHER", "PANEL", "UNUSED", "REMOVED", "NEW", "KNOWN", "OVER", "UNKNOWN", "UP",
     "TURN", "HEAD", "POSE", "ONE", "TWO", "FIRST", "COLUMNS", "AXES", "DIAGONAL", "DIGITS", "WALL",
     "KNOWN_WALL", "WALL_KNOWN", "POINT", "OVER_RX", "OVER_TX", "OVER_SAME", "TWO_WALLS", "BESIDE", "IMAGE",
-    "TX_IMAGE", "BOTH_LEGS", "THEN_WALL", "WALL_THEN", "OTHER_LEG", "IS_WALL", "IS_IMAGE", "IS_FAR",
+    "TX_IMAGE", "BOTH_LEGS", "BOTH_WAYS", "THEN_WALL", "WALL_THEN", "OTHER_LEG", "IS_WALL", "IS_IMAGE", "IS_FAR",
     "IS_POINT", "COMMON", "MORE_WALLS", "UNIT_TILTS", "WIDTHS", "PANEL_STD", "WANDER", "MORE_UNKNOWN",
 )  # fmt: skip
 """Indices, names of kinds, unit vectors, and what follows from others: nothing that was set by hand."""

@@ -12,7 +12,7 @@ from rislam_rt.slam.window.births.feature_removal import remove_from_map, resolv
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import motion_agreement
-from rislam_rt.slam.window.hypotheses.hypotheses import BESIDE, known_features
+from rislam_rt.slam.window.hypotheses.hypotheses import BESIDE, BOTH_WAYS, known_features
 from rislam_rt.slam.window.hypotheses.map_explanations import explanations
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary, summarise_tracks
 from rislam_rt.slam.window.hypotheses.unheard_returns import bearings, missing_legs
@@ -133,8 +133,7 @@ def _enter(
     landmarks = enter(context.landmarks, decision.is_wall, histories.middle, len(at), 5.0, decision.identity)
     forms = np.full((2, 5), UNKNOWN)
     forms[0] = [new if part == NEW else part for part in decision.form]
-    if decision.kind == BESIDE:
-        forms[1] = [*forms[0][:4], decision.known]
+    forms[1] = _partner(decision, forms[0])
     grown = context._replace(window=window, landmarks=landmarks)
     share = min(max(decision.share, 0.0), 1.0)
     grown = _assign(grown, at, idents(landmarks, forms), histories.scatter[row], share)
@@ -149,6 +148,13 @@ def _enter(
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))
     return grown, True
+
+
+def _partner(decision: TrackDecision, form: Integers) -> Integers:
+    """Form (5,) of the path from which the new feature's, of form (5,), is unresolved; `UNKNOWN` for none."""
+    if decision.kind == BESIDE:
+        return np.append(form[:4], decision.known)
+    return form[[0, 1, 2, 4, 3]] if decision.kind == BOTH_WAYS else np.full(5, UNKNOWN)
 
 
 def _without_rival(context: WindowState, born: PanelIdentity, held: tuple[int, ...]) -> WindowState:

@@ -11,8 +11,10 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.hypotheses.hypotheses import (
     BESIDE,
+    BOTH_WAYS,
     IS_IMAGE,
     TWO_WALLS,
+    UPRIGHT_RISE,
     WALL,
     WALLS,
     Hypotheses,
@@ -101,7 +103,7 @@ _TEMPLATES = (
     (NEW, KNOWN, NONE, KNOWN, NONE), (TX, NONE, NONE, NONE, NONE),
     (TX, NONE, NONE, NEW, NONE), (KNOWN, NONE, NONE, NEW, NONE), (KNOWN, NEW, NONE, NONE, NONE),
     (KNOWN, OVER, NONE, NEW, NONE), (KNOWN, NONE, NONE, OVER, NEW), (KNOWN, NONE, NONE, NEW, OVER),
-    (KNOWN, NEW, NONE, OVER, NONE),
+    (KNOWN, NEW, NONE, OVER, NONE), (TX, NONE, NONE, KNOWN, NEW),
 )  # fmt: skip
 """Template of the form of each kind of hypothesis, in the order of `hypotheses.KINDS`."""
 
@@ -116,7 +118,7 @@ def _weigh(
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
         summary, end = summary.farther(scene.sensor)
         owner = owner[end]
-    table = hypotheses(summary, known, landmarks)
+    table = hypotheses(summary, known, landmarks, both_ways=scene.use_vt)
     if len(owner) > near:
         table = table.take((table.trials.track < near) | table.trials.is_wall | table.trials.is_pair)
     if not scene.use_vt:  # wall returns tell no walls
@@ -139,8 +141,10 @@ def _weigh(
     held = log_upright(table, fits, summary, known, landmarks, scene.use_vt)
     evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
     if scene.use_vt:
-        right = held.log_odds + log_possible(table, held.place, held.covariance, summary, known)
-        free = log_possible(table, fits.place, fits.covariance, summary, known)
+        cell = scene.sensor.cell_length[1:]
+        right = held.log_odds + log_possible(table, held.place, held.covariance, summary, known, cell)
+        right[_is_oblique(table, fits, summary, known)] = -np.inf
+        free = log_possible(table, fits.place, fits.covariance, summary, known, cell)
         likely = evidence + np.logaddexp(right, free)
         heard = context, table, track_rows, owner, likely
         silent = log_unheard(*heard, held.place, held.covariance, summary, anyhow=False)
@@ -151,6 +155,16 @@ def _weigh(
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     own = table._replace(trials=table.trials._replace(track=owner[track]))
     return own, fits, evidence, summary.mean[0][track, 0]
+
+
+def _is_oblique(table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures) -> Booleans:
+    """Which hypotheses (H,) are of a wall that is neither upright nor level for certain: it is met in both orders with
+    a known one, to which it is not at right angles, and one of the two is not upright."""
+    found, rows = np.zeros(len(table.kind), dtype=np.bool_), (table.kind == BOTH_WAYS).nonzero()[0]
+    for place in (fits.place[rows], known.place[table.known[rows]]):
+        span = place - summary.middle
+        found[rows] |= np.abs(span[:, 2]) > UPRIGHT_RISE * np.linalg.norm(span, axis=1)
+    return found
 
 
 def decide_tracks(
@@ -181,6 +195,7 @@ def decide_tracks(
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += log_shared(table, fits, evidence, none, explained, summary.middle, concurrent(context, track_rows))
+    oblique = _is_oblique(table, fits, summary, known)
     echo = log_echo_over_floor(table, fits, evidence, summary.middle, lonely)
     decisions, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(summary.seen)):
@@ -198,7 +213,7 @@ def decide_tracks(
                 TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody, 0.0)
             )
             continue
-        at = own[best - 1]
+        at = _cautious(oblique, own, evidence, same, own[best - 1])
         count = int((summary.weight[row, :, 0] > 0.0).sum())
         mean, std = cost_under_noise(CONSTANTS.tail)
         misfit = (fits.cost[at] - mean * (count - 1.0)) / (std * np.sqrt(count))
@@ -206,8 +221,7 @@ def decide_tracks(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
-                direction_beliefs(fits.place[at], summary.middle, known.place[landmarks.walls])
-                if table.trials.is_wall[at] else no_holds(),
+                _holds(table, fits.place[at], summary.middle, known, landmarks.walls, at),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]),
             )
         )  # fmt: skip
@@ -250,6 +264,32 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
     gap, spread = fits.place[own] - fits.place[at], fits.covariance[own] + fits.covariance[at]
     near = np.vecdot(gap, np.linalg.solve(spread, gap[..., None])[..., 0]) < 1.0
     return np.asarray(near & (wall[own] == wall[at]) & ~pair[own] & np.isfinite(fits.cost[own]) & (own != at))
+
+
+def _holds(
+    table: Hypotheses, place: Floats, middle: Floats, known: KnownFeatures, walls: Integers, at: int
+) -> DirectionPriors:
+    """Direction priors of a new wall at `place` (3,) by hypothesis `at`: where it is met in both orders, none that it
+    is at right angles to the known one."""
+    if not table.trials.is_wall[at]:
+        return no_holds()
+    holds = direction_beliefs(place, middle, known.place[walls])
+    if table.kind[at] != BOTH_WAYS:
+        return holds
+    out = known.place[table.known[at]] - middle
+    keep = np.abs(holds.axis @ out) < CONSTANTS.dip * np.linalg.norm(out)
+    return DirectionPriors._make(field[keep] for field in holds)
+
+
+def _cautious(oblique: Booleans, own: Integers, evidence: Floats, same: Booleans, at: int) -> int:
+    """Hypothesis by which a track's feature enters the map: `at`, the likeliest, or, of others that are the `same`, the
+    likeliest `oblique` one (H,), if it is likely enough for a level or upright wall not to be held for true."""
+    slopes = own[same & oblique[own]]
+    if oblique[at] or not len(slopes):
+        return at
+    log_all = np.logaddexp.reduce(np.append(evidence[own[same]], evidence[at]))
+    best = slopes[np.argmax(evidence[slopes])]
+    return int(best if evidence[best] - log_all > np.log1p(-CONSTANTS.born) else at)
 
 
 @lru_cache(maxsize=4)

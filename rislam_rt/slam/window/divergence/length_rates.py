@@ -69,8 +69,8 @@ class Rates(_PlainRates):
 
     @cached_property
     def lean(self) -> Floats:
-        """(E,) error of the rate by that of the direction's elevation, as a share of the vertical speed: what errs in the
-        cosines by `blur` errs in the elevation's sine by the more, the lower it is."""
+        """(E,) error of the rate by that of the direction's elevation, as a share of the vertical speed: what errs in
+        the cosines by `blur` errs in the elevation's sine by the more, the lower it is."""
         up = np.maximum(0.25 * self.toward[:, 2] ** 2, np.maximum(0.5 * self.blur, 1e-12))
         return self.blur * np.sqrt(np.maximum(1.0 - up, 0.0) / up)
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import AXES, NONE, by_wall, reflect
 from rislam_rt.slam.sampling import square_roots
 from rislam_rt.slam.window.hypotheses.hypothesis_fits import Trials
@@ -16,21 +17,24 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
     "two walls", "wall beside its edge", "image of known point", "the same on the tx leg", "image, known tx wall",
-    "image of image", "image over known wall", "tx image, known rx wall",
+    "image of image", "image over known wall", "tx image, known rx wall", "wall and known, both ways",
 )  # fmt: skip
-"""Names of the kinds of hypotheses, by their number; the last six are images of known points in new walls
+"""Names of the kinds of hypotheses, by their number; the last six but one are images of known points in new walls
 (`image_hypotheses`)."""
 WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(9)
-IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES = range(9, 15)
+*IMAGES, BOTH_WAYS = range(9, 16)
+IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES
+# at an acute angle two walls are met in either order, by paths as long and as loud that arrive from either side of the
+# edge and come out as one; at an obtuse angle there is no path, at a right one a single one
 
 FAR = (TX_IMAGE, OTHER_LEG)
 """Kinds whose new wall mirrors a known point on the leg to the Tx."""
-WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES)
+WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES, BOTH_WAYS)
 """Kinds whose new feature is a wall."""
 IS_WALL, IS_IMAGE, IS_FAR, IS_POINT = (
     np.isin(np.arange(len(KINDS)), some) for some in (WALLS, IMAGES, FAR, (POINT, OVER_RX, OVER_TX, OVER_SAME))
 )
-"""Which kinds (15,) have a wall for a new feature, are images of known points, are such images on the Tx leg, and have
+"""Which kinds (16,) have a wall for a new feature, are images of known points, are such images on the Tx leg, and have
 a point for a new feature."""
 
 
@@ -90,9 +94,11 @@ def known_features(mean: Floats, covariance: Floats, landmarks: WindowTable, mid
     return KnownFeatures(place, square_roots(blocks), turn, shift)
 
 
-def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable) -> Hypotheses:
+def hypotheses(
+    summary: TrackSummary, known: KnownFeatures, landmarks: WindowTable, *, both_ways: bool = True
+) -> Hypotheses:
     """Hypotheses of every kind of what caused each track, with initial values of the new feature; images of known
-    points in new walls stand in `image_hypotheses`."""
+    points in new walls stand in `image_hypotheses`, and `BOTH_WAYS` only if asked for."""
     (seen, tx, rx), ray, count = summary.mean, summary.direction, len(summary.seen)
     length, image, middle = seen[:, 0], rx + seen[:, :1] * ray, summary.middle
     walls, once = landmarks.walls, np.array([NONE])
@@ -112,6 +118,8 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
     upright = np.column_stack([alone[:, :2], np.full(count, middle[2])])
     square = _square_to(alone, known.place[aligned] - middle, middle)
     beside = np.where((ray[:, 2] < UPRIGHT_RISE)[:, None], upright, square)
+    some = walls if both_ways else walls[:0]
+    acute = _acute(rx, ray, length, known.place[some] - middle, middle)
     # kind, known walls (W,), first guesses (W, T, 3), the walls on either leg, and about where these are met
     kinds: list[Any] = [
         (WALL, once, alone, NONE, NONE, tx, tx),
@@ -122,6 +130,7 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
         (OVER_TX, walls, apparent, walls, NONE, apparent, tx),
         (OVER_SAME, walls, same, walls, walls, same, same),
         (BESIDE, aligned, beside, NONE, NONE, tx, tx),
+        (BOTH_WAYS, some, acute, some, NONE, tx, tx),
         (TWO_WALLS, np.full(len(pairs), NONE), image - (pairs @ tx[..., None])[..., 0], NONE, NONE, tx, tx),
     ]
     kind, walled, *ends = (_every(kinds, column, np.int64) for column in (0, 1, 3, 4))
@@ -133,7 +142,8 @@ def hypotheses(summary: TrackSummary, known: KnownFeatures, landmarks: WindowTab
     none = np.zeros(len(kind), dtype=np.bool_)
     trials = Trials(
         np.tile(np.arange(count), len(start)), IS_WALL[kind], kind == TWO_WALLS, start.reshape(-1, 3),
-        turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), spreads.reshape(-1, 2, 3, 3), kind == BESIDE,
+        turns.reshape(-1, 2, 3, 3), shifts.reshape(-1, 2, 3), spreads.reshape(-1, 2, 3, 3),
+        np.isin(kind, (BESIDE, BOTH_WAYS)), kind == BOTH_WAYS,
         _beyond(kind, walled, known), none, none, none, np.zeros((len(kind), 3)),
     )  # fmt: skip
     return Hypotheses(kind, walled, np.full(len(kind), NONE), trials)
@@ -145,6 +155,21 @@ def _square_to(alone: Floats, across: Floats, middle: Floats) -> Floats:
     normal = across / np.maximum(np.linalg.norm(across, axis=1), 1e-6)[:, None]
     along = normal @ (alone - middle).T
     return np.asarray(alone - along[..., None] * normal[:, None])
+
+
+def _acute(rx: Floats, ray: Floats, length: Floats, out: Floats, middle: Floats) -> Floats:
+    """Images (W, T, 3) of `middle` in new walls that meet known ones, whose images lie at `out` (W, 3) from it, at an
+    acute angle along the edge at which rays (T, 3) from `rx` (T, 3) point: both walls make a way (T,) of that `length`
+    there and back of twice the edge's distance, times the sine of the angle."""
+    reach = np.maximum(np.linalg.norm(out, axis=1), 1e-6)
+    normal = out / reach[:, None]
+    toward = np.maximum(normal @ ray.T, CONSTANTS.dip)
+    edge = np.maximum(0.5 * reach[:, None] - normal @ (rx - middle).T, CONSTANTS.depth) / toward
+    cos = np.sqrt(np.clip(1.0 - (length / (2.0 * edge)) ** 2, CONSTANTS.dip**2, 0.5))[..., None]
+    along = ray - toward[..., None] * normal[:, None]
+    along /= np.maximum(np.linalg.norm(along, axis=-1), 1e-6)[..., None]
+    new = np.sqrt(1.0 - cos**2) * along - cos * normal[:, None]
+    return np.asarray(middle + 2.0 * np.vecdot(new, rx - middle + edge[..., None] * ray)[..., None] * new)
 
 
 def _every(kinds: list[Any], column: int, dtype: Any, *shape: int) -> Any:
@@ -170,7 +195,7 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
     """Linear part and translation (H, 3, 4) of the reflection in the known wall of hypotheses of a new wall whose
     return is unresolved from its edge with that one; zero elsewhere."""
-    found, rows = np.zeros((len(kind), 3, 4)), (kind == BESIDE).nonzero()[0]
+    found, rows = np.zeros((len(kind), 3, 4)), np.isin(kind, (BESIDE, BOTH_WAYS)).nonzero()[0]
     if len(rows):
         found[rows, :, :3], found[rows, :, 3] = known.turn[walled[rows]], known.shift[walled[rows]]
     return found

@@ -12,6 +12,7 @@ from rislam_rt.slam.predicted_returns import AXES, NONE, TX
 from rislam_rt.slam.window.hypotheses.hypotheses import (
     ALIGNED_TURN,
     BESIDE,
+    BOTH_WAYS,
     IS_IMAGE,
     OVER_SAME,
     OVER_TX,
@@ -32,7 +33,7 @@ from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors
 from rislam_rt.slam.window.solver_limits import CERTAIN, NEARBY
 from rislam_rt.slam.window.state import WindowState
 
-MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2])
+MORE_WALLS = np.array([0, 1, 1, 0, 1, 1, 2, 1, 0, 1, 1, 2, 2, 2, 2, 1])
 """Number of walls on a path of each kind beyond the one of a wall return: each takes its share of the power, and so of
 the paths that are heard. Over known walls, of all walls together; of known points in walls, of all points together."""
 MORE_UNKNOWN = int(MORE_WALLS.max())
@@ -304,8 +305,10 @@ def log_upright(
     rise, width = np.abs(span[:, 2]) / reach, np.log(reach)
     noise, sure = (CONSTANTS.lean * reach) ** 2, float(np.logaddexp(0.0, CONSTANTS.log_upright))
     level, upright = asked & (rise > LEVEL_RISE), asked & (rise < UPRIGHT_RISE)
+    free = np.zeros(len(pair))
     if use_vt:
-        held.gain[asked & ~level & ~upright] = -sure
+        free[asked] = _log_pitch(span[asked], reach[asked], spread[asked])
+        held.gain[asked & ~level & ~upright] = free[asked & ~level & ~upright] - sure
     # odds hold the width: right against a density of one over it
     for rows, told in ((level.nonzero()[0], slice(2)), (upright.nonzero()[0], slice(2, 3))):
         off, across = span[rows, told], spread[rows, told]
@@ -316,20 +319,29 @@ def log_upright(
             each = (each - 0.5 * np.linalg.slogdet(2.0 * np.pi * inside)[1])[:, None]
         else:
             each = log_right(CONSTANTS.log_upright + width[rows, None], off, np.diagonal(inside, axis1=1, axis2=2))
-        held.gain[rows] = (np.logaddexp(0.0, each) - sure).sum(axis=1)
+        held.gain[rows] = (np.logaddexp(free[rows, None], each) - sure).sum(axis=1)
         own = ~pair[rows]
         rows, across, off = rows[own], across[own], off[own]
         pull = np.swapaxes(np.linalg.solve(inside[own], across), 1, 2)
         held.place[rows] -= (pull @ off[..., None])[..., 0]
         held.covariance[rows] -= pull @ across
-        held.log_odds[rows] = each[own, 0]
+        held.log_odds[rows] = each[own, 0] - free[rows]
     rows = (upright & ~(pair & (turn[:, 0, 0] < 0.0))).nonzero()[0]
     square, axis = _square_axes(span[rows], known.place[landmarks.walls] - summary.middle)
     rows = rows[square]
     variance = np.vecdot(axis, (spread[rows] @ axis[..., None])[..., 0]) + noise[rows]
     each = log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)
+    each[table.kind[rows] == BOTH_WAYS] = -np.inf  # an acute angle
     held.gain[rows] += np.logaddexp(0.0, each) - sure
     return held
+
+
+def _log_pitch(span: Floats, reach: Floats, spread: Floats) -> Floats:
+    """Log prior (N,) of walls that are neither upright nor level, with images at `span` (N, 3) [m] and so far off,
+    within covariances (N, 3, 3), against one by which all directions are alike: all pitches are, from level to upright.
+    Gentle slopes are no rarer than steep ones, though there are fewer directions of them."""
+    flat = np.vecdot(span[:, :2], span[:, :2]) + np.trace(spread[:, :2, :2], axis1=1, axis2=2)
+    return np.asarray(-np.log(0.5 * np.pi * np.clip(np.sqrt(flat) / reach, CONSTANTS.lean, 1.0)))
 
 
 def log_right(log_odds: Floats, off: Floats, variance: Floats) -> Floats:

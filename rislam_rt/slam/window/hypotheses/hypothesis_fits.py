@@ -38,7 +38,10 @@ class Trials(NamedTuple):
     """(H, 2, 3, 3) square roots of the covariance that the errors of the two maps give to what they map
     (at about the start)."""
     mixed: Booleans
-    """(H,) whether the return is unresolved from its reflection in a known wall (`beyond`), at an unknown share."""
+    """(H,) whether the return is unresolved from that of the new wall reflected in a known one (`beyond`), at an
+    unknown share..."""
+    even: Booleans
+    """(H,) ...or at one half: it is the return over the known wall and the new one, met in the other order."""
     beyond: Floats
     """(H, 3, 4) linear part and translation of the reflection in that wall."""
     fixed: Booleans
@@ -106,7 +109,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
             lost[active] = False
             cost[lost] = np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
-    share = np.where(trials.mixed, CONSTANTS.weaker * (1.0 + error[:, -1]), 0.0)
+    share = np.where(trials.mixed, _shares(trials.even, error), 0.0)
     # a component lies between the two that it is made of
     evidence -= 20.0 * (np.maximum(-share, 0.0) + np.maximum(share - 1.0, 0.0))
     return Fits(place, covariance, held, cost, share, evidence)
@@ -168,7 +171,7 @@ def _equations(
     pose = _through(by_image, by_tx - AXES)
     pose[..., 0, :] -= toward
     maps = _by_maps(trials, rows, by_image, toward, flip)
-    split = _mix(trials, rows, rx, image, error, (second, inside, by_tx), (seen, new, pose))
+    split = _mix(trials, rows, (tx, rx, place, summary.middle), error, (seen, new, pose))
     wide = np.concatenate(
         [summary.twist[track], pose @ summary.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
@@ -217,28 +220,43 @@ def _through(slopes: Floats, maps: Floats) -> Floats:
     return np.asarray((slopes.reshape(count, 3 * points, 3) @ maps).reshape(count, points, 3, 3))
 
 
+def _shares(even: Booleans, error: Floats) -> Floats:
+    """Weights (H,) of the second of two unresolved returns, from their errors, the last of (H, E)."""
+    return np.where(even, 0.5, CONSTANTS.weaker * (1.0 + error[:, -1]))
+
+
 def _mix(
-    trials: Trials, rows: Integers, rx: Floats, image: Floats, error: Floats, maps: tuple[Floats, Floats, Floats],
+    trials: Trials, rows: Integers, ends: tuple[Floats, Floats, Floats, Floats], error: Floats,
     seen: tuple[Floats, Floats, Floats],
 ) -> Floats:  # fmt: skip
-    """Move predictions, and their slopes by place and pose, in place towards the reflection in a known wall from which
-    they are unresolved; returns the slope (H, B, 3, 1) by the share's error."""
-    (second, inside, by_tx), (value, new, pose) = maps, seen
+    """Move predictions, and their slopes by place and pose, in place towards the new wall's return as reflected in a
+    known wall, from which they are unresolved; returns the slope (H, B, 3, 1) by the share's error.
+
+    `ends` are Tx and Rx positions (H, B, 3), new walls (H, 3) and the place that these are images of (3,).
+    """
+    value, new, pose = seen
     split = np.zeros((*value.shape, 1))
     both = trials.mixed[rows].nonzero()[0]
     if not len(both):
         return split
-    mirror = trials.beyond[rows[both]]
-    out = image[both] @ np.swapaxes(mirror[..., :3], 1, 2) + mirror[:, None, :, 3] - rx[both]
+    (tx, rx, place), middle = (end[both] for end in ends[:3]), ends[3]
+    mirror, even = trials.beyond[rows[both]], trials.even[rows[both]]
+    span = place - middle
+    scaled = span / np.maximum(np.vecdot(span, span), 1e-9)[:, None]
+    depth = np.vecdot(scaled[:, None], tx - 0.5 * (place + middle)[:, None])
+    image = tx - 2.0 * depth[..., None] * span[:, None]
+    inside = -2.0 * (depth[..., None, None] * AXES + scaled[:, None, :, None] * (image - place[:, None])[..., None, :])
+    out = image @ np.swapaxes(mirror[..., :3], 1, 2) + mirror[:, None, :, 3] - rx
     length = np.sqrt(np.vecdot(out, out))
     ray = out / length[..., None]
     gap = np.concatenate([length[..., None], ray[..., :2]], axis=-1) - value[both]
-    share = CONSTANTS.weaker * (1.0 + error[both, -1])[:, None, None]
+    share = _shares(even, error[both])[:, None, None]
     value[both] += share * gap
-    split[both] = CONSTANTS.weaker * gap[..., None]
+    split[both] = np.where(even, 0.0, CONSTANTS.weaker)[:, None, None, None] * gap[..., None]
     across = _by_image(ray, length)
     turned = _through(across, mirror[..., :3])
-    by_new, by_agent = _through(turned, second[both]) @ inside[both], _through(turned, by_tx[both]) - across
+    flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
+    by_new, by_agent = turned @ inside, _through(turned, flip) - across
     new[both] += share[..., None] * (by_new - new[both])
     pose[both] += share[..., None] * (by_agent - pose[both])
     return split

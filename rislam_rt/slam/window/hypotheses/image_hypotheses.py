@@ -76,7 +76,7 @@ def _images(summary: TrackSummary, known: KnownFeatures, point: int, wall: int) 
     trials = Trials(
         np.tile(np.arange(count), len(kinds)), every, ~every, np.concatenate(starts),
         np.repeat(turns, count, axis=0), np.repeat(shifts, count, axis=0), np.repeat(roots, count, axis=0),
-        ~every, np.zeros((len(every), 3, 4)), every, IS_FAR[kind], kind == BOTH_LEGS,
+        ~every, ~every, np.zeros((len(every), 3, 4)), every, IS_FAR[kind], kind == BOTH_LEGS,
         np.repeat(others, count, axis=0),
     )  # fmt: skip
     return Hypotheses(kind, np.full(len(every), point), np.full(len(every), wall), trials)

@@ -56,15 +56,19 @@ def log_unheard(
     length = np.linalg.norm(out, axis=2)
     ray = (rotation_z(-ends.heading) @ (out / length[..., None])[..., None])[..., 0]
     doubt = 2.0 * np.sqrt(np.linalg.eigvalsh(spread[rows])[:, -1:])
-    near = scene.sensor.cell_length + doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
+    exact = doubt / np.concatenate([np.ones(doubt.shape), length[:, [-1, -1]]], axis=1)
+    near = scene.sensor.cell_length + exact
     gap = scene.sensor.nearest(log.seen[:, 0] - length[:, slot])
     wall, heard = (np.abs(gap) < near[:, :1]).nonzero()
     off, spacing = log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing
     off -= np.where(log.mirrored(heard, spacing), np.round(off * spacing) / spacing, 0.0)
     off = (rotation_z(ends.heading)[:, :2, :2][slot[heard]] @ off[..., None])[..., 0]
     inside = (np.abs(off) < near[wall, 1:]).all(axis=1)
-    present = np.zeros(length.shape, dtype=np.bool_)
+    present, itself = np.zeros((2, *length.shape), dtype=np.bool_)
     present[wall[inside], slot[heard[inside]]] = True
+    fits = inside & (np.abs(gap[wall, heard]) < exact[wall, 0] + CONSTANTS.fit * log.std[heard, 0])
+    fits &= (np.abs(off) < exact[wall, 1:] + CONSTANTS.fit * log.std[heard, 1:]).all(axis=1)
+    itself[wall[fits], slot[heard[fits]]] = True
     # no elevation is known to less than `STEP`
     rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP
     shows, deep = _shows(context, table, rows, length, summary), (-CONSTANTS.dip - rise) / std
@@ -74,7 +78,7 @@ def log_unheard(
     for number, row in enumerate(rows.tolist()):
         mine = slot[track_rows[track[row]]]
         span = slice(mine.min(), mine.max() + 1)
-        found[row] = log_silence(shows[number, span], present[number, span])
+        found[row] = log_missed(shows[number, span], present[number, span], itself[number, span])
         if anyhow:
             low = deep[number, span].mean()
             found[row] = np.logaddexp(scipy.special.log_ndtr(low), scipy.special.log_ndtr(-low) + found[row])
@@ -105,6 +109,14 @@ def _shows(context: WindowState, table: Hypotheses, rows: Integers, length: Floa
     sensor, level = context.scene.sensor, free_space(radio) - np.log(length) + ratio[:, None]
     reported = sensor.in_window(sensor.heard_as(length) / SPEED_OF_LIGHT)
     return np.asarray(CONSTANTS.shown * detection_probability(level, std, sensor) * reported)
+
+
+def log_missed(shows: Floats, present: Booleans, itself: Booleans) -> float:
+    """Log probability that a return with detection probabilities (K,) is not detected by itself in all cycles in which
+    no component is `itself` (K,) where it would be; it may be unresolved from those that are `present` (K,) in its
+    cell, in all of them or in none (`company`)."""
+    merged, apart = log_silence(shows, present), log_silence(shows, itself)
+    return float(np.logaddexp(np.log(CONSTANTS.company) + merged, np.log1p(-CONSTANTS.company) + apart))
 
 
 def log_silence(shows: Floats, present: Booleans) -> float:

@@ -21,12 +21,13 @@ from rislam_rt.slam.window.hypotheses.hypotheses import KNOWN_WALL, WALL, WALL_K
 from rislam_rt.slam.window.hypotheses.hypothesis_evidence import log_upright
 from rislam_rt.slam.window.hypotheses.hypothesis_fits import Fits
 from rislam_rt.slam.window.hypotheses.path_feasibility import bounces, log_possible
-from rislam_rt.slam.window.hypotheses.unheard_returns import log_silence
+from rislam_rt.slam.window.hypotheses.unheard_returns import log_missed, log_silence
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 
 ROOMS = Path(__file__).parents[4] / "scenes"
 MIDDLE = np.array([1.0, -0.5, 0.8])
 BASELINE = np.array([0.05, 0.01, 0.0])
+CELL = np.full(2, 1e-9)  # everything is resolved
 TX, RX = MIDDLE + BASELINE, MIDDLE - BASELINE
 
 
@@ -57,7 +58,7 @@ def test_of_a_wall_and_its_mirror_image_in_the_known_one_only_one_can_throw_the_
         place = np.stack([new, twin])
         heard = [reflect(reflect(TX, first, MIDDLE), then, MIDDLE) for first, then in ((known, new), (twin, known))]
         assert np.allclose(*heard)
-        found = np.exp(log_possible(table, place, np.zeros((2, 3, 3)), summary, walls))
+        found = np.exp(log_possible(table, place, np.zeros((2, 3, 3)), summary, walls, CELL))
         # twice its probability, as beforehand either can be
         assert found.sum() < 2.0 + 1e-6
         decided += found.max() > 1.98
@@ -68,7 +69,7 @@ def test_a_path_over_the_floor_arrives_from_below_and_is_not_heard():
     upright, spread = np.stack(2 * [_image([1.0, 0.3, 0.0], 4.0)]), np.tile(1e-6 * np.eye(3), (2, 1, 1))
     for rise, heard in ((-0.8, False), (2.2, True)):
         table, summary, walls = _case([KNOWN_WALL, WALL_KNOWN], MIDDLE + 2.0 * rise * np.eye(3)[2])
-        assert (np.exp(log_possible(table, upright, spread, summary, walls)).max() > 1.98) == heard
+        assert (np.exp(log_possible(table, upright, spread, summary, walls, CELL)).max() > 1.98) == heard
 
 
 def test_the_path_meets_the_new_wall_in_that_wall():
@@ -93,7 +94,15 @@ def test_silence_has_the_probability_of_all_ways_in_which_something_may_hide_the
     assert log_silence(shows, np.ones(4, dtype=bool)) == 0.0
 
 
-def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other():
+def test_what_is_near_hides_a_return_that_shares_its_component():
+    shows, present, itself = np.full(6, 0.9), np.arange(6) > 0, np.arange(6) > 3
+    merged, apart = np.exp(log_silence(shows, present)), np.exp(log_silence(shows, itself))
+    found = np.exp(log_missed(shows, present, itself))
+    assert np.isclose(found, CONSTANTS.company * merged + (1.0 - CONSTANTS.company) * apart, rtol=1e-12)
+    assert log_missed(shows, present, present) == pytest.approx(log_silence(shows, present), rel=1e-12)
+
+
+def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other_pitch_by_pitch():
     slanting, sloping, level = ([np.sin(angle), 0.3 * np.sin(angle), np.cos(angle)] for angle in (0.9, 0.35, 0.0))
     place = np.stack([_image(normal, 2.5) for normal in (slanting, sloping, level)])
     spread, cost = np.tile(1e-6 * np.eye(3), (3, 1, 1)), np.ones(3)
@@ -102,11 +111,14 @@ def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other():
     fits = Fits(place, spread, spread, cost, np.zeros(3), np.zeros(3))
     summary = SimpleNamespace(mean=(np.zeros((1, 3)), TX[None], RX[None]), middle=MIDDLE)
     known = SimpleNamespace(place=np.zeros((0, 3)))
-    held = log_upright(SimpleNamespace(trials=trials), fits, summary, known, empty_table(), True)
-    assert np.allclose(held.gain[:2], np.log(1.0 - CONSTANTS.upright), atol=1e-6)
+    held = log_upright(SimpleNamespace(trials=trials, kind=np.full(3, WALL)), fits, summary, known, empty_table(), True)
+    pitch = np.log(0.5 * np.pi * np.hypot(*(place[:2, :2] - MIDDLE[:2]).T) / 5.0)
+    assert np.allclose(held.gain[:2] + pitch, np.log(1.0 - CONSTANTS.upright), atol=1e-4)
     assert held.gain[2] > 0.0
     assert held.log_odds[2] > CONSTANTS.log_born > held.log_odds[1]
-    alone = log_upright(SimpleNamespace(trials=trials), fits, summary, known, empty_table(), False)
+    alone = log_upright(
+        SimpleNamespace(trials=trials, kind=np.full(3, WALL)), fits, summary, known, empty_table(), False
+    )
     assert alone.gain[0] == 0.0
 
 

@@ -41,9 +41,10 @@ def _mirror(middle, wall):
 
 
 def _trials(kind, summary, rng):
-    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one), or an
-    image of a known point on the Rx leg: `image`, `image of image` (over a known wall first), `over` (over it last),
-    `both legs` (over it on the Tx leg); on the Tx leg: `far`, `far over` (the Rx hears it over a known wall)."""
+    """One hypothesis of a kind: `wall`, `point`, `pair`, `edge` (a wall beside its edge with a known one), `both ways`
+    (a wall and a known one, met in either order), or an image of a known point on the Rx leg: `image`, `image of image`
+    (over a known wall first), `over` (over it last), `both legs` (over it on the Tx leg); on the Tx leg: `far`, `far
+    over` (the Rx hears it over a known wall)."""
     turn, shift = np.tile(AXES, (1, 2, 1, 1)), np.zeros((1, 2, 3))
     known = _mirror(summary.middle, summary.middle + np.array([-3.0, 1.0, 0.5]))
     if kind == "edge":
@@ -54,6 +55,9 @@ def _trials(kind, summary, rng):
             shift[0, 0] = known[0] @ SPOT + known[1]
         if kind in ("over", "far over"):
             turn[0, 1], shift[0, 1] = known
+        start = _wall(summary.middle)
+    elif kind == "both ways":
+        turn[0, 0], shift[0, 0] = _mirror(summary.middle, summary.middle + np.array([0.2, 0.0, 3.0]))
         start = _wall(summary.middle)
     elif kind == "wall":
         turn[0, 1], shift[0, 1] = known
@@ -67,8 +71,8 @@ def _trials(kind, summary, rng):
     uncertainty = 1e-3 * rng.standard_normal((1, 2, 3, 3))
     if kind == "pair":
         uncertainty[:] = 0.0
-    flags = np.array([kind in ("wall", "edge", *IMAGES)]), np.array([kind == "pair"])
-    mixed = np.array([kind == "edge"])
+    flags = np.array([kind in ("wall", "edge", "both ways", *IMAGES)]), np.array([kind == "pair"])
+    mixed = np.array([kind in ("edge", "both ways")])
     beyond = np.zeros((1, 3, 4))
     beyond[0, :, :3], beyond[0, :, 3] = _mirror(summary.middle, summary.middle + np.array([0.2, 0.0, 3.0]))
     return Trials(
@@ -79,6 +83,7 @@ def _trials(kind, summary, rng):
         shift,
         uncertainty,
         mixed,
+        np.array([kind == "both ways"]),
         beyond,
         np.array([kind in IMAGES]),
         np.array([kind in ("far", "far over")]),
@@ -96,7 +101,7 @@ def _left(trials, summary, place, error):
 
 def test_slopes_are_those_of_the_cost():
     rng = np.random.default_rng(1)
-    for kind in ("wall", "point", "pair", "edge", *IMAGES):
+    for kind in ("wall", "point", "pair", "edge", "both ways", *IMAGES):
         # measurements far off in metres and next to nothing in deviations: a slope, and tails that do not count
         summary = _digest(6, rng=rng)._replace(weight=np.full((1, 6, 3), 1e-3))
         trials = _trials(kind, summary, rng)
