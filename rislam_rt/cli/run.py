@@ -41,8 +41,7 @@ def command(
         bool, typer.Option("--report/--no-report", help="Whether to draw the figures and the page.")
     ] = True,
 ) -> None:
-    """The command `rislam-rt run`: run a pipeline in a room: trace, then design, measure, localise and map, cycle by
-    cycle.
+    """Run a pipeline in a room: trace, then design, measure, localise and map, cycle by cycle.
 
     An interrupted run goes on where it stopped when the same command is given again, and a completed one is shown;
     other settings make another folder.

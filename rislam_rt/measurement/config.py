@@ -42,8 +42,8 @@ class ReceiverConfig:
     among which the joint bound cannot share the amplitude out. `joint` draws the errors from that bound too, and costs
     more."""
     alternation: bool = True
-    """Whether the slot is split between the code and its phase-reversed one, which sets the panel's paths apart; for a
-    room without a panel give False (the pipeline does)."""
+    """Whether the slot is split between the code and its phase-reversed one, which sets the panel's paths apart; a
+    pipeline sets it to False in a room without a panel, and from Python that is for you to do."""
     order: Literal["ABBA", "AB"] = "ABBA"
     """Order of the code (A) and its phase-reversed one (B) within the slot: `ABBA` cancels the first order of motion,
     `AB` lets it leak."""

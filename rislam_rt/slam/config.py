@@ -33,8 +33,8 @@ class SlamConfig:
     turn_std: NotNegative = 0.01
     """Random walk of an estimated heading [rad/sqrt(s)]."""
     height: Literal["known", "estimated"] = "known"
-    """`known` keeps the height and the vertical velocity of the start, `estimated` filters them; the default filter
-    takes them for exact at the start alone."""
+    """How well the start's height and vertical velocity are known. With the default filter both follow climbs: `known`,
+    exact at the start; `estimated`, within the start's deviations. Others keep them for good, or filter them."""
     max_bounces: Annotated[int, Ge(0), Le(2)] = 2
     """Largest number of wall bounces, both legs together, of a landmark path that the agent looks for."""
     new_density: Positive = 0.016

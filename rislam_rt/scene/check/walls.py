@@ -48,12 +48,14 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
     """Scene check: findings on meshes that lie on each other, are nearly flat, or have several walls."""
     parts = build_parts(room)
     yield from _stacked(room, parts)
-    for number, part in enumerate(parts.flat):
-        count, name = len(part.offset), room.scene.reflectors[number].name
-        if count < 2:
-            continue
-        field = f"reflector[{number}].mesh ({name})"
-        yield note_at(room.file, field, f"the mesh has {count} planes", f"its walls are {name}#0 to {name}#{count - 1}")
+    several = [number for number, part in enumerate(parts.flat) if len(part.offset) > 1]
+    for number in several:
+        part, name = parts.flat[number], room.scene.reflectors[number].name
+        count, field = len(part.offset), f"reflector[{number}].mesh ({name})"
+        if number == several[0]:
+            others = f", and {counted(len(several) - 1, 'other reflector')} more than one" if len(several) > 1 else ""
+            mend = f"its walls are {name}#0 to {name}#{count - 1}"
+            yield note_at(room.file, field, f"the mesh has {count} planes{others}", mend)
         angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
@@ -80,7 +82,9 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
         field, apart = f"{field} ({names[0]})", f"{round(pair.gap * 1e3, 2):g} mm apart"
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
         if seen:
-            mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm"
+            mend = (
+                f"leave one out, or part them by more than {limit * 1e3:.2g} mm (a door or window stands 1 cm before)"
+            )
             yield warning_at(room.file, field, message, f"where they overlap '{names[0]}' reflects; {mend}")
         elif hidden:
             message += f", and {counted(hidden - 1, 'other pair')} likewise" if hidden > 1 else ""
