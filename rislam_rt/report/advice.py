@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from rislam_rt.adviser.advice import Advice
 from rislam_rt.adviser.coverage import Coverage
@@ -35,7 +35,7 @@ UNSEEN = "#d9d9d9"
 def print_advice(advice: Advice) -> None:
     """Print a table of the SNR margin of each landmark along the trajectory, remedies, and the cost of tracing."""
     console = Console(highlight=False)
-    table = Table("landmark", "codes", *PLACES, "heard", "why not")
+    table = Table(Column("landmark", overflow="fold"), "codes", *PLACES, "heard", "why not")
     for link in advice.links:
         cells = (_cell(link, at) for at in link.three)
         table.add_row(link.landmark, link.code or "any", *cells, share_text(link.share), _why(link))

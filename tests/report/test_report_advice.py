@@ -70,6 +70,21 @@ def test_a_loud_landmark_in_brackets_says_why_in_its_row(
     assert "below 0 dB it is too weak, above it is for the reason in the last column" in text
 
 
+def test_long_names_of_landmarks_are_told_apart(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cut to the column's width, both posts of a frame had one name."""
+    monkeypatch.setenv("COLUMNS", "80")
+    margins, reasons = (
+        np.array([-3.0, 14.7, -4.0]),
+        ("too weak", "not to be told from VT traffic_mirror_back", "too weak"),
+    )
+    links = [LandmarkLink(f"frame_post_{side}", "any", margins, np.zeros(3), reasons) for side in ("left", "right")]
+    print_advice(Advice(links, [], [TraceCost(1, 6, 33, 31, 0.2)], 10.0))
+    names = [line.split("│")[1].strip() for line in capsys.readouterr().out.splitlines() if line.count("│") > 2]
+    assert "".join(names).count("frame_post_left") == "".join(names).count("frame_post_right") == 1
+
+
 def test_a_place_in_brackets_of_a_landmark_that_is_heard_says_why_too(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
