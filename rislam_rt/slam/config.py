@@ -33,8 +33,9 @@ class SlamConfig:
     turn_std: NotNegative = 0.01
     """Random walk of an estimated heading [rad/sqrt(s)]."""
     height: Literal["known", "estimated"] = "known"
-    """How well the start's height and vertical velocity are known. With the default filter both follow climbs: `known`,
-    exact at the start; `estimated`, within the start's deviations. Others keep them for good, or filter them."""
+    """How well the start's height and vertical velocity are known: `known`, exactly; `estimated`, within the start's
+    deviations. The default filter follows climbs with either, unless the motion is told and the height known; the other
+    filters keep a known height for good."""
     max_bounces: Annotated[int, Ge(0), Le(2)] = 2
     """Largest number of wall bounces, both legs together, of a landmark path that the agent looks for."""
     new_density: Positive = 0.016

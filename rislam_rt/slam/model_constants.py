@@ -42,8 +42,8 @@ class ModelConstants(NamedTuple):
     fit: float = 3.0
     """Standard deviations of its cost above which a birth hypothesis does not fit at all."""
     company: float = 0.25
-    """Probability that a new track shares its cell with another path: 0.2 to 0.35 of traced components, whatever their
-    SNR (docs/slam_measured.md)."""
+    """Probability that a new track, or a return that is missed, shares the cell of another path: 0.2 to 0.35 of traced
+    components do, whatever their SNR (docs/slam_measured.md)."""
     memory: float = 4.0
     """Cycles over which an unresolved neighbour's pull keeps its sign: phases turn once in half a wavelength moved."""
     cleared: float = 0.05

@@ -82,9 +82,7 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
         field, apart = f"{field} ({names[0]})", f"{round(pair.gap * 1e3, 2):g} mm apart"
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
         if seen:
-            mend = (
-                f"leave one out, or part them by more than {limit * 1e3:.2g} mm (a door or window stands 1 cm before)"
-            )
+            mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm (a door or window by 1 cm, say)"
             yield warning_at(room.file, field, message, f"where they overlap '{names[0]}' reflects; {mend}")
         elif hidden:
             message += f", and {counted(hidden - 1, 'other pair')} likewise" if hidden > 1 else ""

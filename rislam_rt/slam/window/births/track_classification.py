@@ -65,7 +65,7 @@ class TrackDecision(NamedTuple):
     holds: DirectionPriors
     """Direction priors of the new feature, whose row in them is 0."""
     share: float
-    """Weight of the return over the edge with a known wall, where the new wall's return is unresolved from that."""
+    """Weight of the second of two unresolved returns: over the edge with a known wall, or in the other order."""
     misfit: float
     """Standard deviations by which the fit's cost exceeds what noise makes it."""
     identity: PanelIdentity
@@ -159,12 +159,23 @@ def _weigh(
 
 def _is_oblique(table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures) -> Booleans:
     """Which hypotheses (H,) are of a wall that is neither upright nor level for certain: it is met in both orders with
-    a known one, to which it is not at right angles, and one of the two is not upright."""
+    a known one that is, to which it is not at right angles, and one of the two is not upright."""
     found, rows = np.zeros(len(table.kind), dtype=np.bool_), (table.kind == BOTH_WAYS).nonzero()[0]
-    for place in (fits.place[rows], known.place[table.known[rows]]):
-        span = place - summary.middle
-        found[rows] |= np.abs(span[:, 2]) > UPRIGHT_RISE * np.linalg.norm(span, axis=1)
+    new, old = (_directions(place - summary.middle) for place in (fits.place[rows], known.place[table.known[rows]]))
+    steep = (np.abs(np.stack([new[:, 2], old[:, 2]])) > UPRIGHT_RISE).any(axis=0)
+    found[rows] = steep & _is_aligned(old)
     return found
+
+
+def _directions(span: Floats) -> Floats:
+    """Unit vectors (N, 3) along ways (N, 3) to walls of hypotheses."""
+    return np.asarray(span / np.maximum(np.linalg.norm(span, axis=-1, keepdims=True), 1e-6))
+
+
+def _is_aligned(direction: Floats) -> Booleans:
+    """Whether hypotheses' known walls in these directions (..., 3) are upright or level, within `dip`."""
+    across = np.hypot(direction[..., 0], direction[..., 1])
+    return np.asarray(np.minimum(np.abs(direction[..., 2]), across) < CONSTANTS.dip)
 
 
 def decide_tracks(
@@ -269,21 +280,19 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
 def _holds(
     table: Hypotheses, place: Floats, middle: Floats, known: KnownFeatures, walls: Integers, at: int
 ) -> DirectionPriors:
-    """Direction priors of a new wall at `place` (3,) by hypothesis `at`: where it is met in both orders, none that it
-    is at right angles to the known one."""
+    """Direction priors of a new wall at `place` (3,) by hypothesis `at`: where it is met in both orders with an upright
+    or level wall, none that it is at right angles to that or any other."""
     if not table.trials.is_wall[at]:
         return no_holds()
-    holds = direction_beliefs(place, middle, known.place[walls])
-    if table.kind[at] != BOTH_WAYS:
-        return holds
-    out = known.place[table.known[at]] - middle
-    keep = np.abs(holds.axis @ out) < CONSTANTS.dip * np.linalg.norm(out)
-    return DirectionPriors._make(field[keep] for field in holds)
+    out = _directions(known.place[table.known[at]] - middle) if table.kind[at] == BOTH_WAYS else None
+    acute = out if out is not None and _is_aligned(out) else None
+    return direction_beliefs(place, middle, known.place[walls], acute)
 
 
 def _cautious(oblique: Booleans, own: Integers, evidence: Floats, same: Booleans, at: int) -> int:
     """Hypothesis by which a track's feature enters the map: `at`, the likeliest, or, of others that are the `same`, the
-    likeliest `oblique` one (H,), if it is likely enough for a level or upright wall not to be held for true."""
+    likeliest `oblique` one (H,), if its share among these is more than `born` leaves for all that is not held for true.
+    """
     slopes = own[same & oblique[own]]
     if oblique[at] or not len(slopes):
         return at

@@ -22,10 +22,10 @@ KINDS = (
 """Names of the kinds of hypotheses, by their number; the last six but one are images of known points in new walls
 (`image_hypotheses`)."""
 WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BESIDE = range(9)
-*IMAGES, BOTH_WAYS = range(9, 16)
-IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES
 # at an acute angle two walls are met in either order, by paths as long and as loud that arrive from either side of the
 # edge and come out as one; at an obtuse angle there is no path, at a right one a single one
+*IMAGES, BOTH_WAYS = range(9, 16)
+IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES
 
 FAR = (TX_IMAGE, OTHER_LEG)
 """Kinds whose new wall mirrors a known point on the leg to the Tx."""
@@ -159,8 +159,8 @@ def _square_to(alone: Floats, across: Floats, middle: Floats) -> Floats:
 
 def _acute(rx: Floats, ray: Floats, length: Floats, out: Floats, middle: Floats) -> Floats:
     """Images (W, T, 3) of `middle` in new walls that meet known ones, whose images lie at `out` (W, 3) from it, at an
-    acute angle along the edge at which rays (T, 3) from `rx` (T, 3) point: both walls make a way (T,) of that `length`
-    there and back of twice the edge's distance, times the sine of the angle."""
+    acute angle along the edge at which rays (T, 3) from `rx` (T, 3) point: the paths' `length` (T,) is twice the edge's
+    distance times the sine of the angle."""
     reach = np.maximum(np.linalg.norm(out, axis=1), 1e-6)
     normal = out / reach[:, None]
     toward = np.maximum(normal @ ray.T, CONSTANTS.dip)
@@ -194,7 +194,7 @@ def _over(known: KnownFeatures, legs: Integers, spots: Floats, middle: Floats) -
 
 def _beyond(kind: Integers, walled: Integers, known: KnownFeatures) -> Floats:
     """Linear part and translation (H, 3, 4) of the reflection in the known wall of hypotheses of a new wall whose
-    return is unresolved from its edge with that one; zero elsewhere."""
+    return is unresolved from one that ends with that; zero elsewhere."""
     found, rows = np.zeros((len(kind), 3, 4)), np.isin(kind, (BESIDE, BOTH_WAYS)).nonzero()[0]
     if len(rows):
         found[rows, :, :3], found[rows, :, 3] = known.turn[walled[rows]], known.shift[walled[rows]]

@@ -225,21 +225,22 @@ LEVEL_RISE = 0.9
 """Vertical share of the way to a wall's image above which the wall may be level."""
 
 
-def direction_beliefs(place: Floats, middle: Floats, others: Floats) -> DirectionPriors:
+def direction_beliefs(place: Floats, middle: Floats, others: Floats, acute: Floats | None = None) -> DirectionPriors:
     """Direction priors of a hypothesis's wall, the image `place` (3,) [m] of `middle` (3,), whose images in known walls
-    are `others` (W, 3): upright, at right angles to one of them, or level."""
+    are `others` (W, 3): upright, at right angles to one of them, or level. To an upright or level wall that it is met
+    with in both orders, and that lies in direction `acute` (3,), it is at no right angle."""
     span = place - middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
     if rise > LEVEL_RISE:
-        axes += [AXES[0], AXES[1]]
-        log_odds += 2 * [CONSTANTS.log_upright + np.log(reach)]
-    elif rise < UPRIGHT_RISE:
+        axes += [AXES[0], AXES[1]] if acute is None else _along(acute)
+        log_odds += len(axes) * [CONSTANTS.log_upright + np.log(reach)]
+    elif rise < UPRIGHT_RISE and (acute is None or abs(acute[2]) < UPRIGHT_RISE):
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        rows, along = _square_axes(span[None], others - middle)
+        rows, along = _square_axes(span[None], others - middle) if acute is None else (np.zeros(0), AXES[:0])
         axes += list(along)
         log_odds += [float(_log_square(np.asarray(reach)))] * len(rows)
     count = len(axes)
@@ -248,6 +249,13 @@ def direction_beliefs(place: Floats, middle: Floats, others: Floats) -> Directio
         np.zeros(count, dtype=np.int64), axis, axis @ middle, np.full(count, std), np.array(log_odds),
         np.full(count, 0.5),
     )  # fmt: skip
+
+
+def _along(acute: Floats) -> list[Floats]:
+    """Level axis along an upright wall in direction `acute` (3,), along which what meets it at an acute angle may be
+    level; none along a level one."""
+    flat = float(np.hypot(acute[0], acute[1]))
+    return [np.array([-acute[1], acute[0], 0.0]) / flat] if flat > UPRIGHT_RISE else []
 
 
 def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:

@@ -101,13 +101,12 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         short = np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
         place[active] += short * step[:, common:]
         error[active] += short * step[:, :common]
-        if turn == 1:
+        if turn in (1, STEPS - 1):
             best = np.full(len(summary.seen), np.inf)
             np.minimum.at(best, trials.track, cost)
-            active = (cost < best[trials.track] + 2.0 * CERTAIN).nonzero()[0]
-            lost = np.ones(count, dtype=np.bool_)
-            lost[active] = False
-            cost[lost] = np.inf
+            # an angle that its sine tells takes more steps
+            lost = ~((cost < best[trials.track] + 2.0 * CERTAIN) | (trials.even & (turn == 1)))
+            active, cost[lost] = np.flatnonzero(~lost), np.inf
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
     share = np.where(trials.mixed, _shares(trials.even, error), 0.0)
     # a component lies between the two that it is made of
@@ -232,7 +231,8 @@ def _mix(
     """Move predictions, and their slopes by place and pose, in place towards the new wall's return as reflected in a
     known wall, from which they are unresolved; returns the slope (H, B, 3, 1) by the share's error.
 
-    `ends` are Tx and Rx positions (H, B, 3), new walls (H, 3) and the place that these are images of (3,).
+    `ends` are Tx and Rx positions (H, B, 3), new walls (H, 3) and the place that these are images of (3,). By the known
+    wall's error both are moved alike (`_by_maps`), as they are at right angles.
     """
     value, new, pose = seen
     split = np.zeros((*value.shape, 1))

@@ -112,9 +112,9 @@ def _shows(context: WindowState, table: Hypotheses, rows: Integers, length: Floa
 
 
 def log_missed(shows: Floats, present: Booleans, itself: Booleans) -> float:
-    """Log probability that a return with detection probabilities (K,) is not detected by itself in all cycles in which
-    no component is `itself` (K,) where it would be; it may be unresolved from those that are `present` (K,) in its
-    cell, in all of them or in none (`company`)."""
+    """Log probability that a return with detection probabilities (K,) is missed in all cycles in which no component is
+    `itself` (K,) where it would be. With probability `company` it is hidden instead in whatever is `present` (K,) in
+    its cell."""
     merged, apart = log_silence(shows, present), log_silence(shows, itself)
     return float(np.logaddexp(np.log(CONSTANTS.company) + merged, np.log1p(-CONSTANTS.company) + apart))
 

@@ -46,13 +46,13 @@ def _seen(images, rx):
     )
 
 
-def _case(new, share=0.5, move=(0.3, 0.5, 0.4), baseline=(0.0, 0.05, 0.0)):
+def _case(new, share=0.5, known=WALL_AT, move=(0.3, 0.5, 0.4), baseline=(0.0, 0.05, 0.0)):
     """Track of the paths over the known wall and a `new` one, for an agent that moves: of both orders, the second at a
     `share`; with the map."""
     time = np.linspace(-1.0, 0.0, 8)
     place = MIDDLE + time[:, None] * np.asarray(move)
     tx, rx = place + np.array(baseline), place - np.array(baseline)
-    known, image = _image(WALL_AT), _image(new)
+    known, image = _image(known), _image(new)
     one, other = (
         _seen(reflect(reflect(tx, first, MIDDLE), then, MIDDLE), rx) for first, then in ((known, image), (image, known))
     )
@@ -82,7 +82,7 @@ def test_the_ceiling_that_rises_towards_a_wall_is_found_from_both_orders_at_once
 
 
 def test_the_slopes_of_the_mean_of_both_orders_are_those_of_finite_differences():
-    """The fit's own covariance against that of a fit in which the place was moved along each axis."""
+    """The fit's own information against that of the prediction, moved along each axis."""
     summary, known, landmarks = _case(_ceiling(0.15))
     table = hypotheses(summary, known, landmarks)
     table = table.take(table.kind == BOTH_WAYS)
@@ -142,15 +142,41 @@ def test_which_orders_there_are_hangs_on_the_angle(slope):
         assert (apart < 1.0) == (slope < 0.1)
 
 
-def test_what_is_met_in_both_orders_is_not_presumed_to_be_at_right_angles():
-    summary, known, landmarks = _case(_ceiling(0.08))
-    table = hypotheses(summary, known, landmarks)
-    for kind, count in ((KNOWN_WALL, 2), (BOTH_WAYS, 1)):  # level along both axes, or along the wall alone
-        at = int(np.flatnonzero(table.kind == kind)[0])
-        holds = track_classification._holds(table, _image(_ceiling(0.08)), MIDDLE, known, landmarks.walls, at)
-        assert len(holds.std) == count
-        if kind == BOTH_WAYS:
-            np.testing.assert_allclose(holds.axis, [[0.0, 1.0, 0.0]])
+@pytest.mark.parametrize("turned", [0.0, 0.05, 0.8])
+def test_what_is_met_in_both_orders_is_not_presumed_to_be_at_right_angles(turned):
+    """However the room lies: a ceiling may be level along the wall that it rises towards, and not across."""
+    flat = np.array([[np.cos(turned), -np.sin(turned), 0.0], [np.sin(turned), np.cos(turned), 0.0], [0.0, 0.0, 1.0]])
+    table = SimpleNamespace(
+        kind=np.array([KNOWN_WALL, BOTH_WAYS]),
+        known=np.zeros(2, dtype=int),
+        trials=SimpleNamespace(is_wall=np.ones(2, bool)),
+    )
+
+    def axes(at, new, old):
+        known = SimpleNamespace(place=_image(flat @ old)[None])
+        return track_classification._holds(table, _image(flat @ new), MIDDLE, known, np.zeros(1, int), at).axis
+
+    sloping, upright = _ceiling(0.08), np.array([-1.0, 2.0, 0.0])
+    assert len(axes(0, sloping, WALL_AT)) == 2
+    np.testing.assert_allclose(np.abs(axes(1, sloping, WALL_AT)), np.abs(flat @ [[0.0], [1.0], [0.0]]).T, atol=1e-12)
+    np.testing.assert_allclose(axes(1, upright, WALL_AT), [[0.0, 0.0, 1.0]])
+    assert len(axes(1, np.array([0.3, 2.0, 0.05]), np.array([0.0, 0.0, 1.6]))) == 0  # under a level ceiling
+    # where the known one slopes, the new one may be upright or level
+    np.testing.assert_allclose(axes(1, upright, sloping)[0], [0.0, 0.0, 1.0])
+
+
+def test_an_upright_wall_under_a_known_ceiling_that_slopes_is_found_too():
+    """Beside the two orders alone, whose fits are next to perfect sooner."""
+    for slope in (0.05, 0.08):
+        ceiling = _ceiling(slope)
+        summary, known, landmarks = _case(WALL_AT, known=ceiling)
+        table = hypotheses(summary, known, landmarks)
+        table = table.take(np.isin(table.kind, (KNOWN_WALL, WALL_KNOWN, BOTH_WAYS)))
+        fits = try_all(table.trials, summary)
+        both = table.kind == BOTH_WAYS
+        assert fits.cost[both] < 0.1
+        assert np.linalg.norm(fits.place[both] - _image(WALL_AT)) < 5e-3
+        assert not track_classification._is_oblique(table, fits, summary, known).any()
 
 
 def test_both_orders_enter_the_log_as_partners():
@@ -189,4 +215,7 @@ def test_a_feature_slopes_unless_it_is_held_for_level():
         evidence = np.array([-10.0, -np.inf, -10.0 + log_odds])
         assert track_classification._cautious(oblique, own, evidence, same, 0) == chosen
     assert track_classification._cautious(oblique, own, np.zeros(3), same & False, 0) == 0
-    assert track_classification._cautious(oblique, own, np.zeros(3), same, 2) == 2
+    slopes = np.array([False, True, True])  # of two that slope, the likeliest of all
+    assert (
+        track_classification._cautious(slopes, own, np.array([-9.0, -1.0, -2.0]), np.array([True, True, False]), 2) == 2
+    )
