@@ -394,8 +394,7 @@ def test_connected_triangles_counts_pieces_not_vertices() -> None:
 
 def test_several_meshes_of_many_planes_are_one_note(paper: Scene) -> None:
     """Twelve crates are twelve times the same remark, under which the warnings would be lost."""
-    scene = paper
     for x in (2.0, 3.0, 4.0):
-        scene = furnished(scene, f"shelf_{x:g}", block([x, 4.0, 1.0], [x + 0.5, 5.0, 2.0]))
-    (note,) = (text for text in remarks(scene).values() if "planes" in text)
+        paper = furnished(paper, f"shelf_{x:g}", block([x, 4.0, 1.0], [x + 0.5, 5.0, 2.0]))
+    (note,) = (text for text in remarks(paper).values() if "planes" in text)
     assert "the mesh has 6 planes, and 2 other reflectors more than one; its walls are shelf_2#0 to shelf_2#5" in note

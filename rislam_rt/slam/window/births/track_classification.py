@@ -111,9 +111,10 @@ _TEMPLATES = (
 def _weigh(
     context: WindowState, track_rows: list[Integers], summary: TrackSummary, owner: Integers, known: KnownFeatures,
     lonely: Floats,
-) -> tuple[Hypotheses, Fits, Floats, Floats]:  # fmt: skip
+) -> tuple[Hypotheses, Fits, Floats, Floats, Booleans]:  # fmt: skip
     """Fit all hypotheses of what caused T tracks, of which `owner` (E,) tells each summary's; returns them, fits, log
-    evidences (H,), and path lengths (H,) [m]: as heard, or whole periods of the sounding more."""
+    evidences (H,), path lengths (H,) [m], as heard or whole periods of the sounding more, and which (H,) are oblique.
+    """
     landmarks, scene, near = context.landmarks, context.scene, len(owner)
     if scene.use_vt:  # without wall returns a longer way is one more thing that a point's track may be, and never born
         summary, end = summary.farther(scene.sensor)
@@ -140,10 +141,11 @@ def _weigh(
     fits = fits._replace(cost=np.where(evidence < best[owner[track]] - 2.0 * CERTAIN, np.inf, fits.cost))
     held = log_upright(table, fits, summary, known, landmarks, scene.use_vt)
     evidence = np.where(np.isfinite(fits.cost), evidence + held.gain, -np.inf)
+    oblique = _is_oblique(table, fits, summary, known)
     if scene.use_vt:
         cell = scene.sensor.cell_length[1:]
         right = held.log_odds + log_possible(table, held.place, held.covariance, summary, known, cell)
-        right[_is_oblique(table, fits, summary, known)] = -np.inf
+        right[oblique] = -np.inf
         free = log_possible(table, fits.place, fits.covariance, summary, known, cell)
         likely = evidence + np.logaddexp(right, free)
         heard = context, table, track_rows, owner, likely
@@ -154,7 +156,7 @@ def _weigh(
         evidence += np.logaddexp(right, free) - np.logaddexp(held.log_odds, 0.0)
     evidence[fitted_twice(table, fits.place, evidence)] = -np.inf
     own = table._replace(trials=table.trials._replace(track=owner[track]))
-    return own, fits, evidence, summary.mean[0][track, 0]
+    return own, fits, evidence, summary.mean[0][track, 0], oblique
 
 
 def _is_oblique(table: Hypotheses, fits: Fits, summary: TrackSummary, known: KnownFeatures) -> Booleans:
@@ -192,7 +194,7 @@ def decide_tracks(
     `beside` (T,) the log odds that its direction speaks for a path over unknown walls.
     """
     landmarks, scene = context.landmarks, context.scene
-    table, fits, evidence, length = _weigh(context, track_rows, summary, owner, known, lonely)
+    table, fits, evidence, length, oblique = _weigh(context, track_rows, summary, owner, known, lonely)
     track = table.trials.track
     over = identify(context, track_rows, table, fits, evidence)
     evidence += over.gain
@@ -206,7 +208,6 @@ def decide_tracks(
     none += np.logaddexp(np.log1p(-CONSTANTS.panels), np.log(CONSTANTS.panels) + over_panels)
     explained = [(row, value + (over.elsewhere[row, panel] if panel >= 0 else 0.0)) for row, value, panel in told]
     evidence += log_shared(table, fits, evidence, none, explained, summary.middle, concurrent(context, track_rows))
-    oblique = _is_oblique(table, fits, summary, known)
     echo = log_echo_over_floor(table, fits, evidence, summary.middle, lonely)
     decisions, shares, nobody = [], np.zeros(len(explained)), unknown(1, scene.num_panels)
     for row in range(len(summary.seen)):

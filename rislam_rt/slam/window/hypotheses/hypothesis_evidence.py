@@ -240,9 +240,9 @@ def direction_beliefs(place: Floats, middle: Floats, others: Floats, acute: Floa
     elif rise < UPRIGHT_RISE and (acute is None or abs(acute[2]) < UPRIGHT_RISE):
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        rows, along = _square_axes(span[None], others - middle) if acute is None else (np.zeros(0), AXES[:0])
-        axes += list(along)
-        log_odds += [float(_log_square(np.asarray(reach)))] * len(rows)
+        square = _square_axes(span[None], others - middle)[1] if acute is None else AXES[:0]
+        axes += list(square)
+        log_odds += [float(_log_square(np.asarray(reach)))] * len(square)
     count = len(axes)
     axis = np.array(axes).reshape(count, 3)
     return DirectionPriors(

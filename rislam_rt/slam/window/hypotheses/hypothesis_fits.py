@@ -139,20 +139,13 @@ def _equations(
     turn, shift = trials.turn[rows], trials.shift[rows]
     first, second = turn[:, 0], turn[:, 1]
     # a point: fixed images; a wall: the image of the Tx, which moves
-    span = place - summary.middle
-    scaled = span / np.maximum(np.vecdot(span, span), 1e-9)[:, None]
     inner = tx @ np.swapaxes(first, 1, 2) + shift[:, None, 0]
-    depth = np.vecdot(scaled[:, None], inner - 0.5 * (place + summary.middle)[:, None])
-    mirrored = inner - 2.0 * depth[..., None] * span[:, None]
+    mirrored, by_wall, flip = _mirrored(inner, place, summary.middle)
     out, fixed = trials.far[rows][:, None, None], trials.fixed[rows][:, None, None]
     base = np.where(wall[:, None, None], mirrored, place[:, None] + np.where(pair[:, None, None], inner, 0.0))
     base = np.where(out, inner, base)
     image = base @ np.swapaxes(second, 1, 2) + shift[:, None, 1]
-    by_wall = -2.0 * (
-        depth[..., None, None] * AXES + scaled[:, None, :, None] * (mirrored - place[:, None])[..., None, :]
-    )
     inside = np.where(wall[:, None, None, None], np.where(out[..., None], 0.0, by_wall), AXES)
-    flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
     by_tx = np.where(wall[:, None, None], second @ flip @ first, np.where(pair[:, None, None], first, 0.0))
     to_rx = image - rx
     reach = np.maximum(np.sqrt(np.vecdot(to_rx, to_rx)), 1e-6)
@@ -187,12 +180,24 @@ def _equations(
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
     normal[:, np.arange(size), np.arange(size)] *= 1.0 + 1e-12  # a blind direction that rounding would make singular
     normal[:, common, common] += 1.0
+    span = place - summary.middle
     ridge = (2.0 * CONSTANTS.size) ** -2.0  # what nothing tells of lies in the room
     normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), ridge)[:, None]
     slope[:, common] -= error
     tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
     return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
+
+
+def _mirrored(spots: Floats, place: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+    """Images (H, B, 3) of spots (H, B, 3) in the new walls of hypotheses, which mirror `middle` (3,) to `place` (H, 3),
+    and their derivatives by that place (H, B, 3, 3) and by the spots (H, 3, 3)."""
+    span = place - middle
+    scaled = span / np.maximum(np.vecdot(span, span), 1e-9)[:, None]
+    depth = np.vecdot(scaled[:, None], spots - 0.5 * (place + middle)[:, None])
+    image = spots - 2.0 * depth[..., None] * span[:, None]
+    by_place = depth[..., None, None] * AXES + scaled[:, None, :, None] * (image - place[:, None])[..., None, :]
+    return image, -2.0 * by_place, AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
 
 
 def _by_maps(trials: Trials, rows: Integers, by_image: Floats, toward: Floats, flip: Floats) -> tuple[Floats, Floats]:
@@ -241,11 +246,7 @@ def _mix(
         return split
     (tx, rx, place), middle = (end[both] for end in ends[:3]), ends[3]
     mirror, even = trials.beyond[rows[both]], trials.even[rows[both]]
-    span = place - middle
-    scaled = span / np.maximum(np.vecdot(span, span), 1e-9)[:, None]
-    depth = np.vecdot(scaled[:, None], tx - 0.5 * (place + middle)[:, None])
-    image = tx - 2.0 * depth[..., None] * span[:, None]
-    inside = -2.0 * (depth[..., None, None] * AXES + scaled[:, None, :, None] * (image - place[:, None])[..., None, :])
+    image, inside, flip = _mirrored(tx, place, middle)
     out = image @ np.swapaxes(mirror[..., :3], 1, 2) + mirror[:, None, :, 3] - rx
     length = np.sqrt(np.vecdot(out, out))
     ray = out / length[..., None]
@@ -255,7 +256,6 @@ def _mix(
     split[both] = np.where(even, 0.0, CONSTANTS.weaker)[:, None, None, None] * gap[..., None]
     across = _by_image(ray, length)
     turned = _through(across, mirror[..., :3])
-    flip = AXES - 2.0 * span[:, :, None] * scaled[:, None, :]
     by_new, by_agent = turned @ inside, _through(turned, flip) - across
     new[both] += share[..., None] * (by_new - new[both])
     pose[both] += share[..., None] * (by_agent - pose[both])

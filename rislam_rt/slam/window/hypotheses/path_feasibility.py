@@ -34,8 +34,8 @@ def log_possible(
 ) -> Floats:
     """Log probability (H,) that the path over a known and a new wall is geometrically possible, over that beforehand,
     with new walls at `place` (H, 3) [m] within covariances `spread` (H, 3, 3) [m^2], known ones as uncertain as they
-    are; 0 for other hypotheses. Beforehand it is one half: at a right angle
-    one of two orders is possible, and of an acute and an obtuse angle one has paths, which are in both orders.
+    are; 0 for other hypotheses. Beforehand it is one half: at a right angle one of two orders is possible, and of an
+    acute and an obtuse angle the acute one has paths, in both orders.
 
     These come out as one component, the likelier the nearer they arrive, up to a `cell` (2,) of cosines apart (that of
     the array's axes, as if it were square or the body faced along the room's).

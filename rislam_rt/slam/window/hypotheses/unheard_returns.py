@@ -180,10 +180,9 @@ def missing_legs(context: WindowState, rows: Integers, mean: Floats) -> Floats:
     np.logical_or.at(ceiling, looked.track, lower.any(axis=1))
     echo = np.where(ceiling, 0.0, np.log1p(-CONSTANTS.shown))
     scene, floor = context.scene, (away[tracks:, 2] < -LEVEL_RISE).any()
+    # the floor is known or heard itself, and the map says what comes over it; or nothing is asked
     if floor or not scene.use_vt or scene.radio.array.pattern != "upper":
-        echo[
-            :
-        ] = -np.inf  # the floor is known or heard itself, and the map says what comes over it; or nothing is asked
+        echo[:] = -np.inf
     return np.stack([along_one, square, square, echo], axis=1)
 
 
