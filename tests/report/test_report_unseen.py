@@ -114,8 +114,12 @@ def test_files_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     content = json.loads((tmp_path / "x.json").read_text())
     assert content["tests"] == 3
     assert content["cards"]["b"]["failed"] == 1
-    along = spec.model_copy(update={"ways": "along_walls"})
-    assert [("along the walls" in " ".join(about_lines(s, RECORD, 0, 1, 1))) for s in (spec, along)] == [False, True]
+    told = [
+        " ".join(about_lines(spec.model_copy(update={"ways": ways}), RECORD, 0, 1, 1))
+        for ways in ("anyhow", "along_walls", "carried")
+    ]
+    assert ["along the walls" in text for text in told] == [False, True, True]
+    assert ["carried by a walker" in text for text in told] == [False, False, True]
     print_cards(rows(), timings)
     assert "relative RMSE [mm]" in capsys.readouterr().out
 

@@ -60,7 +60,9 @@ def about_lines(spec: UnseenSpec, record: Mapping[str, Any], tests: int, there: 
     unfinished = "" if there == wanted else f" Not complete: {there} of {wanted} cells."
     purpose = "for tests" if spec.is_test else "for development"
     counted = "never" if tests == 0 else "once" if tests == 1 else f"{tests} times"
-    way = "" if spec.ways == "anyhow" else '; **agents set out from rest along the walls** (`ways = "along_walls"`)'
+    carried = ", carried by a walker" if spec.ways == "carried" else ""
+    way = f'; **agents set out from rest along the walls{carried}** (`ways = "{spec.ways}"`)'
+    way = "" if spec.ways == "anyhow" else way
     text = f"""Rooms {spec.first} to {spec.first + spec.rooms - 1} ({purpose}), drawn at random each from its number:
     shape, ceiling, size, materials, furniture, scatterers, panel and motion ([how](../unseen_data.md)){way}.
     {config["cycles"] or "All"} cycles of 0.1 s, up to {config["depth"]} wall bounces. Written by

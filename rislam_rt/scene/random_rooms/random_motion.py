@@ -29,14 +29,20 @@ STANDING, WALKING, BRAKING = (1.0, 3.0), (2.0, 6.0), 0.6
 """Ranges [s] of a random motion's stops and of the time between two, and the time [s] to brake or set off."""
 SPIN = (1.0, 3.0)
 """Range [rad] of a random motion's turn on the spot."""
-Ways = Literal["anyhow", "along_walls"]
+Ways = Literal["anyhow", "along_walls", "carried"]
 """How random motions lie in their room: in any direction and moving from the first cycle on; or from rest, first
-parallel or at right angles to a wall, with right angles for corners."""
+parallel or at right angles to a wall, with right angles for corners; or like these, carried by a walker."""
 WALL_SPEED = (0.2, 1.4)
 """Range of speeds [m/s] of random motions along walls, log-uniform; in too small a room the way ends early."""
 REST, SETTING_OFF = (0.3, 1.0), (0.3, 1.0)
 """Ranges of the rest [s] at the start of a random motion along walls, and of the acceleration [m/s^2] from it, which is
 that of its last halt too."""
+STEP_RATE, BOB, SWAY = (1.5, 2.2), (0.005, 0.02), (0.005, 0.02)
+"""Ranges of a walker's steps per second, and of the amplitudes [m] of what is carried: upwards once in a step, and
+sideways once in two: a hand bobs by less than the 27 to 48 mm from top to bottom of a body's centre of mass at 0.7 to
+1.6 m/s (Orendurff et al. 2004, J. Rehabil. Res. Dev. 41(6A))."""
+STROLL = 0.8
+"""Speed [m/s] from which on a walker's amplitudes are whole; below, they are in proportion."""
 SHORTEST = 4.0
 """Least time [s] after which a random motion along walls halts for good; its turns, and a climb, go on in place."""
 _STARTS, _SLOWER = 64, 0.8
@@ -102,9 +108,24 @@ def draw_motion(
                 angle = np.asarray(wrap(yaw[number] + heading))
                 ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
                 velocity = np.column_stack([speed * pace[:, None] * ahead, climb])
+                if ways == "carried":
+                    step, by = _gait(speed * pace, ahead, rng)
+                    position, velocity = position + step, velocity + by
                 return Trajectory(_times(), position, velocity, angle, Body())
         speed, end = (_SLOWER * speed, end) if anyhow else (speed, _SLOWER * end)
     raise SceneError("no room for a motion; draw another plan")
+
+
+def _gait(pace: Floats, ahead: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Draw what a walker's gait adds to positions (K, 3) [m] and velocities (K, 3) [m/s] of a random motion, at speeds
+    (K,) [m/s] towards unit vectors (K, 2): sines in proportion to the speed up to `STROLL`."""
+    rate, bob, sway = rng.uniform(*STEP_RATE), rng.uniform(*BOB), rng.uniform(*SWAY)
+    phase = np.pi * rate * _times() + rng.uniform(0.0, 2.0 * np.pi)
+    twice = 2.0 * phase + rng.uniform(0.0, 2.0 * np.pi)
+    share, left = np.minimum(pace / STROLL, 1.0)[:, None], np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    step = share * np.column_stack([sway * np.sin(phase)[:, None] * left, bob * np.sin(twice)])
+    by = np.pi * rate * np.column_stack([sway * np.cos(phase)[:, None] * left, 2.0 * bob * np.cos(twice)])
+    return step, share * by
 
 
 def _from_rest(course: MotionProfile, speed: float, push: float, rest: float, end: float) -> MotionProfile:

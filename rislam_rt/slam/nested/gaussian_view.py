@@ -44,7 +44,7 @@ def gaussian_view(belief: Nested, step: Floats, heading: Floats, config: SlamCon
     none = np.zeros(accel.shape)
     return Window(
         head, accel, precision, precision, none, precision[:, 2], step, straight, prior,
-        np.zeros((size, size)), slots, whole, no_holds(),
+        np.zeros((size, size)), slots, whole, no_holds(), np.zeros(count), np.zeros(count),
     )  # fmt: skip
 
 

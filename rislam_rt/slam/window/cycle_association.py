@@ -93,15 +93,16 @@ def associate_cycle(
     window: Window, landmarks: WindowTable, visibility: VisibilityObservations, heading: float,
     scene: KnownEnvironment, code: RisCode | None,
     observed: Observations, strangers: Floats, sway: Floats | None, beside: Continuations | None = None,
+    heave: float = 0.0,
 ) -> CycleAssociation:  # fmt: skip
     """Predict the returns of a belief, cluster the unresolved ones, and assign a cycle's components to the clusters.
 
     `strangers` (M,) is the density of clutter at each component, `sway` (C, L) the level probabilities of the attitude,
     None for a body that is known to be level. `beside` says where tracks go on, if a panel is known and no component
-    tells whether it ran over it.
+    tells whether it ran over it; `heave` [m^2] is the variance of the body's height above the floor that it goes along.
     """
     mean, held, excess = window_gaussian.now_with_excess(window)
-    covariance = _with_height(held, excess, scene)
+    covariance = _with_height(held, excess, scene, heave)
     poses = poses_of(mean[:3], np.asarray(heading + mean[6]), scene.body)
     expected = predict_returns(
         mean[HEAD:].reshape(-1, 3), landmarks, poses, mean[:3], scene, code, covariance[HEAD:, HEAD:]
@@ -187,9 +188,9 @@ def _median(values: Floats) -> Floats:
     return np.asarray(0.5 * (values[middle] + values[-1 - middle]))
 
 
-def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) -> Floats:
-    """Covariance of the present with the height's variance widened by what the motion model may be off by, where wall
-    returns are used.
+def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment, heave: float) -> Floats:
+    """Covariance of the present with the height's variance widened by the variance of its `heave` [m^2] and by what the
+    motion model may be off by, where wall returns are used.
 
     A livelier motion is looked at beside the one that is held (`filter._associate_over_motions`), but a slow climb is
     none. Without wall returns next to nothing measures the height: a gate as wide as it may be off holds anything.
@@ -197,7 +198,7 @@ def _with_height(covariance: Floats, excess: Floats, scene: KnownEnvironment) ->
     if not scene.use_vt:
         return covariance
     wide = covariance.copy()
-    wide[2, 2] += excess[2, 2]
+    wide[2, 2] += excess[2, 2] + heave
     return wide
 
 

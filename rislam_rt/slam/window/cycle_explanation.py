@@ -80,8 +80,8 @@ def innovations(
     view: CycleAssociation, log: Log, used: Booleans, cycle: int, axes: int
 ) -> tuple[Floats, Floats, Floats]:
     """Innovations (N, 3) of a cycle's associated components, measured less predicted, and the predictions' jacobians
-    (N, 3, 7 + 3F) by the present and (N, 3, A) by the attitude about so many `axes`, all in standard deviations; the
-    log already holds the associations."""
+    (N, 3, 7 + 3F) by the present and (N, 3, A + 1) by the attitude about so many `axes` and by the heave, all in
+    standard deviations; the log already holds the associations."""
     row, at = view.row[used], int(np.searchsorted(log.cycle, cycle)) + view.pick[used]
     lead, mate, share = view.groups.leader[row], view.groups.partner[row], log.share[at, None]
     seen = view.expected.seen[lead] + share * view.groups.gap[row]
@@ -90,7 +90,7 @@ def innovations(
     left = log.seen[at] - seen
     correct_horizon_bias(seen, log.std[at], left, slope)
     std = np.sqrt(log.std[at] ** 2 + log.extra[at])
-    turned = attitude.jacobian(log.seen[at, 1:], axes)
+    turned = np.concatenate([attitude.jacobian(log.seen[at, 1:], axes), slope[..., 2:3]], axis=2)
     return left / std, slope / std[..., None], turned / std[..., None]
 
 

@@ -40,6 +40,11 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     spread = covariance.copy()
     spread[:6, :6] += excess
     spread[:3, :3] += np.diag(state.shift**2)
+    if ahead and state.heaves:  # the next step's heave is another one
+        mean[2] -= state.window.heave[-1]
+        spread[2, 2] += state.heave_variance
+    else:
+        spread[2, 2] += state.heave_spread
     position = mean[:3] + ahead * mean[3:6]
     root = square_root(spread[:3, :3])
     return SlamEstimate(
@@ -81,9 +86,9 @@ def revisit(
     features = mean[HEAD:].reshape(-1, 3)
     spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.landmarks, state.shift)
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
-    window = window_gaussian.begin_with(
-        start.position, start.velocity, std, mean[HEAD:], spread, turns=fresh.window.turns
-    )
+    velocity, turns = fresh.window.head[3:6], fresh.window.turns
+    window = window_gaussian.begin_with(start.position, velocity, std, mean[HEAD:], spread, turns=turns)
+    window = window_gaussian.with_heave(window, fresh.heave_variance, at_start=True)
     landmarks = state.landmarks._replace(hidden=np.zeros(state.landmarks.hidden.shape))
     return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3))
 

@@ -34,10 +34,12 @@ from rislam_rt.slam.window.motion import coordinated_turn, motion_learning
 from rislam_rt.slam.window.motion.manoeuvres import with_climb, with_manoeuvre
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import level, relinearise
-from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
+from rislam_rt.slam.window.smoother import attitude, heave, motion, window_gaussian
+from rislam_rt.slam.window.smoother.attitude import Attitude
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
+from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import CLIMBED, LATELY, REFRESH
+from rislam_rt.slam.window.solver_limits import CLIMBED, LASTED, LATELY, REFRESH
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -50,7 +52,12 @@ def init(
     offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
-    window = window_gaussian.begin(start.position, start.velocity, std, turns=turns)
+    velocity, gait = start.velocity, heave.first_levels()
+    if config.filter == "window" and config.motion == "learnt" and config.use_vt:
+        velocity, gait = heave.at_start(velocity, float(std[5]))
+    window = window_gaussian.with_heave(
+        window_gaussian.begin(start.position, velocity, std, turns=turns), heave.variance(gait), at_start=True
+    )
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
@@ -60,7 +67,7 @@ def init(
         no_observations(),
         motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
-        attitude.first_levels(compass=not turns),
+        attitude.first_levels(compass=not turns), gait, 0.0,
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
@@ -125,7 +132,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         )
         told_of_first = motion_learning.likelihoods(window, 1, motion_learning.vertical_information(window))[:, 0]
         motion_mode = motion.forward(motion_mode, told_of_first, CONSTANTS.stay)
-        passed = np.concatenate([passed, window.head[None, :3]])
+        passed = np.concatenate([passed, window_gaussian.poses(window)[:1, :3]])
         window, headings = window_gaussian.slide(window), headings[1:]
         rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
@@ -157,16 +164,20 @@ def _associate_over_motions(
     upwards, a turn of the body that no compass tells, or a jump in position, and return the state and association of
     the likeliest, and the log odds of these two manoeuvres, 0 for what is not believed.
 
-    A jump has to explain the cycle better than being lost does, which explains nothing.
+    A body that begins to bob is asked about beside one that begins to climb. A jump has to explain the cycle better
+    than being lost does, which explains nothing.
     """
+
+    heaved = state.heave_variance
 
     def view_of(window: Window) -> CycleAssociation:
         return associate_cycle(
             window, state.landmarks, state.visibility, heading, state.scene, code, observed, strangers,
-            state.sway, beside,
+            state.sway, beside, heaved,
         )  # fmt: skip
 
-    lively, window, best = [0.0, 0.0], state.window, view_of(state.window)
+    plain = view_of(state.window)
+    lively, window, best = [0.0, 0.0], state.window, plain
     learnt = state.config.motion == "learnt"  # a motion that is told stays told
     for axis in range(2 if learnt and len(best.groups.leader) and len(window.step) else 0):
         steps = (LATELY, CLIMBED)[axis]
@@ -179,6 +190,15 @@ def _associate_over_motions(
             log_odds = view.score + prior - best.score
             if log_odds > 0.0:
                 lively[axis], window, best = log_odds, trial, view
+    if not heaved and len(plain.groups.leader) and _may_heave(state):
+        prior, heaved = heave.begins(state.gait)
+        wide = plain.covariance.copy()
+        wide[2, 2] += heaved
+        rival = best.score + (CONSTANTS.log_rare - CONSTANTS.log_upright if lively[1] else 0.0)
+        if score_again(plain, plain.mean, wide, observed, strangers) + prior > rival:
+            view = view_of(state.window)
+            if view.score + prior > rival:
+                lively[1], window, best = 0.0, state.window, view
     if best.surprise > 1.0 and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
         trial = divergence_monitor.turned(motion_learning.solve_livelier(window), angle)
@@ -205,29 +225,64 @@ def _solve(
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
     told = attitude.likelihood(
         innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
-        state.attitude_variance,
+        np.append(state.attitude_variance, heave.expected_variance(state.gait)),
     )  # fmt: skip
-    sway = attitude.next_levels(state.sway, told)
-    view = with_tilts(view, attitude.tilts(sway, told))
+    state, begun = _with_gait_learnt(state, told)
+    rotation = heave.without(told, float(state.window.heave_variance[-1]))
+    sway = attitude.next_levels(state.sway, rotation)
+    view = with_tilts(view, attitude.tilts(sway, rotation))
     sway[0] = view.tilts.weight.sum(axis=1)
-    known = np.concatenate([state.attitude_information[:-1], told.information])
+    known = np.concatenate([state.attitude_information[:-1], rotation.information])
     state = state._replace(sway=sway, attitude_information=known)
-    variance, last = state.attitude_variance, state.window.num_poses - 1
-    rotation, covariance = attitude.posterior(variance, told)
-    state = level(state, last, rotation[None])
-    innovation = innovation - turned @ rotation
+    variance, last = state.nuisance_variance[-1], state.window.num_poses - 1
+    nuisance, covariance = attitude.posterior(variance, heave.told_of(told, len(variance)))
+    state = level(state, last, nuisance[None])
+    turned = turned[..., : len(variance)]
+    innovation = innovation - turned @ nuisance
     window = window_gaussian.with_present(
-        state.window, innovation, jacobian, turned, state.attitude[-1], variance
+        state.window, innovation, jacobian, turned, state.nuisance[-1], variance
     )  # fmt: skip
     window = window_gaussian.solve(window, spread=False)
-    state, left = relinearise(state._replace(window=window), 0 if state.cycle % REFRESH == 0 else last)
+    state, left = relinearise(state._replace(window=window), 0 if begun or state.cycle % REFRESH == 0 else last)
     window = window_gaussian.weigh_holds(window_gaussian.solve(state.window))
     spread = prediction_variance(window, left.slot, left.slopes)
     left = left._replace(square=squares(left.row, left.left, state.log, spread, _excess_variance(window, left)))
     state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window), lively))
     if lively[1] and state.is_level:  # associated as if it climbed, which the other steps contradict
         state = state._replace(window=window_gaussian.solve(state.window))
-    return state, view, left, float(np.sum(innovation**2)), covariance
+    # of a heave that is held for none there may be one all the same
+    spread_up = float(covariance[-1, -1]) if state.heaves else heave.expected_variance(state.gait) * _may_heave(state)
+    state = state._replace(heave_spread=spread_up)
+    return state, view, left, float(np.sum(innovation**2)), covariance[:axes, :axes]
+
+
+def _may_heave(state: WindowState) -> bool:
+    """Whether the body's height above the floor is estimated in each cycle: where its motion is learnt, and walls tell
+    of it."""
+    return state.config.motion == "learnt" and state.scene.use_vt
+
+
+def _with_gait_learnt(state: WindowState, told: Attitude) -> tuple[WindowState, bool]:
+    """State whose heave's deviation is learnt from what is `told` of attitude and heave of one more cycle, and whether
+    it has come to be believed in, for all cycles of the window then.
+
+    To begin with, single cycles may speak for a heave where the floor rises, and a floor that is held for uneven
+    explains one: so the whole window is asked (`heave.window_levels`).
+    """
+    if not _may_heave(state):
+        return state, False
+    window, begun = state.window, False
+    state = state._replace(gait=heave.next_levels(state.gait, told, state.attitude_variance))
+    doubted = state.heave_variance > 0.0 or (not state.is_level and state.cycle % REFRESH == 0)
+    if doubted and not state.heaves and len(window.step) > LASTED[0]:
+        rises = window_gaussian.pose_design(window)[1:, 2, HEAD + 2 :: window.accel.shape[1]]
+        found = heave.window_levels(*motion_learning.vertical_information(window), rises)
+        begun = heave.variance(found) > 0.0
+        state = state._replace(gait=found, is_level=state.is_level or begun)
+    if begun:
+        window = window_gaussian.with_heave(window, state.heave_variance, at_start=window.num_poses > state.cycle)
+    variance = np.append(window.heave_variance[:-1], state.heave_variance)
+    return state._replace(window=window._replace(heave_variance=variance)), begun
 
 
 def _excess_variance(window: Window, left: Residuals) -> Floats:

@@ -12,7 +12,8 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN, forms_apart
 from rislam_rt.slam.window.measurement_log import Residuals
 from rislam_rt.slam.window.smoother import attitude
 from rislam_rt.slam.window.smoother.motion_basis import POSE
-from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, poses
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, floor_poses, poses
+from rislam_rt.slam.window.solver_limits import TOLD
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -43,7 +44,7 @@ class Whitened(NamedTuple):
     slopes: Floats
     """(A, 3, 4 + 3F) derivatives of the predictions by pose and features."""
     turned: Floats
-    """(A, 3, Z) those by the attitude."""
+    """(A, 3, Z) those by each cycle's nuisances: attitude and heave."""
 
 
 def relinearise(
@@ -53,14 +54,15 @@ def relinearise(
     the cycle, and level them by the attitudes that they tell; returns the state and its residuals. `found` are their
     `predictions`, where they are known."""
     found = found or predictions(state, first)
-    window, variance, heard = state.window, state.attitude_variance, whitened(state, found)
+    window, variance, heard = state.window, state.nuisance_variance, whitened(state, found)
     weight = np.sqrt(trust(heard.left))[:, None, None]
     parts = [weight * part for part in (heard.slopes, heard.turned, heard.left[..., None])]
     flat = _side_by_side(heard.slot - first, window.num_poses - first, *parts)
-    one = attitude.marginalise(np.swapaxes(flat, 1, 2) @ flat, state.attitude[first:], variance)
+    product = _with_start(np.swapaxes(flat, 1, 2) @ flat, state, first, [2, -2])
+    one = attitude.marginalise(product, state.nuisance[first:], variance[first:])
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[first:], gradient[first:] = one.hessian, -one.slope
-    middle[first:, :POSE], middle[first:, POSE:] = poses(window)[first:], window.features.ravel()
+    middle[first:, :POSE], middle[first:, POSE:] = floor_poses(window)[first:], window.features.ravel()
     state = state._replace(window=window._replace(slots=Quadratic(hessian, gradient, middle)))
     return _levelled(state, first, heard)
 
@@ -76,9 +78,22 @@ def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowSt
     weight = np.sqrt(trust(heard.left))[:, None, None]
     parts = [weight * part * sharper for part in (heard.turned, heard.left[..., None])]
     own = _side_by_side(of, state.window.num_poses - first, *parts)
-    change = attitude.change(np.swapaxes(own, 1, 2) @ own, state.attitude[first:], state.attitude_variance)
+    product = _with_start(np.swapaxes(own, 1, 2) @ own, state, first, [-2])
+    change = attitude.change(product, state.nuisance[first:], state.nuisance_variance[first:])
     left = heard.left - (heard.turned @ change[of][..., None])[..., 0]
     return level(state, first, change), Residuals(heard.row, heard.slot, left, heard.slopes, np.zeros(len(left)))
+
+
+def _with_start(product: Floats, state: WindowState, first: int, by: list[int]) -> Floats:
+    """Products (K, D, D) of slopes and residuals for the re-linearisation, with the start's height in those of the
+    run's first pose: floor and heave, whose columns are `by`, add up to what was told, of which the floor is as unsure
+    as the heave."""
+    if first or state.window.num_poses <= state.cycle or not state.heaves:
+        return product
+    row = np.zeros(product.shape[1])
+    row[by], row[-1] = 1.0, state.window.prior.middle[2] - poses(state.window)[0, 2]
+    product[0] += np.outer(row, row) / TOLD**2
+    return product
 
 
 def _side_by_side(of: Integers, count: int, *parts: Floats) -> Floats:
@@ -94,20 +109,23 @@ def _side_by_side(of: Integers, count: int, *parts: Floats) -> Floats:
 
 
 def level(state: WindowState, first: int, change: Floats) -> WindowState:
-    """Level the log's measurements, as they are re-linearised, of the poses from `first` on by changes (K, A) [rad] of
-    their attitudes."""
+    """Level the log's measurements, as they are re-linearised, of the poses from `first` on by changes (K, Z) of their
+    nuisances: attitudes [rad] and heave [m]."""
     log, by, begin = state.log, np.zeros((len(change), 3)), state.cycle - state.window.num_poses + 1 + first
-    by[:, : change.shape[1]] = change
+    axes = len(state.sway) + 1
+    by[:, :axes] = change[:, :axes]
     late = slice(np.searchsorted(log.cycle, begin), None)
     seen, rotation = log.seen.copy(), state.attitude.copy()
     seen[late, 1:] = attitude.levelled(seen[late, 1:], by[log.cycle[late] - begin])
     rotation[first:] += by
-    return state._replace(log=log._replace(seen=seen), attitude=rotation)
+    heave = state.window.heave.copy()
+    heave[first:] += change[:, axes:].sum(axis=1)
+    return state._replace(log=log._replace(seen=seen), attitude=rotation, window=state.window._replace(heave=heave))
 
 
 def predictions(state: WindowState, first: int, *, slopes: bool = True) -> Predictions:
     """Predictions, as re-linearised, of the explained components that were heard at the poses from `first` on; without
-    `slopes`, which take half of the time, there are none (D = 0)."""
+    `slopes`, which take half of the time, there are none (D = 0), unless a heave hangs on them."""
     window, log, scene = state.window, state.log, state.scene
     slot = log.cycle - (state.cycle - window.num_poses + 1)
     rows = (log.explained & (slot >= first)).nonzero()[0]
@@ -118,7 +136,7 @@ def predictions(state: WindowState, first: int, *, slopes: bool = True) -> Predi
     ends = Poses._make(each[at] for each in poses_of(place[:, :3], state.heading + place[:, 3], scene.body))
     returns = forms_apart(state.landmarks.rows(np.concatenate([form[:, 0], form[both, 1]])))
     known = returns, window.features, state.landmarks.anchor, ends
-    if slopes:
+    if slopes or state.heaves:
         linear = linearise_each(*known, POSE)
         every, by = linear.seen, linear.wide
         by[..., :3] = linear.by_pose
@@ -145,6 +163,8 @@ def whitened(state: WindowState, found: Predictions) -> Whitened:
     left = log.seen[rows] - found.seen
     left[:, 0] = state.scene.sensor.nearest(left[:, 0])
     turned = attitude.jacobian(log.seen[rows, 1:], len(state.attitude_variance))
+    if state.heaves:
+        turned = np.concatenate([turned, found.slopes[..., 2:3]], axis=2)
     each = std[..., None]
     return Whitened(rows, found.slot, (left + found.bias) / std, found.slopes / each, turned / each)
 

@@ -48,6 +48,8 @@ ALIGNED = 0.2
 """Share of the paths over unknown walls that have them on the Tx leg alone, and so keep their direction of arrival."""
 STILL = 1e-5
 """What stands for zero: [m/s^2] of an axis that is known not to move, [m/s] least deviation of a rate of length."""
+TOLD = 1e-4
+"""[m] standard deviation of a start's position that is held exactly, as far as rounding of the solution lets it."""
 ASTRAY = 0.3
 """[m] by which a step of a fit may go along directions in which a length alone tells nothing."""
 BEARINGS = 8
@@ -65,5 +67,7 @@ STRENGTHS = 13
 """Number of strengths of an unresolved neighbour over which a track's expected scatter is averaged."""
 SWAYS = 5
 """Number of levels of the body's attitude, half a decade of angle apart."""
+HEAVES = np.array([0.0, 1e-3, 3e-3, 1e-2, 3e-2])
+"""Standard deviations [m] of the body's heave: none, and up to what a walker's hand or hip does."""
 PRIORS = 5
 """Number of priors of the vertical motion that are compared, from an uneven floor to what each step alone asks for."""

@@ -11,8 +11,9 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.smoother import attitude
+from rislam_rt.slam.window.smoother import attitude, heave
 from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.solver_limits import STILL
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
@@ -54,6 +55,10 @@ class WindowState(NamedTuple):
     """(K, A, A) [1/rad^2] of these rotations, before their prior."""
     sway: Floats
     """(2, L) probabilities of the levels of the attitude's deviation, of tilt and yaw; (1, L) without a compass."""
+    gait: Floats
+    """(L,) probabilities of the levels of the heave's deviation (see `heave`)."""
+    heave_spread: float
+    """[m^2] variance of the last pose's heave, after what was heard; where it is held for none, as there may be one."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
     scene: KnownEnvironment
@@ -73,6 +78,30 @@ class WindowState(NamedTuple):
     def attitude_variance(self) -> Floats:
         """Expected variance (A,) [rad^2] of the window state's attitude about each axis."""
         return attitude.variance(self.sway)
+
+    @property
+    def heave_variance(self) -> float:
+        """Expected variance [m^2] of the window state's heave in the cycle after those of `gait`, 0 if it is held for
+        none."""
+        return heave.variance(self.gait)
+
+    @property
+    def heaves(self) -> bool:
+        """Whether the window state holds a heave in any of its cycles."""
+        return bool(self.window.heave_variance.any())
+
+    @property
+    def nuisance(self) -> Floats:
+        """Estimates (K, Z) of each cycle's nuisances in the window state: the attitude [rad] about each axis that is
+        estimated and, if there is any, the heave [m]."""
+        rotation = self.attitude[:, : len(self.sway) + 1]
+        return np.column_stack([rotation, self.window.heave]) if self.heaves else rotation
+
+    @property
+    def nuisance_variance(self) -> Floats:
+        """Prior variances (K, Z) of the window state's `nuisance`; of a heave that there is not, those of `STILL`."""
+        turned = np.tile(self.attitude_variance, (self.window.num_poses, 1))
+        return np.column_stack([turned, np.maximum(self.window.heave_variance, STILL**2)]) if self.heaves else turned
 
     @property
     def attitude_covariance(self) -> Floats:

@@ -26,8 +26,8 @@ class UnseenSpec(SweptSpec):
     """Number of rooms, with consecutive seeds."""
     ways: Ways = "anyhow"
     """How agents go: in any direction and moving from the first cycle on; or from rest, first parallel or at right
-    angles to a wall, at walking speeds and with right angles for corners; receivers are then told a `top_speed` of
-    1.5 m/s unless `run` says another."""
+    angles to a wall, at walking speeds and with right angles for corners; or so and carried by a walker, who bobs and
+    sways with each step. From rest, receivers are told a `top_speed` of 1.5 m/s unless `run` says another."""
     snr_db: list[Decibel] = Field(default=[13.0], min_length=1)
     """Reference SNRs: of the paper's sphere at 3 m, integrated over the signal and all antennas."""
     variants: list[VariantSection] = Field(default=[])

@@ -12,6 +12,7 @@ from rislam_rt.scene.random_rooms import MOTIONS, SHAPES, RandomRoom, draw_room
 from rislam_rt.scene.random_rooms.landmarks import MOST
 from rislam_rt.scene.random_rooms.random_floor_plan import area, depth_inside, draw_plan, triangulate
 from rislam_rt.scene.random_rooms.random_motion import (
+    BOB,
     CLIMB,
     CORNER,
     CYCLE,
@@ -19,6 +20,8 @@ from rislam_rt.scene.random_rooms.random_motion import (
     REST,
     SETTING_OFF,
     SPIN,
+    STEP_RATE,
+    STROLL,
     WALL_SPEED,
 )
 
@@ -160,6 +163,38 @@ def test_along_walls_an_agent_sets_out_from_rest() -> None:
     assert max(fastest) <= WALL_SPEED[1] + 1e-9
     assert max(fastest) > 1.0
     assert min(fastest) >= WALL_SPEED[0] - 1e-9
+
+
+def test_a_carried_agent_goes_along_walls_and_bobs_once_in_a_step() -> None:
+    fitted = 0
+    for seed in range(12):
+        smooth, motion = (draw_room(seed, ways).scene.agent for ways in ("along_walls", "carried"))
+        off, speed = motion.position - smooth.position, np.linalg.norm(smooth.velocity[:, :2], axis=1)
+        assert np.array_equal(motion.heading, smooth.heading)
+        share = np.minimum(speed / STROLL, 1.0)
+        assert np.abs(off[:, 2]).max() <= BOB[1] * share.max()
+        assert (np.abs(off[share == 0.0]) == 0.0).all()
+        ahead = np.column_stack([np.cos(motion.heading), np.sin(motion.heading)])
+        assert np.abs(np.vecdot(off[:, :2], ahead)).max() < 1e-12
+        # steps at a constant speed: the phase in between two cycles is that of a sine, and the velocity its derivative
+        spans = np.lib.stride_tricks.sliding_window_view(share, 41)
+        first = int(np.argmax((np.ptp(spans, axis=1) < 1e-12) & (spans[:, 0] > 0.0)))
+        rows = slice(first, first + 41)
+        if share[first] == 0.0:
+            continue
+        fitted += 1
+        amplitude, rates = off[rows, 2], np.linspace(*STEP_RATE, 200)
+        time = CYCLE * np.arange(41)
+        waves = np.exp(2j * np.pi * rates[:, None] * time)
+        rate = rates[np.argmax(np.abs(waves @ amplitude))]
+        design = np.column_stack([np.sin(2.0 * np.pi * rate * time), np.cos(2.0 * np.pi * rate * time)])
+        found, left, *_ = np.linalg.lstsq(design, amplitude)
+        assert left[0] < 0.02 * np.sum(amplitude**2), seed
+        assert BOB[0] - 1e-6 <= np.hypot(*found) / share[rows][0] * 1.02
+        wanted = 2.0 * np.pi * rate * np.column_stack([design[:, 1], -design[:, 0]]) @ found
+        rise = (motion.velocity - smooth.velocity)[rows, 2]
+        assert np.abs(rise - wanted).max() < 0.1 * np.abs(wanted).max()
+    assert fitted > 5
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -186,7 +186,7 @@ def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
     common[found.slot, :, found.which] = heavy[:, :, None] * own[:, None]  # one component of a track in a cycle
     np.add.at(gradient, found.slot, -pull[:, None] * found.toward)
     return RateFactor(
-        single, common.reshape(many, 3, 2 * count), gradient, window_gaussian.poses(state.window)[:, :3],
+        single, common.reshape(many, 3, 2 * count), gradient, window_gaussian.floor_poses(state.window)[:, :3],
         *_first_step(found, share, rate, spread, float(state.window.step[0])),
     )  # fmt: skip
 

@@ -180,26 +180,32 @@ class Marginal(NamedTuple):
     """(K, A) [rad]."""
 
 
-def marginalise(product: Floats, rotation: Floats, variance: Floats) -> Marginal:
-    """Marginalise the attitudes of K cycles, whose estimates are `rotation` (K, 3) and whose prior variances are (A,),
-    from products (K, S + A + 1, S + A + 1) of the slopes by pose and features, those by attitude, and residuals."""
-    axes = len(variance)
+def marginalise(product: Floats, nuisance: Floats, variance: Floats) -> Marginal:
+    """Marginalise the attitudes (and heave) of K cycles, whose estimates are `nuisance` (K, Z) and whose prior
+    variances are (K, Z), from products (K, S + Z + 1, S + Z + 1) of the slopes by pose and features, those by attitude,
+    and residuals."""
+    axes = variance.shape[1]
     own, by, out = slice(-1 - axes, -1), slice(0, product.shape[-1] - 1 - axes), -1
     right, cross = product[:, own].copy(), product[:, by, own]
-    right[..., out] -= rotation[:, :axes] / variance
-    found = np.asarray(np.linalg.solve(right[..., own] + np.diag(1.0 / variance), right), dtype=np.float64)
+    right[..., out] -= nuisance / variance
+    found = np.asarray(np.linalg.solve(right[..., own] + _diagonal(1.0 / variance), right), dtype=np.float64)
     gain, change = found[..., by], found[..., out]
     slope = product[:, by, out] - (cross @ change[..., None])[..., 0]
     return Marginal(product[:, by, by] - cross @ gain, slope, change)
 
 
-def change(product: Floats, rotation: Floats, variance: Floats) -> Floats:
-    """Changes (K, A) [rad] of the attitudes of K cycles, whose estimates are `rotation` (K, 3) and whose prior
-    variances are (A,), with poses and features as they are, from products (K, A + 1, A + 1) of the slopes by attitude
+def change(product: Floats, nuisance: Floats, variance: Floats) -> Floats:
+    """Changes (K, Z) of the attitudes (and heave) of K cycles, whose estimates are `nuisance` (K, Z) and whose prior
+    variances are (K, Z), with poses and features as they are, from products (K, Z + 1, Z + 1) of the slopes by attitude
     and residuals."""
-    information = product[:, :-1, :-1] + np.diag(1.0 / variance)
-    pull = product[:, :-1, -1] - rotation[:, : len(variance)] / variance
+    information = product[:, :-1, :-1] + _diagonal(1.0 / variance)
+    pull = product[:, :-1, -1] - nuisance / variance
     return np.asarray(np.linalg.solve(information, pull[..., None])[..., 0])
+
+
+def _diagonal(values: Floats) -> Floats:
+    """Diagonal matrices (K, Z, Z) for attitudes, of values (K, Z)."""
+    return np.asarray(values[:, :, None] * np.eye(values.shape[1]))
 
 
 def likelihood(left: Floats, jacobian: Floats, covariance: Floats, slopes: Floats, prior: Floats) -> Attitude:

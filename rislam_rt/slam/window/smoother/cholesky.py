@@ -42,6 +42,15 @@ def log_evidence(information: Floats, slope: Floats, std: Floats) -> float:
     return 0.5 * (form - log_det)
 
 
+def log_evidence_of(information: Floats, slope: Floats, prior: Floats) -> float:
+    """Log marginal likelihood as `log_evidence`, of unknowns with a joint prior of covariance `prior` (D, D)."""
+    root = np.tril(_factorise(prior))
+    inside = root.T @ information @ root
+    inside.flat[:: len(inside) + 1] += 1.0
+    form, log_det = form_and_log_det(inside, slope @ root)
+    return 0.5 * (form - log_det)
+
+
 def inverse(matrix: Floats) -> Floats:
     """Inverse (D, D) of a symmetric positive definite matrix, exactly symmetric."""
     inside, _ = scipy.linalg.lapack.dpotri(_factorise(matrix), lower=1, overwrite_c=1)

@@ -82,6 +82,10 @@ class Window(NamedTuple):
     """(D, D) of head and accelerations, at the last solution."""
     holds: DirectionPriors
     """Direction priors of the walls."""
+    heave: Floats
+    """(K,) [m] estimated height of each pose above the floor's, which is what the motion gives (see `heave`)."""
+    heave_variance: Floats
+    """(K,) [m^2] prior variance of each heave, 0 where there is none."""
     rates: RateFactor | None = None
     """What tracks that no feature explains tell of the poses, until a pose comes or leaves."""
 
@@ -111,8 +115,18 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     none = np.zeros((0, 3 + turns))
     return Window(
         head, none, none, none, none, np.zeros(0), np.zeros(0), np.zeros(0), prior, np.zeros((HEAD, HEAD)), slots,
-        np.diag(np.maximum(std, 1e-6) ** 2), no_holds(),
+        np.diag(np.maximum(std, 1e-6) ** 2), no_holds(), np.zeros(1), np.zeros(1),
     )  # fmt: skip
+
+
+def with_heave(window: Window, variance: float, *, at_start: bool) -> Window:
+    """Sliding window with a heave of prior `variance` [m^2] in all its poses; if it still begins `at_start`, whose
+    height is the body's, the floor's there is as unsure."""
+    hessian = window.prior.hessian.copy()
+    if at_start and variance:
+        hessian[2, 2] = min(hessian[2, 2], 1.0 / variance)
+    prior = window.prior._replace(hessian=hessian)
+    return window._replace(prior=prior, heave_variance=np.full(window.num_poses, variance))
 
 
 def begin_with(
@@ -136,7 +150,14 @@ def pose_design(window: Window) -> Floats:
 
 
 def poses(window: Window) -> Floats:
-    """Positions [m] and compass offsets [rad] of the window's poses (K, 4)."""
+    """Positions [m] and compass offsets [rad] of the window's poses (K, 4), heave included."""
+    found = floor_poses(window)
+    found[:, 2] += window.heave
+    return found
+
+
+def floor_poses(window: Window) -> Floats:
+    """Poses (K, 4) of the sliding window as `poses` returns them, as the motion gives them: without heave."""
     free = window.accel.shape[1]
     found = np.empty((window.num_poses, POSE))
     found[:, TURN] = window.head[6]
@@ -159,7 +180,9 @@ def _carried(window: Window, rows: Floats) -> Floats:
 def mean_now(window: Window) -> Floats:
     """Mean (7 + 3F,) of the sliding window's last pose, its velocity, the compass offset, and the features."""
     unknowns = np.concatenate([window.head, window.accel.ravel()])
-    return np.concatenate([_carried(window, unknowns), window.head[HEAD:]])
+    found = np.concatenate([_carried(window, unknowns), window.head[HEAD:]])
+    found[2] += window.heave[-1]
+    return found
 
 
 def now(window: Window) -> tuple[Floats, Floats]:
@@ -214,16 +237,16 @@ def now_under(window: Window, precision: Floats, present: tuple[Floats, Floats] 
 
 
 def with_present(
-    window: Window, left: Floats, jacobian: Floats, turned: Floats, rotation: Floats, variance: Floats
+    window: Window, left: Floats, jacobian: Floats, turned: Floats, nuisance: Floats, variance: Floats
 ) -> Window:
     """Sliding window with the last slot's quadratic made from the present cycle's innovations (N, 3), in standard
-    deviations, and their jacobians (N, 3, 7 + 3F) by the present and `turned` (N, 3, A) by the attitude, whose estimate
-    is `rotation` (3,) and whose prior variances are (A,); all at full weight."""
-    spot = np.concatenate([poses(window)[-1], window.head[HEAD:]])
+    deviations, and their jacobians (N, 3, 7 + 3F) by the present and `turned` (N, 3, Z) by attitude and heave, whose
+    estimates are `nuisance` (Z,) and whose prior variances are (Z,); all at full weight."""
+    spot = np.concatenate([floor_poses(window)[-1], window.head[HEAD:]])
     # what is seen does not hang on the velocity
     flat = np.concatenate([jacobian[..., :3], jacobian[..., 6:], turned, left[..., None]], axis=2)
     flat = flat.reshape(-1, flat.shape[-1])
-    found = marginalise((flat.T @ flat)[None], rotation[None], variance)
+    found = marginalise((flat.T @ flat)[None], nuisance[None], variance[None])
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[-1], gradient[-1], middle[-1] = found.hessian[0], -found.slope[0], spot
     return window._replace(slots=Quadratic(hessian, gradient, middle))
@@ -252,7 +275,8 @@ def extend(
         variance=np.concatenate([window.variance, np.zeros((1, free)) + variance]),
         uneven=np.append(window.uneven, precision[2]),
         step=np.append(window.step, dt), velocity_turn=np.append(window.velocity_turn, velocity_turn), slots=slots,
-        covariance=covariance, rates=None,
+        covariance=covariance, heave=np.append(window.heave, 0.0),
+        heave_variance=np.append(window.heave_variance, 0.0), rates=None,
     )  # fmt: skip
 
 
@@ -295,7 +319,8 @@ def slide(window: Window) -> Window:
         variance=window.variance[1:], uneven=window.uneven[1:], step=window.step[1:],
         velocity_turn=window.velocity_turn[1:], prior=prior,
         noise=eliminated_noise(shaken, size, gain), slots=Quadratic(*(field[1:] for field in window.slots)),
-        covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1), rates=None,
+        covariance=np.concatenate([covariance[:, :size], covariance[:, size + free :]], axis=1),
+        heave=window.heave[1:], heave_variance=window.heave_variance[1:], rates=None,
     )  # fmt: skip
 
 
@@ -328,7 +353,7 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     accelerations."""
     size, (steps, free), slots = len(window.head), window.accel.shape, window.slots.hessian
     spot = np.empty(slots.shape[:2])
-    spot[:, :POSE], spot[:, POSE:] = poses(window), window.head[HEAD:]
+    spot[:, :POSE], spot[:, POSE:] = floor_poses(window), window.head[HEAD:]
     slope, weight = window.slots.slope(spot), slots[:, :POSE, :POSE]
     if window.rates:
         weight = weight.copy()

@@ -45,13 +45,12 @@ def test_a_marginalised_attitude_is_that_of_a_joint_least_squares(axes):
     wanted = np.linalg.solve(wide.T @ wide + prior, wide.T @ value)
     left = value - own @ before
     flat = np.concatenate([by, own, left[:, None]], axis=1)
-    rotation = np.concatenate([before, np.zeros(3 - axes)])[None]
-    found = attitude.marginalise((flat.T @ flat)[None], rotation, variance)
+    found = attitude.marginalise((flat.T @ flat)[None], before[None], variance[None])
     place = np.linalg.solve(found.hessian[0] + 0.3 * np.eye(5), found.slope[0])
     np.testing.assert_allclose(place, wanted[:5], atol=1e-12)
     # with pose and features held where the solution has them, the change is what is missing to its attitude
     flat[:, -1] = left - by @ place
-    again = attitude.marginalise((flat.T @ flat)[None], rotation, variance)
+    again = attitude.marginalise((flat.T @ flat)[None], before[None], variance[None])
     np.testing.assert_allclose(before + again.change[0], wanted[5:], atol=1e-12)
 
 
@@ -110,9 +109,9 @@ def test_tilts_have_the_moments_of_their_levels_and_of_what_is_told():
 
 def test_the_change_of_an_attitude_is_that_of_least_squares():
     rng, variance = np.random.default_rng(4), np.array([1e-4, 1e-4])
-    rows, left, rotation = rng.standard_normal((9, 2)), rng.standard_normal(9), 0.01 * rng.standard_normal(3)
+    rows, left, rotation = rng.standard_normal((9, 2)), rng.standard_normal(9), 0.01 * rng.standard_normal(2)
     flat = np.column_stack([rows, left])
-    found = attitude.change((flat.T @ flat)[None], rotation[None], variance)[0]
+    found = attitude.change((flat.T @ flat)[None], rotation[None], variance[None])[0]
     wide = np.vstack([rows, np.diag(variance**-0.5)])
-    aim = np.concatenate([left, -rotation[:2] * variance**-0.5])
+    aim = np.concatenate([left, -rotation * variance**-0.5])
     np.testing.assert_allclose(found, np.linalg.lstsq(wide, aim)[0])

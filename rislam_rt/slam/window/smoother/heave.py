@@ -1,0 +1,142 @@
+"""Heave of the body in each cycle: its height above the floor it moves along, as whoever carries it bobs up and down.
+
+A floor's height has its motion modes as any motion has, and none of them oscillates: for an agent that is carried they
+leave a choice between a level floor and one that is lost. So each cycle has a height of its own beside the floor's,
+white, of zero mean. It is a nuisance of its cycle as the attitude is, eliminated there beside it. Its deviation is
+learnt: one of a ladder of levels, the first of which is none at all.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Floats
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.smoother import motion
+from rislam_rt.slam.window.smoother.attitude import Attitude
+from rislam_rt.slam.window.smoother.cholesky import log_evidence_of
+from rislam_rt.slam.window.solver_limits import AGO, HEAVES, STILL
+
+
+def first_levels() -> Floats:
+    """Initial probabilities (L,) of the levels of heave: none, and a third as much for each further one."""
+    weight = 3.0 ** -np.arange(len(HEAVES), dtype=np.float64)
+    return np.asarray(weight / weight.sum())
+
+
+def expected_variance(probability: Floats) -> float:
+    """Expected variance [m^2] of the heave from level probabilities (L,)."""
+    return float(probability @ HEAVES**2)
+
+
+def variance(probability: Floats) -> float:
+    """Variance [m^2] by which the heave is estimated, from level probabilities (L,): as expected, or 0 as long as none
+    at all is likelier."""
+    return expected_variance(probability) if probability[0] <= 0.5 else 0.0
+
+
+def at_start(velocity: Floats, std: float) -> tuple[Floats, Floats]:
+    """Velocity (3,) [m/s] of the floor's path at the start, where the body's is told, upwards within `std`; and level
+    probabilities (L,).
+
+    Who is told to rise either does, or bobs above a level floor, whichever is likelier: what oscillates with a
+    deviation s, accelerated by as much as the liveliest motion mode a, moves at sqrt(a s).
+    """
+    level, up = first_levels(), float(velocity[2])
+    spread = std**2 + CONSTANTS.liveliest * HEAVES[1:]
+    bobs = CONSTANTS.upright * level[1:] * _density(up, spread)
+    climbs = (1.0 - CONSTANTS.upright) * level[0] * _density(up, np.array(std**2 + CONSTANTS.walk**2))
+    rests = CONSTANTS.upright * level[0] * _density(up, np.array(max(std**2, STILL**2)))
+    if max(climbs, rests) > bobs.sum():
+        return velocity, level
+    return velocity * np.array([1.0, 1.0, 0.0]), np.append(0.0, bobs / bobs.sum())
+
+
+def _density(value: float, variance: Floats) -> Floats:
+    """Densities of a value under centred normals of some variances."""
+    return np.asarray(np.exp(-0.5 * value**2 / variance) / np.sqrt(2.0 * np.pi * variance))
+
+
+def window_levels(information: Floats, slope: Floats, rises: Floats) -> Floats:
+    """Level probabilities (L,) of the heave over a whole window, by its marginal likelihood beside that of any floor.
+
+    Of the vertical accelerations of the window's K steps an `information` matrix (K, K) and its product (K,) with them,
+    `slope`, tell without their priors; `rises` (K, K) are the heights that they give to the poses after the first. The
+    floor is level, or uneven by white accelerations of one of the motion modes' deviations, over all steps or since one
+    of `AGO` steps ago.
+    """
+    count = len(slope)
+    spans = sorted({count, *(ago for ago in AGO.tolist() if 0 < ago < count)})
+    rough = motion.first_motion_mode(0.0)
+    floors = [(0.0, count, CONSTANTS.upright)] + [
+        (std, span, (1.0 - CONSTANTS.upright) * share / len(spans))
+        for std, share in zip(motion.ladder(), rough, strict=True)
+        for span in spans
+    ]
+    # against the first pose, which has a heave as well
+    unit = np.linalg.solve(rises, np.column_stack([np.eye(count), np.ones(count)]))
+    bobs = unit @ unit.T
+    log_like = np.empty((len(HEAVES), len(floors)))
+    for row, heave in enumerate(HEAVES):
+        for column, (std, span, share) in enumerate(floors):
+            variance = np.full(count, STILL**2)
+            variance[-span:] += std**2
+            prior = heave**2 * bobs
+            prior.flat[:: count + 1] += variance
+            log_like[row, column] = np.log(share) + log_evidence_of(information, slope, prior)
+    found = np.log(first_levels()) + np.logaddexp.reduce(log_like, axis=1)
+    found = np.exp(found - found.max())
+    return np.asarray(found / found.sum())
+
+
+def begins(probability: Floats) -> tuple[float, float]:
+    """Log probability, from level probabilities (L,) of the cycle before, that there is a heave in this one, and its
+    expected variance [m^2] then."""
+    ahead = foreseen(probability)
+    any_at_all = float(ahead[1:].sum())
+    return float(np.log(any_at_all)), expected_variance(ahead) / any_at_all
+
+
+def foreseen(before: Floats) -> Floats:
+    """Level probabilities (L,) of the heave one cycle on, before it is heard: it stays, or anything is as likely as at
+    first."""
+    return CONSTANTS.stay * before + CONSTANTS.rare * first_levels()
+
+
+def next_levels(before: Floats, told: Attitude, rotation: Floats) -> Floats:
+    """Level probabilities (L,) of the heave after one more cycle, of which `told` (K = 1) knows the rotation, whose
+    prior variances are (A,), and the heave.
+
+    The marginal likelihood of a level is that of N(0, its variance) under the cycle's likelihood; no cycle tells more
+    than that a rare event of another kind took place in it.
+    """
+    own = alone(told, rotation)
+    information, slope = float(own.information[0, 0, 0]), float(own.slope[0, 0])
+    spread = 1.0 + information * HEAVES**2
+    log_like = 0.5 * (slope * HEAVES) ** 2 / spread - 0.5 * np.log(spread)
+    found = foreseen(before)
+    found *= np.exp(np.maximum(log_like - log_like.max(), -CONSTANTS.max_log_ratio))
+    return np.asarray(found / found.sum())
+
+
+def alone(told: Attitude, rotation: Floats) -> Attitude:
+    """What is `told` of the heave (K = 1) with the rotation, whose prior variances are (A,), eliminated."""
+    return _eliminated(told, slice(-1, None), slice(-1), 1.0 / rotation)
+
+
+def without(told: Attitude, heave: float) -> Attitude:
+    """What is `told` of the rotation (K = 1) with the heave, whose prior variance [m^2] is `heave`, eliminated."""
+    if heave == 0.0:
+        return told_of(told, told.slope.shape[1] - 1)
+    return _eliminated(told, slice(-1), slice(-1, None), np.array([1.0 / heave]))
+
+
+def told_of(told: Attitude, count: int) -> Attitude:
+    """What is `told` of the first `count` of a cycle's nuisances (K = 1), with no others."""
+    return Attitude(told.information[:, :count, :count], told.slope[:, :count])
+
+
+def _eliminated(told: Attitude, keep: slice, out: slice, prior: Floats) -> Attitude:
+    """What is `told` of the numbers `keep` with those of `out`, whose prior precisions are given, eliminated."""
+    cross = told.information[:, keep, out]
+    gain = cross @ np.linalg.inv(told.information[:, out, out] + np.diag(prior))
+    information = told.information[:, keep, keep] - gain @ np.swapaxes(cross, 1, 2)
+    return Attitude(information, told.slope[:, keep] - (gain @ told.slope[:, out, None])[..., 0])

@@ -1,0 +1,71 @@
+"""An agent that is carried: its bob is no floor that rises, its floor stays level, and a climb is followed all the
+same."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rislam_rt import slam
+from rislam_rt.channel.image_source import ImageSourceChannel
+from rislam_rt.measurement import ReceiverConfig, measure, with_reference_snr
+from rislam_rt.model import RadioConfig, SensorModel
+from rislam_rt.pipeline.scheme_simulation import without_panel
+from rislam_rt.scene import load_scene
+from rislam_rt.slam import SlamConfig, StartPrior
+
+ROOM, COUNT, DT = Path(__file__).parents[3] / "scenes" / "paper_room", 90, 0.1
+TIME = DT * np.arange(COUNT)
+CONFIG = SlamConfig(filter="window", use_vt=True)
+STEP = 2.0 * np.pi * 1.8
+
+
+def course(height, rise):
+    """Positions and velocities (K, 3) of a walk at 0.3 m/s, at heights [m] that rise by `rise` [m/s] in each cycle."""
+    place = np.column_stack([1.6 + 0.3 * TIME, 1.4 + 0.1 * TIME, 1.2 + height])
+    return place, np.column_stack([np.full(COUNT, 0.3), np.full(COUNT, 0.1), rise])
+
+
+def carried(place, velocity, seed):
+    """Errors (K,) [m] and told deviations (K,) of the height, and the last state, of the filter in the paper's room
+    without its panel."""
+    scene, rng = load_scene(ROOM), np.random.default_rng(seed)
+    motion = replace(scene.agent[:COUNT], position=place, velocity=velocity, heading=np.full(COUNT, 0.3))
+    radio = with_reference_snr(RadioConfig(), 13.0)
+    paths = without_panel(ImageSourceChannel(replace(scene, agent=motion), radio, 2).paths(motion))
+    start = StartPrior(place[0], velocity[0] + 0.01 * rng.standard_normal(3) * [1.0, 1.0, 0.0], 0.3)
+    state = slam.init(start, motion.body, None, SensorModel(radio), CONFIG, rng=rng)
+    error, std = np.empty((2, COUNT))
+    for cycle in range(COUNT):
+        heard, _ = measure(paths, cycle, 0.3, radio, ReceiverConfig("bound", alternation=False), rng=rng)
+        state, _ = slam.step(state, heard, None, DT if cycle else 0.0, 0.3, CONFIG, rng=rng)
+        found = slam.estimate(state, CONFIG)
+        error[cycle], std[cycle] = found.position[2] - place[cycle, 2], np.sqrt(found.covariance[2, 2])
+    return error, std, state
+
+
+@pytest.mark.parametrize("phase", [0.0, 1.0], ids=["told that it rises", "told that it rises less"])
+def test_a_bob_is_followed_above_a_level_floor(phase):
+    bob = 0.012
+    place, velocity = course(bob * np.sin(STEP * TIME + phase), bob * STEP * np.cos(STEP * TIME + phase))
+    error, std, state = carried(place, velocity, 1)
+    assert state.is_level
+    assert np.sqrt(state.heave_variance) == pytest.approx(bob / np.sqrt(2.0), rel=0.6)  # its ladder's steps
+    assert np.sqrt(np.mean(error[40:] ** 2)) < 0.25 * bob / np.sqrt(2.0)
+    assert np.abs(slam.smoothed(state)[:, 2] - place[:, 2]).max() < 0.5 * bob
+    assert np.mean(error[40:] ** 2 / std[40:] ** 2) < 4.0  # nearly one draw of one number: 95 % are below
+
+
+def test_wheels_have_no_heave():
+    error, _, state = carried(*course(np.zeros(COUNT), np.zeros(COUNT)), 2)
+    assert not state.heaves
+    assert state.heave_variance == 0.0
+    assert np.abs(error).max() < 1e-4
+
+
+def test_a_climb_is_no_heave():
+    rise = 0.15 * np.clip(TIME - 3.0, 0.0, 1.0)
+    error, _, state = carried(*course(DT * (np.cumsum(rise) - rise), rise), 3)
+    assert not state.heaves
+    assert np.abs(error[60:]).max() < 0.02
