@@ -109,14 +109,14 @@ def draw_motion(
                 ahead = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
                 velocity = np.column_stack([speed * pace[:, None] * ahead, climb])
                 if ways == "carried":
-                    step, by = _gait(speed * pace, ahead, rng)
+                    step, by = _carried(speed * pace, ahead, rng)
                     position, velocity = position + step, velocity + by
                 return Trajectory(_times(), position, velocity, angle, Body())
         speed, end = (_SLOWER * speed, end) if anyhow else (speed, _SLOWER * end)
     raise SceneError("no room for a motion; draw another plan")
 
 
-def _gait(pace: Floats, ahead: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def _carried(pace: Floats, ahead: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Draw what a walker's gait adds to positions (K, 3) [m] and velocities (K, 3) [m/s] of a random motion, at speeds
     (K,) [m/s] towards unit vectors (K, 2): sines in proportion to the speed up to `STROLL`."""
     rate, bob, sway = rng.uniform(*STEP_RATE), rng.uniform(*BOB), rng.uniform(*SWAY)

@@ -15,7 +15,7 @@ from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmarks.duplicate_walls import second_planes
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, image_ident
 from rislam_rt.slam.window.ris_candidate import find_candidate
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import heave, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.state import WindowState
 
@@ -88,7 +88,7 @@ def revisit(
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
     velocity, turns = fresh.window.head[3:6], fresh.window.turns
     window = window_gaussian.begin_with(start.position, velocity, std, mean[HEAD:], spread, turns=turns)
-    window = window_gaussian.with_heave(window, fresh.heave_variance, at_start=True)
+    window = heave.with_heave(window, fresh.heave_variance, at_start=True)
     landmarks = state.landmarks._replace(hidden=np.zeros(state.landmarks.hidden.shape))
     return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3))
 

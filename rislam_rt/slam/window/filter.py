@@ -52,11 +52,11 @@ def init(
     offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
-    velocity, gait = start.velocity, heave.first_levels()
+    velocity, heave_levels = start.velocity, heave.first_levels()
     if config.filter == "window" and config.motion == "learnt" and config.use_vt:
-        velocity, gait = heave.at_start(velocity, float(std[5]))
-    window = window_gaussian.with_heave(
-        window_gaussian.begin(start.position, velocity, std, turns=turns), heave.variance(gait), at_start=True
+        velocity, heave_levels = heave.at_start(velocity, float(std[5]))
+    window = heave.with_heave(
+        window_gaussian.begin(start.position, velocity, std, turns=turns), heave.variance(heave_levels), at_start=True
     )
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
@@ -67,7 +67,7 @@ def init(
         no_observations(),
         motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
-        attitude.first_levels(compass=not turns), gait, 0.0,
+        attitude.first_levels(compass=not turns), heave_levels, 0.0,
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
@@ -191,7 +191,7 @@ def _associate_over_motions(
             if log_odds > 0.0:
                 lively[axis], window, best = log_odds, trial, view
     if not heaved and len(plain.groups.leader) and _may_heave(state):
-        prior, heaved = heave.begins(state.gait)
+        prior, heaved = heave.begins(state.heave_levels)
         wide = plain.covariance.copy()
         wide[2, 2] += heaved
         rival = best.score + (CONSTANTS.log_rare - CONSTANTS.log_upright if lively[1] else 0.0)
@@ -225,9 +225,9 @@ def _solve(
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
     told = attitude.likelihood(
         innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
-        np.append(state.attitude_variance, heave.expected_variance(state.gait)),
+        np.append(state.attitude_variance, heave.expected_variance(state.heave_levels)),
     )  # fmt: skip
-    state, begun = _with_gait_learnt(state, told)
+    state, begun = _with_heave_learnt(state, told)
     rotation = heave.without(told, float(state.window.heave_variance[-1]))
     sway = attitude.next_levels(state.sway, rotation)
     view = with_tilts(view, attitude.tilts(sway, rotation))
@@ -235,7 +235,7 @@ def _solve(
     known = np.concatenate([state.attitude_information[:-1], rotation.information])
     state = state._replace(sway=sway, attitude_information=known)
     variance, last = state.nuisance_variance[-1], state.window.num_poses - 1
-    nuisance, covariance = attitude.posterior(variance, heave.told_of(told, len(variance)))
+    nuisance, covariance = attitude.posterior(variance, heave.restricted(told, len(variance)))
     state = level(state, last, nuisance[None])
     turned = turned[..., : len(variance)]
     innovation = innovation - turned @ nuisance
@@ -251,7 +251,9 @@ def _solve(
     if lively[1] and state.is_level:  # associated as if it climbed, which the other steps contradict
         state = state._replace(window=window_gaussian.solve(state.window))
     # of a heave that is held for none there may be one all the same
-    spread_up = float(covariance[-1, -1]) if state.heaves else heave.expected_variance(state.gait) * _may_heave(state)
+    spread_up = (
+        float(covariance[-1, -1]) if state.heaves else heave.expected_variance(state.heave_levels) * _may_heave(state)
+    )
     state = state._replace(heave_spread=spread_up)
     return state, view, left, float(np.sum(innovation**2)), covariance[:axes, :axes]
 
@@ -262,7 +264,7 @@ def _may_heave(state: WindowState) -> bool:
     return state.config.motion == "learnt" and state.scene.use_vt
 
 
-def _with_gait_learnt(state: WindowState, told: Attitude) -> tuple[WindowState, bool]:
+def _with_heave_learnt(state: WindowState, told: Attitude) -> tuple[WindowState, bool]:
     """State whose heave's deviation is learnt from what is `told` of attitude and heave of one more cycle, and whether
     it has come to be believed in, for all cycles of the window then.
 
@@ -272,15 +274,15 @@ def _with_gait_learnt(state: WindowState, told: Attitude) -> tuple[WindowState, 
     if not _may_heave(state):
         return state, False
     window, begun = state.window, False
-    state = state._replace(gait=heave.next_levels(state.gait, told, state.attitude_variance))
+    state = state._replace(heave_levels=heave.next_levels(state.heave_levels, told, state.attitude_variance))
     doubted = state.heave_variance > 0.0 or (not state.is_level and state.cycle % REFRESH == 0)
     if doubted and not state.heaves and len(window.step) > LASTED[0]:
         rises = window_gaussian.pose_design(window)[1:, 2, HEAD + 2 :: window.accel.shape[1]]
         found = heave.window_levels(*motion_learning.vertical_information(window), rises)
         begun = heave.variance(found) > 0.0
-        state = state._replace(gait=found, is_level=state.is_level or begun)
+        state = state._replace(heave_levels=found, is_level=state.is_level or begun)
     if begun:
-        window = window_gaussian.with_heave(window, state.heave_variance, at_start=window.num_poses > state.cycle)
+        window = heave.with_heave(window, state.heave_variance, at_start=window.num_poses > state.cycle)
     variance = np.append(window.heave_variance[:-1], state.heave_variance)
     return state._replace(window=window._replace(heave_variance=variance)), begun
 

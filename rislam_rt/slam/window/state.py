@@ -55,7 +55,7 @@ class WindowState(NamedTuple):
     """(K, A, A) [1/rad^2] of these rotations, before their prior."""
     sway: Floats
     """(2, L) probabilities of the levels of the attitude's deviation, of tilt and yaw; (1, L) without a compass."""
-    gait: Floats
+    heave_levels: Floats
     """(L,) probabilities of the levels of the heave's deviation (see `heave`)."""
     heave_spread: float
     """[m^2] variance of the last pose's heave, after what was heard; where it is held for none, as there may be one."""
@@ -81,9 +81,9 @@ class WindowState(NamedTuple):
 
     @property
     def heave_variance(self) -> float:
-        """Expected variance [m^2] of the window state's heave in the cycle after those of `gait`, 0 if it is held for
+        """Variance [m^2] by which the window state's heave of the present cycle is estimated, 0 if it is held for
         none."""
-        return heave.variance(self.gait)
+        return heave.variance(self.heave_levels)
 
     @property
     def heaves(self) -> bool:

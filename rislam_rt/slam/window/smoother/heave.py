@@ -13,6 +13,7 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion
 from rislam_rt.slam.window.smoother.attitude import Attitude
 from rislam_rt.slam.window.smoother.cholesky import log_evidence_of
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import AGO, HEAVES, STILL
 
 
@@ -95,6 +96,16 @@ def begins(probability: Floats) -> tuple[float, float]:
     return float(np.log(any_at_all)), expected_variance(ahead) / any_at_all
 
 
+def with_heave(window: Window, variance: float, *, at_start: bool) -> Window:
+    """Sliding window with a heave of prior `variance` [m^2] in all its poses; if it still begins `at_start`, whose
+    height is the body's, the floor's there is as unsure."""
+    hessian = window.prior.hessian.copy()
+    if at_start and variance:
+        hessian[2, 2] = min(hessian[2, 2], 1.0 / variance)
+    prior = window.prior._replace(hessian=hessian)
+    return window._replace(prior=prior, heave_variance=np.full(window.num_poses, variance))
+
+
 def foreseen(before: Floats) -> Floats:
     """Level probabilities (L,) of the heave one cycle on, before it is heard: it stays, or anything is as likely as at
     first."""
@@ -125,11 +136,11 @@ def alone(told: Attitude, rotation: Floats) -> Attitude:
 def without(told: Attitude, heave: float) -> Attitude:
     """What is `told` of the rotation (K = 1) with the heave, whose prior variance [m^2] is `heave`, eliminated."""
     if heave == 0.0:
-        return told_of(told, told.slope.shape[1] - 1)
+        return restricted(told, told.slope.shape[1] - 1)
     return _eliminated(told, slice(-1), slice(-1, None), np.array([1.0 / heave]))
 
 
-def told_of(told: Attitude, count: int) -> Attitude:
+def restricted(told: Attitude, count: int) -> Attitude:
     """What is `told` of the first `count` of a cycle's nuisances (K = 1), with no others."""
     return Attitude(told.information[:, :count, :count], told.slope[:, :count])
 

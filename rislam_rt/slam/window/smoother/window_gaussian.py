@@ -119,16 +119,6 @@ def begin(position: Floats, velocity: Floats, std: Floats, *, turns: bool = Fals
     )  # fmt: skip
 
 
-def with_heave(window: Window, variance: float, *, at_start: bool) -> Window:
-    """Sliding window with a heave of prior `variance` [m^2] in all its poses; if it still begins `at_start`, whose
-    height is the body's, the floor's there is as unsure."""
-    hessian = window.prior.hessian.copy()
-    if at_start and variance:
-        hessian[2, 2] = min(hessian[2, 2], 1.0 / variance)
-    prior = window.prior._replace(hessian=hessian)
-    return window._replace(prior=prior, heave_variance=np.full(window.num_poses, variance))
-
-
 def begin_with(
     position: Floats, velocity: Floats, std: Floats, features: Floats, covariance: Floats, *, turns: bool
 ) -> Window:

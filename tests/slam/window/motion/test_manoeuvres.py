@@ -170,7 +170,8 @@ def test_a_climb_for_one_cycle_that_the_steps_contradict_leaves_no_height_open(m
     *_, state = states(place, np.tile([0.6, 0.2, 0.0], (5, 1)), 0.32, 0)
     assert found[-1] == 4
     assert state.is_level
-    assert np.sqrt(slam.estimate(state, CONFIG).covariance[2, 2]) < 1e-3  # it was 0.02 m
+    # but for a heave that there may be; it was 0.02 m
+    assert np.sqrt(slam.estimate(state, CONFIG).covariance[2, 2] - state.heave_spread) < 1e-3
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
