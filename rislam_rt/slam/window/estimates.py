@@ -88,9 +88,10 @@ def revisit(
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
     velocity, turns = fresh.window.head[3:6], fresh.window.turns
     window = window_gaussian.begin_with(start.position, velocity, std, mean[HEAD:], spread, turns=turns)
-    window = heave.with_heave(window, fresh.heave_variance, at_start=True)
+    height = np.array([start.position[2], fresh.shift[2]])
+    window = heave.with_heave(window, fresh.heave_variance, height)
     landmarks = state.landmarks._replace(hidden=np.zeros(state.landmarks.hidden.shape))
-    return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3))
+    return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3), start_height=height)
 
 
 def build_map(

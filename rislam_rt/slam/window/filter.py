@@ -52,12 +52,12 @@ def init(
     offset = start.heading_std if config.heading == "estimated" else 0.0
     turns = config.heading != "known"
     std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
-    velocity, heave_levels = start.velocity, heave.first_levels()
+    velocity, heave_levels = start.velocity.copy(), heave.first_levels()
     if config.filter == "window" and config.motion == "learnt" and config.use_vt:
-        velocity, heave_levels = heave.at_start(velocity, float(std[5]))
-    window = heave.with_heave(
-        window_gaussian.begin(start.position, velocity, std, turns=turns), heave.variance(heave_levels), at_start=True
-    )
+        velocity[2], std[5], heave_levels = heave.at_start(float(velocity[2]), float(std[5]))
+    height = np.array([start.position[2], 0.0])
+    window = window_gaussian.begin(start.position, velocity, std, turns=turns)
+    window = heave.with_heave(window, heave.variance(heave_levels), height)
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
@@ -67,7 +67,7 @@ def init(
         no_observations(),
         motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
-        attitude.first_levels(compass=not turns), heave_levels, 0.0,
+        attitude.first_levels(compass=not turns), heave_levels, height, 0.0,
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
@@ -176,8 +176,8 @@ def _associate_over_motions(
             state.sway, beside, heaved,
         )  # fmt: skip
 
-    plain = view_of(state.window)
-    lively, window, best = [0.0, 0.0], state.window, plain
+    lively, window, best = [0.0, 0.0], state.window, view_of(state.window)
+    level_floor = window, best
     learnt = state.config.motion == "learnt"  # a motion that is told stays told
     for axis in range(2 if learnt and len(best.groups.leader) and len(window.step) else 0):
         steps = (LATELY, CLIMBED)[axis]
@@ -190,15 +190,19 @@ def _associate_over_motions(
             log_odds = view.score + prior - best.score
             if log_odds > 0.0:
                 lively[axis], window, best = log_odds, trial, view
-    if not heaved and len(plain.groups.leader) and _may_heave(state):
+        if axis == 0:
+            level_floor = window, best
+    if not heaved and len(best.groups.leader) and _may_heave(state):
+        floor, plain = level_floor
         prior, heaved = heave.begins(state.heave_levels)
         wide = plain.covariance.copy()
         wide[2, 2] += heaved
         rival = best.score + (CONSTANTS.log_rare - CONSTANTS.log_upright if lively[1] else 0.0)
-        if score_again(plain, plain.mean, wide, observed, strangers) + prior > rival:
-            view = view_of(state.window)
-            if view.score + prior > rival:
-                lively[1], window, best = 0.0, state.window, view
+        tried = score_again(plain, plain.mean, wide, observed, strangers) + prior > rival
+        if tried and (view := view_of(floor)).score + prior > rival:
+            lively[1], window, best = 0.0, floor, view
+        else:
+            heaved = 0.0
     if best.surprise > 1.0 and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
         trial = divergence_monitor.turned(motion_learning.solve_livelier(window), angle)
@@ -275,16 +279,21 @@ def _with_heave_learnt(state: WindowState, told: Attitude) -> tuple[WindowState,
         return state, False
     window, begun = state.window, False
     state = state._replace(heave_levels=heave.next_levels(state.heave_levels, told, state.attitude_variance))
+    start = state.start_height if window.num_poses > state.cycle else None
+    if state.heaves:
+        if start is not None and state.heave_variance > window.heave_variance[0]:  # the first ones were a guess
+            window = heave.with_heave(window, state.heave_variance, start)
+        variance = np.append(window.heave_variance[:-1], state.heave_variance)
+        return state._replace(window=window._replace(heave_variance=variance)), False
     doubted = state.heave_variance > 0.0 or (not state.is_level and state.cycle % REFRESH == 0)
-    if doubted and not state.heaves and len(window.step) > LASTED[0]:
+    if doubted and len(window.step) > LASTED[0] and (window.step > 0.0).all():
         rises = window_gaussian.pose_design(window)[1:, 2, HEAD + 2 :: window.accel.shape[1]]
         found = heave.window_levels(*motion_learning.vertical_information(window), rises)
         begun = heave.variance(found) > 0.0
         state = state._replace(heave_levels=found, is_level=state.is_level or begun)
     if begun:
-        window = heave.with_heave(window, state.heave_variance, at_start=window.num_poses > state.cycle)
-    variance = np.append(window.heave_variance[:-1], state.heave_variance)
-    return state._replace(window=window._replace(heave_variance=variance)), begun
+        state = state._replace(window=heave.with_heave(window, state.heave_variance, start))
+    return state, begun
 
 
 def _excess_variance(window: Window, left: Residuals) -> Floats:

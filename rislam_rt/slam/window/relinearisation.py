@@ -86,13 +86,13 @@ def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowSt
 
 def _with_start(product: Floats, state: WindowState, first: int, by: list[int]) -> Floats:
     """Products (K, D, D) of slopes and residuals for the re-linearisation, with the start's height in those of the
-    run's first pose: floor and heave, whose columns are `by`, add up to what was told, of which the floor is as unsure
-    as the heave."""
+    run's first pose: floor and heave, whose columns are `by`, add up to what was told."""
     if first or state.window.num_poses <= state.cycle or not state.heaves:
         return product
     row = np.zeros(product.shape[1])
-    row[by], row[-1] = 1.0, state.window.prior.middle[2] - poses(state.window)[0, 2]
-    product[0] += np.outer(row, row) / TOLD**2
+    height, std = state.start_height
+    row[by], row[-1] = 1.0, height - poses(state.window)[0, 2]
+    product[0] += np.outer(row, row) / (std**2 + TOLD**2)
     return product
 
 

@@ -57,6 +57,8 @@ class WindowState(NamedTuple):
     """(2, L) probabilities of the levels of the attitude's deviation, of tilt and yaw; (1, L) without a compass."""
     heave_levels: Floats
     """(L,) probabilities of the levels of the heave's deviation (see `heave`)."""
+    start_height: Floats
+    """(2,) [m] height that was told of the start, and its standard deviation within the Gaussian."""
     heave_spread: float
     """[m^2] variance of the last pose's heave, after what was heard; where it is held for none, as there may be one."""
     shift: Floats

@@ -133,7 +133,7 @@ def _lengths(state: WindowState, rows: slice, step: float) -> length_rates.Lengt
 def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
     """Mean velocity (3,) [m/s] over the last `PAST` cycles, and its standard deviations (3,)."""
     cycles, time = _latest(window)
-    place = window_gaussian.poses(window)[:, :3]
+    place = window_gaussian.floor_poses(window)[:, :3]
     variance = way_variance(window, np.array([-1 - cycles]), np.array([-1]))[0]
     return (place[-1] - place[-1 - cycles]) / time, np.sqrt(variance) / time + 1e-6
 

@@ -42,13 +42,15 @@ def log_evidence(information: Floats, slope: Floats, std: Floats) -> float:
     return 0.5 * (form - log_det)
 
 
-def log_evidence_of(information: Floats, slope: Floats, prior: Floats) -> float:
-    """Log marginal likelihood as `log_evidence`, of unknowns with a joint prior of covariance `prior` (D, D)."""
-    root = np.tril(_factorise(prior))
-    inside = root.T @ information @ root
-    inside.flat[:: len(inside) + 1] += 1.0
-    form, log_det = form_and_log_det(inside, slope @ root)
-    return 0.5 * (form - log_det)
+def log_evidences(information: Floats, slope: Floats, priors: Floats) -> Floats:
+    """Log marginal likelihoods (N,) as `log_evidence`, of unknowns with joint priors of covariances `priors`
+    (N, D, D)."""
+    root = np.linalg.cholesky(priors)
+    turned = np.swapaxes(root, 1, 2)
+    factor = np.linalg.cholesky(turned @ information @ root + np.eye(len(slope)))
+    half = np.linalg.solve(factor, (turned @ slope)[..., None])[..., 0]
+    log_det = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    return np.asarray(0.5 * np.vecdot(half, half) - log_det)
 
 
 def inverse(matrix: Floats) -> Floats:

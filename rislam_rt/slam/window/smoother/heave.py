@@ -7,14 +7,15 @@ learnt: one of a ladder of levels, the first of which is none at all.
 """
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import motion
 from rislam_rt.slam.window.smoother.attitude import Attitude
-from rislam_rt.slam.window.smoother.cholesky import log_evidence_of
-from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import AGO, HEAVES, STILL
+from rislam_rt.slam.window.smoother.cholesky import log_evidences
+from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
+from rislam_rt.slam.window.solver_limits import BEGUN, HEAVES, STILL
 
 
 def first_levels() -> Floats:
@@ -34,21 +35,25 @@ def variance(probability: Floats) -> float:
     return expected_variance(probability) if probability[0] <= 0.5 else 0.0
 
 
-def at_start(velocity: Floats, std: float) -> tuple[Floats, Floats]:
-    """Velocity (3,) [m/s] of the floor's path at the start, where the body's is told, upwards within `std`; and level
-    probabilities (L,).
+def at_start(up: float, std: float) -> tuple[float, float, Floats]:
+    """Vertical velocity of the floor's path at the start and its deviation [m/s], where the body is told to rise by
+    `up` within `std` [m/s]; and level probabilities (L,).
 
-    Who is told to rise either does, or bobs above a level floor, whichever is likelier: what oscillates with a
-    deviation s, accelerated by as much as the liveliest motion mode a, moves at sqrt(a s).
+    Who is told to rise either does, or bobs above a level floor: what oscillates with a deviation s, accelerated by as
+    much as the liveliest motion mode a, moves at sqrt(a s). If a bob is the likelier, the floor's velocity has the mean
+    and the variance of both.
     """
-    level, up = first_levels(), float(velocity[2])
+    level = first_levels()
     spread = std**2 + CONSTANTS.liveliest * HEAVES[1:]
     bobs = CONSTANTS.upright * level[1:] * _density(up, spread)
     climbs = (1.0 - CONSTANTS.upright) * level[0] * _density(up, np.array(std**2 + CONSTANTS.walk**2))
-    rests = CONSTANTS.upright * level[0] * _density(up, np.array(max(std**2, STILL**2)))
+    # an uneven floor's accelerations give as much in a second
+    rests = CONSTANTS.upright * level[0] * _density(up, np.array(max(std, CONSTANTS.level) ** 2))
     if max(climbs, rests) > bobs.sum():
-        return velocity, level
-    return velocity * np.array([1.0, 1.0, 0.0]), np.append(0.0, bobs / bobs.sum())
+        return up, std, level
+    levels = np.append(climbs, bobs) / (climbs + bobs.sum())
+    share = float(levels[0])
+    return share * up, float(np.sqrt(std**2 + share * (1.0 - share) * up**2)), levels
 
 
 def _density(value: float, variance: Floats) -> Floats:
@@ -61,29 +66,26 @@ def window_levels(information: Floats, slope: Floats, rises: Floats) -> Floats:
 
     Of the vertical accelerations of the window's K steps an `information` matrix (K, K) and its product (K,) with them,
     `slope`, tell without their priors; `rises` (K, K) are the heights that they give to the poses after the first. The
-    floor is level, or uneven by white accelerations of one of the motion modes' deviations, over all steps or since one
-    of `AGO` steps ago.
+    floor is level, or uneven by white accelerations of one of the motion modes' deviations; either that or the heave
+    may have begun within the window, one of `BEGUN` steps ago.
     """
     count = len(slope)
-    spans = sorted({count, *(ago for ago in AGO.tolist() if 0 < ago < count)})
-    rough = motion.first_motion_mode(0.0)
-    floors = [(0.0, count, CONSTANTS.upright)] + [
-        (std, span, (1.0 - CONSTANTS.upright) * share / len(spans))
-        for std, share in zip(motion.ladder(), rough, strict=True)
-        for span in spans
-    ]
-    # against the first pose, which has a heave as well
+    spans = np.array([count, *(ago for ago in BEGUN if ago < count)])
+    late = np.arange(count) >= count - spans[:, None]
+    modes = motion.ladder()[:, None, None] ** 2 * late
+    floors = np.concatenate([np.zeros((1, count)), modes.reshape(-1, count)]) + STILL**2
+    log_floor = np.log(1.0 - CONSTANTS.upright) + np.log(motion.first_motion_mode(0.0)) - np.log(len(spans))
+    log_floor = np.append(np.log(CONSTANTS.upright), np.repeat(log_floor, len(spans)))
+    # heights above the first pose, which has a heave as well if all have, as accelerations
     unit = np.linalg.solve(rises, np.column_stack([np.eye(count), np.ones(count)]))
-    bobs = unit @ unit.T
-    log_like = np.empty((len(HEAVES), len(floors)))
-    for row, heave in enumerate(HEAVES):
-        for column, (std, span, share) in enumerate(floors):
-            variance = np.full(count, STILL**2)
-            variance[-span:] += std**2
-            prior = heave**2 * bobs
-            prior.flat[:: count + 1] += variance
-            log_like[row, column] = np.log(share) + log_evidence_of(information, slope, prior)
-    found = np.log(first_levels()) + np.logaddexp.reduce(log_like, axis=1)
+    bobs = [(unit[:, :-1] * each) @ unit[:, :-1].T for each in late]
+    bobs[0] = unit @ unit.T
+    found = np.log(first_levels())
+    for row, std in enumerate(HEAVES):
+        some = std**2 * np.array(bobs if std else bobs[:1])
+        prior = some[:, None] + floors[:, :, None] * np.eye(count)
+        log_like = log_evidences(information, slope, prior.reshape(-1, count, count)).reshape(len(some), -1)
+        found[row] += scipy.special.logsumexp(log_like + log_floor) - np.log(len(some))
     found = np.exp(found - found.max())
     return np.asarray(found / found.sum())
 
@@ -96,14 +98,19 @@ def begins(probability: Floats) -> tuple[float, float]:
     return float(np.log(any_at_all)), expected_variance(ahead) / any_at_all
 
 
-def with_heave(window: Window, variance: float, *, at_start: bool) -> Window:
-    """Sliding window with a heave of prior `variance` [m^2] in all its poses; if it still begins `at_start`, whose
-    height is the body's, the floor's there is as unsure."""
-    hessian = window.prior.hessian.copy()
-    if at_start and variance:
-        hessian[2, 2] = min(hessian[2, 2], 1.0 / variance)
-    prior = window.prior._replace(hessian=hessian)
-    return window._replace(prior=prior, heave_variance=np.full(window.num_poses, variance))
+def with_heave(window: Window, variance: float, start: Floats | None = None) -> Window:
+    """Sliding window with a heave of prior `variance` [m^2] in all its poses.
+
+    If the window still begins at the run's start, whose height [m] was told with a deviation, `start` (2,), that height
+    is the body's: of the floor's nothing is known beforehand any more (see `relinearise`).
+    """
+    if start is not None and variance:
+        hessian, gradient, middle = (field.copy() for field in window.prior)
+        less = max(hessian[2, 2] - CONSTANTS.walk**-2.0, 0.0)
+        hessian[2, 2] -= less
+        gradient[2] -= less * (middle[2] - start[0])
+        window = window._replace(prior=Quadratic(hessian, gradient, middle))
+    return window._replace(heave_variance=np.full(window.num_poses, variance))
 
 
 def foreseen(before: Floats) -> Floats:

@@ -7,9 +7,9 @@ import scipy
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.smoother import heave, motion
 from rislam_rt.slam.window.smoother.attitude import Attitude
-from rislam_rt.slam.window.smoother.cholesky import log_evidence, log_evidence_of
+from rislam_rt.slam.window.smoother.cholesky import log_evidence, log_evidences
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, pose_matrix
-from rislam_rt.slam.window.solver_limits import AGO, HEAVES, STILL
+from rislam_rt.slam.window.solver_limits import BEGUN, HEAVES, STILL
 
 COUNT, DT, ERROR = 30, 0.1, 1e-3
 TIME = DT * np.arange(COUNT + 1)
@@ -74,17 +74,19 @@ def test_a_window_weighs_levels_by_the_density_of_its_heights():
     rng = np.random.default_rng(4)
     height = np.append(0.0, 2e-3 * rng.standard_normal(COUNT))
     wanted = np.full(len(HEAVES), -np.inf)
-    spans = [ago for ago in AGO.tolist() if 0 < ago < COUNT] + [COUNT]
+    spans = [COUNT, *BEGUN]
     floors = [(0.0, COUNT, CONSTANTS.upright)]
     for std, share in zip(motion.ladder(), motion.first_motion_mode(0.0), strict=True):
         floors += [(std, span, (1.0 - CONSTANTS.upright) * share / len(spans)) for span in spans]
     for row, std in enumerate(HEAVES):
         for rough, span, share in floors:
-            accel = np.full(COUNT, STILL**2)
-            accel[-span:] += rough**2
-            covariance = RISES @ np.diag(accel) @ RISES.T + std**2 * (np.eye(COUNT) + 1.0) + ERROR**2 * np.eye(COUNT)
-            like = scipy.stats.multivariate_normal.logpdf(height[1:], cov=covariance)
-            wanted[row] = np.logaddexp(wanted[row], np.log(share) + like)
+            for since in spans if std else spans[:1]:
+                accel = np.full(COUNT, STILL**2)
+                accel[-span:] += rough**2
+                bob = np.diag(np.arange(COUNT) >= COUNT - since) + float(since == COUNT)
+                covariance = RISES @ np.diag(accel) @ RISES.T + std**2 * bob + ERROR**2 * np.eye(COUNT)
+                like = scipy.stats.multivariate_normal.logpdf(height[1:], cov=covariance)
+                wanted[row] = np.logaddexp(wanted[row], np.log(share / (len(spans) if std else 1)) + like)
     wanted = heave.first_levels() * np.exp(wanted - wanted.max())
     # the prior of the accelerations is inverted: condition of the matrix, 1e8
     np.testing.assert_allclose(heave.window_levels(*told(height), RISES), wanted / wanted.sum(), atol=1e-5)
@@ -95,11 +97,12 @@ def test_a_window_weighs_levels_by_the_density_of_its_heights():
     [
         (0.01 * np.sin(2.0 * np.pi * 1.8 * TIME), True),
         (0.004 * np.sin(2.0 * np.pi * 1.6 * TIME + 1.0), True),
+        (0.01 * np.sin(2.0 * np.pi * 1.8 * TIME) * (TIME > 2.2), True),
         (0.5 * 0.1 * np.maximum(TIME - 1.5, 0.0) ** 2, False),
         (0.1 * (1.0 - np.cos(np.pi * TIME / 3.0)), False),
         (0.0 * TIME, False),
     ],
-    ids=["a walker", "a calm one", "a climb that begins", "a climb and a fall", "wheels"],
+    ids=["a walker", "a calm one", "one who sets off", "a climb that begins", "a climb and a fall", "wheels"],
 )
 def test_a_bob_is_told_from_a_climb(height, bobs):
     rng = np.random.default_rng(5)
@@ -109,11 +112,15 @@ def test_a_bob_is_told_from_a_climb(height, bobs):
 
 @pytest.mark.parametrize(("up", "bobs"), [(0.0, False), (0.03, True), (-0.1, True), (0.6, False)])
 def test_a_told_rise_is_a_bob_or_a_climb(up, bobs):
-    """Where the floor is held for level it does not rise, and what was told of it is the body's own."""
-    told_velocity = np.array([0.3, -0.2, up])
-    velocity, levels = heave.at_start(told_velocity, 0.0)
+    """What was told is the floor's, exactly, or the body's own: then hardly any of it is the floor's."""
+    floor, std, levels = heave.at_start(up, 0.0)
     assert (heave.variance(levels) > 0.0) == bobs
-    np.testing.assert_array_equal(velocity, told_velocity * [1.0, 1.0, float(not bobs)])
+    if bobs:
+        assert levels[0] == pytest.approx(floor / up)
+        assert 0.0 < floor / up < 0.3
+        assert abs(floor) < std < 0.5 * abs(up)
+    else:
+        assert (floor, std) == (up, 0.0)
     assert levels.sum() == pytest.approx(1.0)
 
 
@@ -121,9 +128,9 @@ def test_evidence_of_a_joint_prior_is_that_of_single_ones():
     rng = np.random.default_rng(6)
     rows = rng.standard_normal((12, 5))
     information, slope, std = rows.T @ rows, rng.standard_normal(5), rng.uniform(0.1, 2.0, 5)
-    found = log_evidence_of(information, slope, np.diag(std**2))
+    found = log_evidences(information, slope, np.diag(std**2)[None])[0]
     assert found == pytest.approx(log_evidence(information, slope, std), abs=1e-10)
     prior = np.cov(rng.standard_normal((5, 40)))
     mixed = np.eye(5) + prior @ information
     wanted = 0.5 * slope @ np.linalg.solve(mixed, prior @ slope) - 0.5 * np.linalg.slogdet(mixed)[1]
-    assert log_evidence_of(information, slope, prior) == pytest.approx(wanted, abs=1e-10)
+    assert log_evidences(information, slope, prior[None])[0] == pytest.approx(wanted, abs=1e-10)
