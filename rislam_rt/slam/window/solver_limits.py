@@ -29,7 +29,7 @@ LASTED = np.array([3, 5, 10, 20])
 """Numbers of last steps over which a manoeuvre is looked for that only tracks tell of."""
 CLIMBED = 10
 """Number of last steps over which a climb is looked for that returns tell of."""
-BEGUN = (20, 10)
+BEGUN = np.array([20, 10])
 """Numbers of steps ago, beside all of the window's, at which a heave, or a floor that is not level, may have begun."""
 AGO = np.array([0, 3, 5, 10, 20])
 """Numbers of steps ago at which a lively segment may have begun or ended."""
