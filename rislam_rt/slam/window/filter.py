@@ -229,7 +229,7 @@ def _solve(
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
     told = attitude.likelihood(
         innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
-        np.append(state.attitude_variance, _heave_doubt(state)),
+        np.append(state.attitude_variance, _heave_uncertainty(state)),
     )  # fmt: skip
     state, begun = _with_heave_learnt(state, told)
     rotation = heave.without(told, float(state.window.heave_variance[-1]))
@@ -254,7 +254,7 @@ def _solve(
     state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window), lively))
     if lively[1] and state.is_level:  # associated as if it climbed, which the other steps contradict
         state = state._replace(window=window_gaussian.solve(state.window))
-    state = state._replace(heave_spread=float(covariance[-1, -1]) if state.heaves else _heave_doubt(state))
+    state = state._replace(heave_spread=float(covariance[-1, -1]) if state.heaves else _heave_uncertainty(state))
     return state, view, left, float(np.sum(innovation**2)), covariance[:axes, :axes]
 
 
@@ -264,7 +264,7 @@ def _may_heave(state: WindowState) -> bool:
     return state.config.motion == "learnt" and state.scene.use_vt
 
 
-def _heave_doubt(state: WindowState) -> float:
+def _heave_uncertainty(state: WindowState) -> float:
     """Expected variance [m^2] of the body's height above the floor, whether it is held for none or not."""
     return heave.expected_variance(state.heave_levels) if _may_heave(state) else 0.0
 
