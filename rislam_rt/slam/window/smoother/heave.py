@@ -70,6 +70,9 @@ def window_levels(information: Floats, slope: Floats, rises: Floats) -> Floats:
     may have begun within the window, one of `BEGUN` steps ago.
     """
     count = len(slope)
+    # a difference of large numbers: rounding may leave a little less than nothing
+    value, vector = np.linalg.eigh(information)
+    information = (vector * np.maximum(value, 0.0)) @ vector.T
     spans = np.array([count, *(ago for ago in BEGUN if ago < count)])
     late = np.arange(count) >= count - spans[:, None]
     modes = motion.ladder()[:, None, None] ** 2 * late

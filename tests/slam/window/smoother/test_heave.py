@@ -110,6 +110,16 @@ def test_a_bob_is_told_from_a_climb(height, bobs):
     assert (heave.variance(found) > 0.0) == bobs
 
 
+@pytest.mark.parametrize("dt", [1.0, 0.01, 1e-3])
+def test_a_window_is_weighed_whatever_its_cycles_last_and_rounding_makes_of_it(dt):
+    """What is told is a difference of large numbers, and may lack a little of being positive."""
+    rises = pose_matrix(np.full(COUNT, dt).tobytes(), np.zeros(COUNT).tobytes(), False)[1:, 2, HEAD + 2 :: 3]
+    information = rises.T @ rises / ERROR**2 - 1e-3 * np.eye(COUNT)
+    found = heave.window_levels(information, np.zeros(COUNT), rises)
+    assert np.isfinite(found).all()
+    assert heave.variance(found) == 0.0
+
+
 @pytest.mark.parametrize(("up", "bobs"), [(0.0, False), (0.03, True), (-0.1, True), (0.6, False)])
 def test_a_told_rise_is_a_bob_or_a_climb(up, bobs):
     """What was told is the floor's, exactly, or the body's own: then hardly any of it is the floor's."""
