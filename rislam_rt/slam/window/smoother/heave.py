@@ -44,21 +44,16 @@ def at_start(up: float, std: float) -> tuple[float, float, Floats]:
     and the variance of both.
     """
     level = first_levels()
-    spread = std**2 + CONSTANTS.liveliest * HEAVES[1:]
-    bobs = CONSTANTS.upright * level[1:] * _density(up, spread)
-    climbs = (1.0 - CONSTANTS.upright) * level[0] * _density(up, np.array(std**2 + CONSTANTS.walk**2))
+    density, spread = scipy.stats.norm.pdf, np.sqrt(std**2 + CONSTANTS.liveliest * HEAVES[1:])
+    bobs = CONSTANTS.upright * level[1:] * density(up, scale=spread)
+    climbs = (1.0 - CONSTANTS.upright) * level[0] * density(up, scale=np.hypot(std, CONSTANTS.walk))
     # an uneven floor's accelerations give as much in a second
-    rests = CONSTANTS.upright * level[0] * _density(up, np.array(max(std, CONSTANTS.level) ** 2))
+    rests = CONSTANTS.upright * level[0] * density(up, scale=max(std, CONSTANTS.level))
     if max(climbs, rests) > bobs.sum():
         return up, std, level
     levels = np.append(climbs, bobs) / (climbs + bobs.sum())
     share = float(levels[0])
     return share * up, float(np.sqrt(std**2 + share * (1.0 - share) * up**2)), levels
-
-
-def _density(value: float, variance: Floats) -> Floats:
-    """Densities of a value under centred normals of some variances."""
-    return np.asarray(np.exp(-0.5 * value**2 / variance) / np.sqrt(2.0 * np.pi * variance))
 
 
 def window_levels(information: Floats, slope: Floats, rises: Floats) -> Floats:
