@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file, settings_of
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file
 from rislam_rt.cli.output_files import OUTPUT, write_json
 from rislam_rt.input_messages import counted
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from rislam_rt.adviser.link_budget import Survey
     from rislam_rt.model import Scene
+    from rislam_rt.pipeline import PipelineSpec
     from rislam_rt.pipeline.specification.pipeline_spec import Settings as Records
     from rislam_rt.scene.findings import Finding
 
@@ -28,10 +29,10 @@ def command(
         typer.Option(min=0.001, max=1000.0, help="Carrier, for that of the pipeline (10 GHz)."),
     ] = None,
     pipeline: Annotated[
-        Path,
-        typer.Option(metavar="PIPELINE", help="Whose radio and receiver the room is held against.",
-                     parser=pipeline_file),
-    ] = MAIN_JOB,
+        Path | None,
+        typer.Option(metavar="PIPELINE", help="Whose radio and receiver the room is held against, and whose run has to "
+                     "fit it.", parser=pipeline_file, show_default=str(MAIN_JOB)),
+    ] = None,
     set_: Settings = None,
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw where the panel can be heard (PNG, SVG or PDF)."), OUTPUT
@@ -41,7 +42,8 @@ def command(
     """Look for what is wrong with a scene, and say what a run in it will hear.
 
     Exit code 2 if it is unusable; warnings are allowed. What a run will hear depends on radio and receiver: those of
-    the main job, of --pipeline, or as changed.
+    the main job, of --pipeline, or as changed. With --pipeline, or schemes named by --set, what keeps that run from
+    starting in this room is an error, too.
 
     Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
     """
@@ -49,14 +51,19 @@ def command(
 
     from rislam_rt.adviser.late_paths import late_path_warnings
     from rislam_rt.adviser.link_budget import survey
+    from rislam_rt.cli.run import names_schemes
+    from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings
+    from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.scene import check_scene
     from rislam_rt.scene.scene_folder import scene_file
 
     changed = list(set_ or ())
     if carrier_ghz is not None:
         changed += [f"radio.carrier_ghz={carrier_ghz}", f"radio.bandwidth_ghz={min(1.0, carrier_ghz)}"]
-    settings = settings_of(pipeline, changed)
+    file = pipeline or pipeline_file(str(MAIN_JOB))
+    spec = load_spec(file, changed)
+    settings = build_settings(spec)
     if picture is not None:
         from rislam_rt.report.style import picture_kind
 
@@ -65,6 +72,9 @@ def command(
     checked, looked = _checked_scene(Path(scene), findings), None
     if checked is not None:
         looked = survey(checked, settings)
+        named = names_schemes(spec, file, changed)
+        if named or pipeline is not None:
+            findings += _run_errors(checked, spec, file, named=named)
         findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
         findings += late_path_warnings(looked, str(scene_file(scene)))
     for finding in findings:
@@ -88,6 +98,23 @@ def _checked_scene(folder: Path, findings: "Sequence[Finding]") -> "Scene | None
     from rislam_rt.scene.load import read_draft
 
     return None if any(finding.severity == "error" for finding in findings) else read_draft(folder).scene
+
+
+def _run_errors(scene: "Scene", spec: "PipelineSpec", file: Path, *, named: bool) -> "list[Finding]":
+    """Part of `rislam-rt check`: the error that `rislam-rt run` would end with at once, of a pipeline that does not fit
+    a scene, with its file as the place; `named`: whether the user named the schemes."""
+    from rislam_rt.cli.run import panel_schemes, without_schemes
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.pipeline.run import check_run
+    from rislam_rt.scene.findings import error_at
+
+    try:
+        check_run(scene, spec if named else without_schemes(spec, panel_schemes(spec, scene)))
+    except ConfigError as error:
+        field, _, told = str(error).partition(": ")
+        message, _, mend = told.partition("; ")
+        return [error_at(str(file), field, message, mend)]
+    return []
 
 
 def _advise(scene: "Scene", settings: "Records", picture: Path | None, looked: "Survey") -> dict[str, object]:

@@ -21,7 +21,7 @@ from rislam_rt.input_messages import counted
 from rislam_rt.shipped import is_shipped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
@@ -58,9 +58,7 @@ def command(
     spec = load_any(pipeline, set_ or ())
     given = StudyOptions(pipeline, scene, out, jobs, json, page)
     if isinstance(spec, PipelineSpec):
-        named = any(setting.partition("=")[0].strip() == "schemes" for setting in set_ or ())
-        named |= "schemes" in spec.model_fields_set and not is_shipped(pipeline)
-        run_main_job(spec, given, named=named)
+        run_main_job(spec, given, named=names_schemes(spec, pipeline, set_ or ()))
         return
     from rislam_rt.cli import study
     from rislam_rt.studies import ClaimsSpec, ClassifierSpec, CompareSpec, Fig4aSpec, UnseenSpec
@@ -87,12 +85,11 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> N
 
     opened = open_scene(scene_of(given.scene, spec, given.pipeline), build_radio(spec.radio))
     need = [] if named else panel_schemes(spec, opened.scene)
-    if need:
-        left = [name for name in spec.schemes if name not in need] or ["no_ris"]
-        spec = spec.model_copy(update={"schemes": left})
+    spec = without_schemes(spec, need)
     check_run(opened.scene, spec)
     if need:
-        typer.echo(f"scene '{opened.scene.name}' has no panel, which {', '.join(need)} need: {', '.join(left)} alone")
+        left = ", ".join(spec.schemes)
+        typer.echo(f"scene '{opened.scene.name}' has no panel, which {', '.join(need)} need: {left} alone")
     identity = run_identity(spec, opened.scene)
     folder = given.out or Path("runs") / identity.folder
     about = find_run(folder, identity)
@@ -104,11 +101,24 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> N
     compute_run(spec, opened.scene, identity, folder, given)
 
 
+def names_schemes(spec: "PipelineSpec", pipeline: Path, changed: "Sequence[str]") -> bool:
+    """For `rislam-rt run`: whether the user named the schemes, in a pipeline of their own or by `--set`."""
+    in_file = "schemes" in spec.model_fields_set and not is_shipped(pipeline)
+    return in_file or any(setting.partition("=")[0].strip() == "schemes" for setting in changed)
+
+
 def panel_schemes(spec: "PipelineSpec", scene: "Scene") -> list[str]:
     """For `rislam-rt run`: the schemes of a pipeline that need a panel and do not find one in the scene."""
     from rislam_rt.pipeline.schemes import SCHEMES
 
     return [] if scene.ris is not None else [name for name in spec.schemes if SCHEMES[name].panel]
+
+
+def without_schemes(spec: "PipelineSpec", left_out: "Sequence[str]") -> "PipelineSpec":
+    """For `rislam-rt run`: a pipeline without the schemes that find no panel; with `no_ris` if none is left."""
+    if not left_out:
+        return spec
+    return spec.model_copy(update={"schemes": [name for name in spec.schemes if name not in left_out] or ["no_ris"]})
 
 
 def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:

@@ -54,3 +54,28 @@ def test_an_agent_faster_than_the_receiver_is_told_so_before_it_runs(check, tmp_
     assert "scene.toml: receiver.top_speed: 0.09 m/s, and the agent moves at up to 0.1 m/s (cycle 0)" in line
     assert out.endswith("paper_room: 0 errors, 2 warnings\n")
     assert "receiver.top_speed" in [one["field"] for one in json.loads((tmp_path / "c.json").read_text())["findings"]]
+
+
+def test_what_keeps_a_pipeline_from_running_in_a_room_is_an_error_in_the_words_of_the_run(check, run, tmp_path):
+    mine, named = tmp_path / "mine.toml", 'schemes = ["optimized"]'
+    mine.write_text(f'name = "mine"\n{named}\n')
+    code, out, _ = check("empty_box", "--pipeline", mine, "--json", "c.json")
+    told = "schemes: 'optimized' needs a panel and scene 'empty_box' has none; give 'no_ris'"
+    assert run("run", mine, "--scene", "empty_box", "--no-report")[::2] == (2, f"error: {told}\n")
+    assert code == 2
+    assert f"error: {mine}: {told}\n" in out
+    assert out.endswith("empty_box: 1 error, 0 warnings\n")
+    found = json.loads((tmp_path / "c.json").read_text())
+    assert (found["errors"], found["findings"][0]["field"]) == (1, "schemes")
+    assert "advice" in found
+    assert told in check("empty_box", "--set", 'schemes=["optimized"]')[1]
+    mine.write_text(f'name = "mine"\n{named}\n[budget]\nmeasure_s = 0.05\n')
+    assert "mine.toml: budget: the four steps sum to 0.14 s; make them" in check("paper_room", "--pipeline", mine)[1]
+
+
+@pytest.mark.parametrize("words", [(), ("--pipeline", "trace_then_slam"), ("--set", "radio.reference_snr_db=3")])
+def test_a_room_without_a_panel_stands_where_nobody_named_schemes(check, words):
+    """A run leaves out the schemes of a built-in pipeline that need a panel, so that nothing is wrong."""
+    code, out, _ = check("empty_box", *words)
+    assert code == 0
+    assert out.endswith("empty_box: 0 errors, 0 warnings\n")
