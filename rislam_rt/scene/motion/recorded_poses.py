@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import wrap
 from rislam_rt.input_messages import counted, parse_number
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.motion.recorded_columns import QUATERNION, few_names, find_columns
@@ -20,7 +21,15 @@ MAX_STEP = 1e6
 MAX_TILT = 1e-3
 """Largest angle [rad] of a recorded pose's z axis from the room's: the body turns about z only."""
 MAX_HEADING = 6.0 * np.pi
-"""Largest recorded heading [rad], three turns one way: more is taken for degrees."""
+"""Largest recorded heading [rad], three turns one way, that is taken as it is: more has to be one that turns on."""
+FIRST_HEADING = 2.0 * np.pi
+"""Largest heading [rad] with which a recording begins that turns on beyond `MAX_HEADING`: odometry counts from the
+start."""
+FASTEST_TURN = np.pi
+"""Largest turn [rad] within a second of a heading that turns on: half a turn, a TurtleBot3 makes up to 2.84 rad. Of
+degrees 3.2 a second exceed it."""
+ALONG_WAY = 0.9
+"""Share of the way that headings point along from which on they are headings of that way, whatever their unit."""
 SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "blanks"}
 """What other separators of CSV files than commas are called."""
 COMMAS = "separate columns by commas, write decimals with a point"
@@ -86,7 +95,9 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     table = {what: column * scale for (what, (_, scale)), column in zip(place.items(), np.array(rows).T, strict=True)}
     time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
     if "heading" in table:
-        return RecordedPoses(time, position, _in_radians(table["heading"]))
+        heading = table["heading"]
+        _check_radians(heading, time, position, told=place["heading"].unit != 1.0)
+        return RecordedPoses(time, position, wrap(heading) if np.abs(heading).max() > MAX_HEADING else heading)
     turned = all(part in table for part in QUATERNION)
     return RecordedPoses(time, position, _heading(np.column_stack([table[q] for q in QUATERNION])) if turned else None)
 
@@ -125,13 +136,34 @@ def _check_lengths(lines: Sequence[Sequence[str]]) -> None:
             raise Fault(what, COMMAS)
 
 
-def _in_radians(heading: Floats) -> Floats:
-    """Headings (K,) of recorded poses [rad] as they are, unless they can only be degrees."""
+def _check_radians(heading: Floats, time: Floats, position: Floats, *, told: bool) -> None:
+    """Check that the headings (K,) [rad] of recorded poses may be radians; they are where their column `told` that it
+    holds degrees."""
     largest = float(heading[np.argmax(np.abs(heading))])
-    if abs(largest) > MAX_HEADING:
+    why = "" if told or abs(largest) <= MAX_HEADING else _reason_for_degrees(heading, time, position)
+    if why:
         mend = "call the column 'heading_deg' if these are degrees, or bring them to -pi to pi"
-        raise Fault(f"a heading of {largest:.4g} rad in the trajectory", mend)
-    return heading
+        raise Fault(f"a heading of {largest:.4g} rad in the trajectory, {why}", mend)
+
+
+def _reason_for_degrees(heading: Floats, time: Floats, position: Floats) -> str:
+    """Reason why recorded headings (K,) beyond `MAX_HEADING` are not radians that turn on, as odometry counts them;
+    empty if they may be."""
+    heading = np.clip(heading, -MAX_TIME, MAX_TIME)  # so that no difference overflows
+    step = np.abs(np.diff(heading))
+    turn, x, y = (np.interp(time + 1.0, time, one) - one for one in (heading, *position.T[:2]))  # in a second
+    if abs(heading[0]) > FIRST_HEADING:
+        return f"and it begins at {heading[0]:.4g} rad"
+    if step.max(initial=0.0) >= np.pi:
+        pose = int(np.argmax(step >= np.pi))
+        return f"and {step[pose]:.4g} rad from pose {pose} to the next"
+    if np.abs(turn).max() > FASTEST_TURN:
+        pose = int(np.argmax(np.abs(turn) > FASTEST_TURN))
+        return f"and {abs(turn[pose]):.4g} rad in the second after pose {pose}"
+    way = x + 1j * y
+    length = max(float(np.abs(way).sum()), 1e-300)
+    as_radians, as_degrees = (abs(way @ np.exp(-1j * angle)) / length for angle in (heading, np.radians(heading)))
+    return "and as degrees they point along the way" if as_degrees > max(ALONG_WAY, as_radians) else ""
 
 
 def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[float]:

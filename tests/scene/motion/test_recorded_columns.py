@@ -60,6 +60,63 @@ def test_half_a_quaternion_and_two_columns_for_one_quantity_are_refused() -> Non
     assert find_columns([*PLACE, "x_mm"], {"x": "x_mm"})["x"] == (4, 1e-3)
 
 
+def recording(column: str, heading: np.ndarray, step: float, course: np.ndarray | None = None) -> bytes:
+    """CSV file of poses every `step` seconds that go at 0.3 m/s along a course (K,) [rad], or stand still."""
+    velocity = (
+        np.zeros((len(heading), 2)) if course is None else 0.3 * np.column_stack([np.cos(course), np.sin(course)])
+    )
+    x, y = (step * np.cumsum(velocity, axis=0)).T
+    rows = "".join(f"{step * k},{x[k]},{y[k]},1,{heading[k]}\n" for k in range(len(heading)))
+    return f"t,x,y,z,{column}\n{rows}".encode()
+
+
+def turning(rate: float, to: float, step: float, begin: float = 0.0) -> np.ndarray:
+    """Heading that turns by `rate` a second from `begin` on until it reaches `to`, and then stays."""
+    time = np.arange(0.0, (to - begin) / rate + 5.0, step)
+    return np.minimum(begin + rate * time, to)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 2.0])
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_heading_that_turns_on_is_wrapped(step: float, moving: bool) -> None:
+    """As odometry has it after a spiral, or a robot that looks about where it stands."""
+    turned = turning(1.4, 21.6, step, begin=-3.0)
+    for column, scale in (("yaw", 1.0), ("yaw_deg", 180.0 / np.pi)):
+        content = recording(column, scale * turned, step, turned + 0.3 if moving else None)
+        found = parse_csv(content, {}).heading
+        assert found is not None
+        assert np.abs(found).max() <= np.pi
+        np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * turned), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "step", "along", "why"),
+    [
+        (np.arange(30.0, 60.0), 0.1, False, "a heading of 59 rad in the trajectory, and it begins at 30 rad"),
+        (np.arange(0.0, 91.0), 0.1, False, "and 10 rad in the second after pose 0"),
+        (np.repeat([0.0, 90.0, 180.0], 20), 0.1, False, "and 90 rad from pose 19 to the next"),
+        (turning(3.3, 90.0, 0.1), 0.1, False, "and 3.3 rad in the second after pose"),
+        (turning(1.0, 90.0, 0.1), 0.1, True, "and as degrees they point along the way"),
+    ],
+)
+def test_degrees_that_are_called_radians_are_refused(degrees: np.ndarray, step: float, along: bool, why: str) -> None:
+    """They begin, step or turn as no heading in radians, or point along the way as degrees, however slow they turn."""
+    course = np.radians(degrees) + 0.3 if along else None
+    with pytest.raises(Fault, match=r"; call the column 'heading_deg' if these are degrees") as caught:
+        parse_csv(recording("yaw", degrees, step, course), {})
+    assert why in str(caught.value)
+    found = parse_csv(recording("yaw_deg", degrees, step, course), {}).heading
+    assert found is not None
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * np.radians(degrees)), atol=1e-9)
+
+
+def test_headings_without_measure_are_refused_in_one_line() -> None:
+    with pytest.raises(
+        Fault, match=r"a heading of 1e\+308 rad in the trajectory, and 1e\+11 rad from pose 0 to the next"
+    ):
+        parse_csv(recording("yaw", np.array([0.0, 1e308, -1e308]), 0.1), {})
+
+
 def test_headings_that_can_only_be_degrees_are_refused() -> None:
     rows = "".join(f"{k},0,0,1,{10 * k}\n" for k in range(9))
     with pytest.raises(Fault, match=r"a heading of 80 rad .*; call the column 'heading_deg'"):
