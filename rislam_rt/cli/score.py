@@ -33,9 +33,10 @@ def command(
     """Print the score card of a completed run, in a room of one's own or another: what the study 'unseen' says of its.
 
     Error and bound relative to the true start, whether the run was lost and said so, walls, landmarks and panel found
-    of those heard, ghosts, births, delays. A run folder holds the last map alone: for births and delays its
-    measurements are replayed, which gives the run's estimates again; nothing is traced. What is saved with --save goes
-    into read_recording, replay and score_run of Python.
+    of those heard, ghosts, births, delays. A panel that the scheme is told of counts among the landmarks, too. A run
+    folder holds the last map alone: for births and delays its measurements are replayed, which gives the run's
+    estimates again; nothing is traced. What is saved with --save goes into read_recording, replay and score_run of
+    Python.
 
     Example: rislam-rt score runs/trace_then_slam-office-7-0123abcd --save recordings
     """

@@ -26,6 +26,7 @@ def test_cells() -> None:
     assert rows["relative RMSE after 10 s [mm]"] == rows["NEES per degree of freedom"] == ["-", "-"]
     assert rows["lost"] == ["from 1.2 s on", "no"]
     assert rows["walls found of those heard"] == ["6 of 11", "6 of 11"]
+    assert rows["landmarks (with panel) found of those heard"] == ["4 of 5", "4 of 5"]
     assert rows["births of the right kind"] == ["27 of 29", "not known"]
     assert rows["births"] == ["60", "not known"]
     assert rows["delay of walls [s]"] == ["1.55", "not known"]

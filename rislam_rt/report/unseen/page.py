@@ -47,7 +47,8 @@ def _meaning() -> list[str]:
     it is above the detection threshold for {HEARD:g} s in all; walls in one plane are one. A wall is found if at the
     end a plane of the map lies within {NEAR_WALL:g} m of it (RMS over its surface) and within {NEAR_ANGLE:g} degrees,
     one to one, and found well within {GOOD_ANGLE:g} degree and {GOOD_OFFSET:g} m at its middle; a landmark, within
-    {NEAR_POINT:g} m; the panel, if the landmark that the map holds for it does. Ghosts are what stands for nothing,
+    {NEAR_POINT:g} m; the panel, if the landmark that the map holds for it does. A panel that the estimator is told of
+    is one of the landmarks, too, found as such whatever the map holds it for. Ghosts are what stands for nothing,
     heard or not, one to one. A birth is of the right kind if most components that the landmark got were of that kind.
     Delays are medians from the first audible cycle to the first in which the map holds it; a panel that is not found
     has none."""
@@ -176,7 +177,7 @@ ROWS: dict[str, Any] = {
     "angle of those found [deg]": _median("wall_deg"),
     "offset of those found [mm]": _median("wall_m", MILLI, 1),
     "delay of walls [s]": _median("wall_delay_s"),
-    "landmarks found of those heard": _share("points_found"),
+    "landmarks (with panel) found of those heard": _share("points_found"),
     "error of those found [mm]": _median("point_m", MILLI, 1),
     "delay of landmarks [s]": _median("point_delay_s"),
     "panel found of those heard": _share("panel_found"),

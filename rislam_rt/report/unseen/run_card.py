@@ -80,7 +80,7 @@ ROWS: dict[str, Show] = {
     "angle of those found [deg]": _value("wall_deg"),
     "offset of those found [mm]": _value("wall_m", MILLI, 1),
     "delay of walls [s]": _over_time("wall_delay_s"),
-    "landmarks found of those heard": _of("points_found", "points_heard"),
+    "landmarks (with panel) found of those heard": _of("points_found", "points_heard"),
     "error of those found [mm]": _value("point_m", MILLI, 1),
     "delay of landmarks [s]": _over_time("point_delay_s"),
     "panel found": _panel,

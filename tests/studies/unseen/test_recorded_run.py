@@ -72,6 +72,15 @@ def test_the_scores_are_those_of_replaying_and_scoring(
         assert recording.truth.panel == 1
 
 
+def test_the_panel_is_a_landmark_of_the_scheme_that_is_told_of_it(recordings: dict[str, rislam_rt.Recording]) -> None:
+    for name, heard in (("random", 2), ("no_ris", 1)):
+        one = recordings[name]
+        assert (one.inputs.panel is None) == (name == "no_ris")
+        truth = one.truth._replace(landmark_audible=np.ones_like(one.truth.landmark_audible))  # sphere and panel
+        answers = rislam_rt.answers_from_arrays(one.inputs, truth.position)
+        assert rislam_rt.score_run(truth, one.inputs, answers)["points_heard"] == heard
+
+
 def test_without_a_replay_all_is_the_same_but_what_needs_one(
     folder: Path, recordings: dict[str, rislam_rt.Recording]
 ) -> None:
