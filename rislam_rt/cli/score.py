@@ -25,7 +25,8 @@ def command(
         bool,
         typer.Option(
             "--replay/--no-replay",
-            help="Whether to replay the measurements, as long as localising took; births and delays need it.",
+            help="Whether to replay the measurements, as long as localising took. Births, delays and CPU time need it; "
+            "errors, bounds, and walls, landmarks and ghosts of the last map do not.",
         ),
     ] = True,
     json: JsonFile = None,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import rislam_rt
+from rislam_rt.studies.unseen.score import OVER_TIME
 
 ROOT = Path(__file__).parents[2]
 SHORT = ("channel=image_source", "depth=1", "cycles=22", "receiver.estimator=bound", 'schemes=["random"]')
@@ -33,9 +34,12 @@ def test_a_run_in_a_room_of_ones_own_is_scored_and_recorded(run, tmp_path):
     assert scores == recording.scores
     assert {name: told["schemes"]["random"][name] for name in scores} == scores
     # the same again, without the replay; nothing in the run folder has changed
-    code, out, err = run("score", "mine", "--no-replay", "--save", "kept", "-q")
+    code, out, err = run("score", "mine", "--no-replay", "--save", "kept", "-q", "--json", "last.json")
     assert (code, err) == (0, "")
     assert "not known" in out
+    last, whole = (json.loads(Path(name).read_text())["schemes"]["random"] for name in ("last.json", "card.json"))
+    assert {name for name in whole if last[name] != whole[name]} <= {*OVER_TIME, "cycle_ms"}
+    assert {last[name] for name in (*OVER_TIME, "cycle_ms")} == {None}
     assert {file: file.stat().st_mtime_ns for file in (tmp_path / "mine").rglob("*")} == before
     # what is not of the program's making stays
     Path("kept/mine_random.nc").write_text("of my own")
