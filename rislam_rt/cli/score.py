@@ -19,7 +19,11 @@ def command(
     run: RunFolder,
     save: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Write a recording of each scheme (.nc) there: inputs, truth, scores."),
+        typer.Option(
+            metavar="FOLDER",
+            help="Write a recording of each scheme there, RUN_SCHEME.nc with the run folder's name: "
+            "inputs, truth, scores.",
+        ),
     ] = None,
     replay: Annotated[
         bool,
