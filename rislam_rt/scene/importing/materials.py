@@ -13,11 +13,12 @@ from rislam_rt.scene.schema import ItuMaterial
 
 THICKNESS = {
     "asphalt_concrete": 0.05, "brick": 0.12, "carpet_tile": 0.006, "ceiling_board": 0.015, "chipboard": 0.018,
-    "clear_acrylic": 0.005, "concrete": 0.2, "floorboard": 0.02, "glass": 0.006, "marble": 0.02,
+    "clear_acrylic": 0.005, "concrete": 0.2, "floorboard": 0.02, "glass": 0.004, "marble": 0.02,
     "medium_dry_ground": 1.0, "metal": 0.002, "plasterboard": 0.0125, "plywood": 0.012, "very_dry_ground": 1.0,
     "vinyl_tile": 0.003, "wet_ground": 1.0, "wood": 0.03,
 }  # fmt: skip
-"""Usual thickness [m] of a slab of each material where none is given: of boards in trade, of walls in building."""
+"""Usual thickness [m] of a slab of each material where none is given: of boards in trade, of walls in building. That of
+glass is 4 mm: a nominal thickness of float glass (EN 572-2), the pane of a common double-glazed window."""
 
 WORDS = {
     "metal": ("metal", "steel", "iron", "aluminium", "aluminum", "alu", "copper", "chrome", "metall", "stahl"),

@@ -108,4 +108,8 @@ def write_room(
         mend = by_hand if ".material." in errors[0].field else errors[0].mend
         raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", mend)
     write_files(files, folder, overwrite=overwrite)
-    return remarks + [f"{f.field}: {f.message}; {f.mend}" for f in findings if ".material." in f.field]
+    return remarks + [
+        f"{f.field}: {f.message}; {f.mend} (--material NAME=itu:MATERIAL:THICKNESS_M, or thickness_m in scene.toml)"
+        for f in findings
+        if ".material." in f.field
+    ]
