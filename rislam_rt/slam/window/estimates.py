@@ -14,6 +14,7 @@ from rislam_rt.slam.start_prior import StartPrior
 from rislam_rt.slam.window.filter import init
 from rislam_rt.slam.window.landmarks.duplicate_walls import second_planes
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, image_ident
+from rislam_rt.slam.window.relinearisation import heave_now
 from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.smoother import heave, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
@@ -37,21 +38,23 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     """Pose estimate (mean, covariance, equally likely samples; `ahead` [s] at constant velocity) and map estimate of
     the window filter."""
     mean, covariance, excess = window_gaussian.now_with_excess(state.window)
-    spread = covariance.copy()
-    spread[:6, :6] += excess
-    spread[:3, :3] += np.diag(state.shift**2)
+    by, further = np.eye(6, len(mean)), state.heave_uncertainty
     if ahead and state.heaves:  # the next step's heave is another one
         mean[2] -= state.window.heave[-1]
-        spread[2, 2] += state.heave_variance
-    else:
-        spread[2, 2] += state.heave_spread
+        further = state.heave_variance
+    elif state.heaves:  # what was heard tells of floor and heave together
+        slope, further = heave_now(state)
+        by[2] -= slope
+    spread = by @ covariance @ by.T + by[:, :6] @ excess @ by[:, :6].T
+    spread[:3, :3] += np.diag(state.shift**2)
+    spread[2, 2] += further
     position = mean[:3] + ahead * mean[3:6]
     root = square_root(spread[:3, :3])
     return SlamEstimate(
         position,
         mean[3:6],
         float(state.heading[-1] + mean[6]),
-        spread[:6, :6],
+        spread,
         position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.scene.body,
         build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks, state.shift, mean[:3]),

@@ -67,7 +67,7 @@ def init(
         no_observations(),
         motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
-        attitude.first_levels(compass=not turns), heave_levels, height, 0.0,
+        attitude.first_levels(compass=not turns), heave_levels, height,
         start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
@@ -192,7 +192,7 @@ def _associate_over_motions(
                 lively[axis], window, best = log_odds, trial, view
         if axis == 0:
             level_floor = window, best
-    if not heaved and len(best.groups.leader) and _may_heave(state):
+    if not heaved and len(best.groups.leader) and state.may_heave:
         floor, plain = level_floor
         prior, heaved = heave.begins(state.heave_levels)
         wide = plain.covariance.copy()
@@ -229,7 +229,7 @@ def _solve(
     sharper = state.log.sharper(int(np.searchsorted(state.log.cycle, state.cycle)) + view.pick[used])
     told = attitude.likelihood(
         innovation * sharper, jacobian * sharper[..., None], view.covariance, turned * sharper[..., None],
-        np.append(state.attitude_variance, _heave_uncertainty(state)),
+        np.append(state.attitude_variance, state.heave_uncertainty),
     )  # fmt: skip
     state, begun = _with_heave_learnt(state, told)
     rotation = heave.without(told, float(state.window.heave_variance[-1]))
@@ -254,19 +254,7 @@ def _solve(
     state = coordinated_turn.learn_coordinated_turn(motion_learning.learn_motion(state._replace(window=window), lively))
     if lively[1] and state.is_level:  # associated as if it climbed, which the other steps contradict
         state = state._replace(window=window_gaussian.solve(state.window))
-    state = state._replace(heave_spread=float(covariance[-1, -1]) if state.heaves else _heave_uncertainty(state))
     return state, view, left, float(np.sum(innovation**2)), covariance[:axes, :axes]
-
-
-def _may_heave(state: WindowState) -> bool:
-    """Whether the body's height above the floor is estimated in each cycle: where its motion is learnt, and walls tell
-    of it."""
-    return state.config.motion == "learnt" and state.scene.use_vt
-
-
-def _heave_uncertainty(state: WindowState) -> float:
-    """Expected variance [m^2] of the body's height above the floor, whether it is held for none or not."""
-    return heave.expected_variance(state.heave_levels) if _may_heave(state) else 0.0
 
 
 def _with_heave_learnt(state: WindowState, told: Attitude) -> tuple[WindowState, bool]:
@@ -276,7 +264,7 @@ def _with_heave_learnt(state: WindowState, told: Attitude) -> tuple[WindowState,
     To begin with, single cycles may speak for a heave where the floor rises, and a floor that is held for uneven
     explains one: so the whole window is asked (`heave.window_levels`).
     """
-    if not _may_heave(state):
+    if not state.may_heave:
         return state, False
     window, begun = state.window, False
     state = state._replace(heave_levels=heave.next_levels(state.heave_levels, told, state.attitude_variance))

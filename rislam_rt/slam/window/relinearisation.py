@@ -84,6 +84,20 @@ def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowSt
     return level(state, first, change), Residuals(heard.row, heard.slot, left, heard.slopes, np.zeros(len(left)))
 
 
+def heave_now(state: WindowState) -> tuple[Floats, float]:
+    """Heave of the last pose, after its cycle, from its re-linearised measurements: by how much (7 + 3F,) it is the
+    less, the more each number of the present is (see `window_gaussian.now`), and its variance [m^2] given these."""
+    state, last = state._replace(cycle=state.cycle - 1), state.window.num_poses - 1
+    heard = whitened(state, predictions(state, last))
+    weight, axes = np.sqrt(trust(heard.left))[:, None, None], heard.turned.shape[2]
+    flat = weight * np.concatenate([heard.slopes, heard.turned], axis=2)
+    flat = flat.reshape(-1, flat.shape[2])
+    product = _with_start(np.pad(flat.T @ flat, (0, 1))[None], state, last, [2, -2])[0, :-1, :-1]
+    spread = np.linalg.inv(product[-axes:, -axes:] + np.diag(1.0 / state.nuisance_variance[-1]))
+    slope = spread[-1] @ product[-axes:, :-axes]
+    return np.concatenate([slope[:3], np.zeros(3), slope[3:]]), float(spread[-1, -1])
+
+
 def _with_start(product: Floats, state: WindowState, first: int, by: list[int]) -> Floats:
     """Products (K, D, D) of slopes and residuals for the re-linearisation, with the start's height in those of the
     run's first pose: floor and heave, whose columns are `by`, add up to what was told."""

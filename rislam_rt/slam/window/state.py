@@ -59,8 +59,6 @@ class WindowState(NamedTuple):
     """(L,) probabilities of the levels of the heave's deviation (see `heave`)."""
     start_height: Floats
     """(2,) [m] height that was told of the start, and its standard deviation within the Gaussian."""
-    heave_spread: float
-    """[m^2] variance of the last pose's heave, after what was heard; where it is held for none, as there may be one."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
     scene: KnownEnvironment
@@ -86,6 +84,17 @@ class WindowState(NamedTuple):
         """Variance [m^2] by which the window state's heave of the present cycle is estimated, 0 if it is held for
         none."""
         return heave.variance(self.heave_levels)
+
+    @property
+    def heave_uncertainty(self) -> float:
+        """Expected variance [m^2] of the window state's heave, whether it is held for none or not."""
+        return heave.expected_variance(self.heave_levels) if self.may_heave else 0.0
+
+    @property
+    def may_heave(self) -> bool:
+        """Whether the window state estimates the body's height above the floor in each cycle: where its motion is
+        learnt, and walls tell of it."""
+        return self.config.motion == "learnt" and self.scene.use_vt
 
     @property
     def heaves(self) -> bool:

@@ -14,6 +14,9 @@ from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.window.relinearisation import heave_now, predictions, relinearise, trust, whitened
+from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE
 
 ROOM, COUNT, DT = Path(__file__).parents[3] / "scenes" / "paper_room", 90, 0.1
 TIME = DT * np.arange(COUNT)
@@ -70,3 +73,40 @@ def test_a_climb_is_no_heave():
     error, _, state = carried(*course(DT * (np.cumsum(rise) - rise), rise), 3)
     assert not state.heaves
     assert np.abs(error[60:]).max() < 0.02
+
+
+def height_variance(state):
+    """Variance [m^2] of the body's height after its last cycle, with the nuisances of that cycle as unknowns beside all
+    of the window's, in one dense matrix."""
+    window, heard = state.window, whitened(state, predictions(state, state.window.num_poses - 1))
+    size, axes, design = len(window.head), heard.turned.shape[2], window_gaussian.pose_design(window)[-1]
+    by = np.zeros((heard.slopes.shape[2], len(window.covariance)))
+    by[:3, :HEAD], by[:3, size:], by[3, HEAD - 1] = design[:, :HEAD], design[:, HEAD:], 1.0
+    by[POSE:, HEAD:size] = np.eye(size - HEAD)
+    slots = window.slots.hessian.copy()
+    slots[-1] = 0.0
+    others = window._replace(slots=window.slots._replace(hessian=slots))
+    rows = np.concatenate([heard.slopes @ by, heard.turned], axis=2) * np.sqrt(trust(heard.left))[:, None, None]
+    rows = rows.reshape(-1, rows.shape[2])
+    information = rows.T @ rows + np.diag(np.append(np.zeros(len(by[0])), 1.0 / state.nuisance_variance[-1]))
+    information[:-axes, :-axes] += window_gaussian._normal(others)[0]
+    height = np.concatenate([by[2], np.zeros(axes - 1), [1.0]])
+    return height @ np.linalg.solve(information, height)
+
+
+def test_the_height_is_as_uncertain_as_floor_and_heave_are_together():
+    """Not as both are apart: what a cycle tells of their sum parts them."""
+    place, velocity = course(0.012 * np.sin(STEP * TIME), 0.012 * STEP * np.cos(STEP * TIME))
+    *_, state = carried(place, velocity, 1)
+    inside = state._replace(cycle=state.cycle - 1)
+    for _ in range(5):  # what is estimated and what it is linearised at agree
+        inside, _ = relinearise(inside, 0)
+        inside = inside._replace(window=window_gaussian.solve(inside.window))
+    state = inside._replace(cycle=state.cycle)
+    mean, covariance, excess = window_gaussian.now_with_excess(state.window)
+    slope, own = heave_now(state)
+    by = np.eye(len(mean))[2] - slope
+    assert by @ covariance @ by + own == pytest.approx(height_variance(inside), rel=1e-4)
+    stated = slam.estimate(state, CONFIG).covariance[2, 2]
+    assert stated == pytest.approx(height_variance(inside) + by[:6] @ excess @ by[:6], rel=1e-4)
+    assert stated < 0.25 * (covariance[2, 2] + own)

@@ -171,7 +171,7 @@ def test_a_climb_for_one_cycle_that_the_steps_contradict_leaves_no_height_open(m
     assert found[-1] == 4
     assert state.is_level
     # but for a heave that there may be; it was 0.02 m
-    assert np.sqrt(slam.estimate(state, CONFIG).covariance[2, 2] - state.heave_spread) < 1e-3
+    assert np.sqrt(slam.estimate(state, CONFIG).covariance[2, 2] - state.heave_uncertainty) < 1e-3
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
