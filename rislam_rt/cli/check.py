@@ -49,6 +49,7 @@ def command(
     """
     from dataclasses import asdict
 
+    from rislam_rt.adviser.cancelled_returns import cancelled_return_warnings
     from rislam_rt.adviser.late_paths import late_path_warnings
     from rislam_rt.adviser.link_budget import survey
     from rislam_rt.cli.run import names_schemes
@@ -77,6 +78,7 @@ def command(
             findings += _run_errors(checked, spec, file, named=named)
         findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
         findings += late_path_warnings(looked, str(scene_file(scene)))
+        findings += cancelled_return_warnings(looked, str(scene_file(scene)))
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
