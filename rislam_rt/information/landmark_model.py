@@ -161,7 +161,8 @@ class LandmarkModel:
         return agent, np.concatenate([length[:, None], -cosines @ self.jacobian[last]], axis=1)
 
     def _wall_rows(self, cycle: int, path: int) -> tuple[Floats, Floats]:
-        """Derivatives of a wall return's range and two cosines by the agent (1, 3, 3) and by the unknowns (1, 3, U)."""
+        """Rows of a wall return for the information: derivatives of its range and two cosines by the agent (1, 3, 3)
+        and by the unknowns (1, 3, U)."""
         tx, rx, heading = self.motion.tx[cycle], self.motion.rx[cycle], self.motion.heading[cycle]
         walls = self.paths.tx_walls[path][self.paths.tx_walls[path] >= 0]
         chain = mirror_chain(tx, self.wall_normal[walls], self.wall_offset[walls])

@@ -124,7 +124,7 @@ def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]
 
 
 def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
-    """Reason in words why a landmark is not mapped: no path, SNR below the threshold, or detected too seldom.
+    """Conclusion why a landmark is not mapped, in words: no path, SNR below the threshold, or detected too seldom.
 
     `snr` and `valid` (K, P) are those of its paths, `threshold` that of detection; linear, over all antennas.
     """

@@ -87,7 +87,7 @@ def _visible(
     facets: WallFacets, rays: ImageRays, device: Floats, far: Floats, blockers: Integers, host: int,
     front: Floats | None, landmark: int,
 ) -> ImageRays:  # fmt: skip
-    """Legs that no wall or occluder hides and that reach a panel at the far end from its front."""
+    """Mirror images' legs that no wall or occluder hides and that reach a panel at the far end from its front."""
     count, bounces = rays.walls.shape
     target = np.broadcast_to(far, device.shape)[rays.cycle]
     points = np.concatenate([device[rays.cycle][:, None], rays.bounces, target[:, None]], axis=1)

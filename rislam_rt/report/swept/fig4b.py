@@ -95,7 +95,7 @@ def _error_lines(entries: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _schemes_lines(entries: Sequence[Mapping[str, Any]], error: str) -> list[str]:
-    """Table of one error of all schemes by SNR."""
+    """Table of Fig. 4(b): one error of all schemes by SNR."""
     schemes = list(dict.fromkeys(entry["scheme"] for entry in entries))
     rows = []
     for snr in dict.fromkeys(entry["snr_db"] for entry in entries):

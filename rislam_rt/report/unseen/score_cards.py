@@ -133,7 +133,7 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 
 def by_series(runs: Sequence[SchemeRun]) -> dict[str, list[SchemeRun]]:
-    """Group runs in unseen rooms by their series."""
+    """Group runs in unseen rooms by their series, a score card for each."""
     found: dict[str, list[SchemeRun]] = {}
     for run in runs:
         found.setdefault(run.series, []).append(run)

@@ -173,7 +173,7 @@ def _refresh_view(front: WindowState, belief: Nested, config: SlamConfig) -> Win
 
 
 def _spans(front: WindowState) -> Floats:
-    """Times (K,) [s] from each pose of the particle filter's trail to now."""
+    """Times (K,) [s] from each pose of the nested particle filter's trail to now."""
     return np.append(np.cumsum(front.window.step[::-1])[::-1], 0.0)
 
 

@@ -85,8 +85,9 @@ def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowSt
 
 
 def heave_now(state: WindowState) -> tuple[Floats, float]:
-    """Heave of the last pose, after its cycle, from its re-linearised measurements: by how much (7 + 3F,) it is the
-    less, the more each number of the present is (see `window_gaussian.now`), and its variance [m^2] given these."""
+    """What the re-linearised measurements of the last pose, after its cycle, tell of its heave: by how much (7 + 3F,)
+    it is the less, the more each number of the present is (see `window_gaussian.now`), and its variance [m^2] given
+    these."""
     state, last = state._replace(cycle=state.cycle - 1), state.window.num_poses - 1
     heard = whitened(state, predictions(state, last))
     weight, axes = np.sqrt(trust(heard.left))[:, None, None], heard.turned.shape[2]

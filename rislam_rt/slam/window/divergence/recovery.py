@@ -15,8 +15,8 @@ from rislam_rt.slam.window.state import WindowState
 
 
 def check_motion(state: WindowState) -> tuple[WindowState, bool]:
-    """Check the agent's motion against the rates of path lengths: before any birth a wrong start is corrected, later
-    the odds of being lost are updated; also returns whether the start was corrected."""
+    """Recovery from a wrong start, which before any birth a check of the motion against the rates of path lengths
+    corrects; later the same updates the odds of being lost. Also returns whether the start was corrected."""
     if not motion_agreement.is_checked(state):
         return state, False
     if len(state.landmarks.ident):
