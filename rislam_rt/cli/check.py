@@ -31,7 +31,7 @@ def command(
     pipeline: Annotated[
         Path | None,
         typer.Option(metavar="PIPELINE", help="Whose radio and receiver the room is held against, and whose run has to "
-                     "fit it.", parser=pipeline_file, show_default=str(MAIN_JOB)),
+                     f"fit it; without it, those of {MAIN_JOB}.", parser=pipeline_file, show_default=False),
     ] = None,
     set_: Settings = None,
     picture: Annotated[
@@ -75,7 +75,7 @@ def command(
         looked = survey(checked, settings)
         named = names_schemes(spec, file, changed)
         if named or pipeline is not None:
-            findings += _run_errors(checked, spec, file, named=named)
+            findings += _run_errors(checked, spec, (str(scene_file(scene)), str(file)), changed, named=named)
         findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
         findings += late_path_warnings(looked, str(scene_file(scene)))
         findings += cancelled_return_warnings(looked, str(scene_file(scene)))
@@ -102,9 +102,12 @@ def _checked_scene(folder: Path, findings: "Sequence[Finding]") -> "Scene | None
     return None if any(finding.severity == "error" for finding in findings) else read_draft(folder).scene
 
 
-def _run_errors(scene: "Scene", spec: "PipelineSpec", file: Path, *, named: bool) -> "list[Finding]":
+def _run_errors(
+    scene: "Scene", spec: "PipelineSpec", files: tuple[str, str], changed: "Sequence[str]", *, named: bool
+) -> "list[Finding]":
     """Part of `rislam-rt check`: the error that `rislam-rt run` would end with at once, of a pipeline that does not fit
-    a scene, with its file as the place; `named`: whether the user named the schemes."""
+    a scene. Its place is one of the `files` of scene and pipeline, or `--set` for what is `changed` there; `named`:
+    whether the user named the schemes."""
     from rislam_rt.cli.run import panel_schemes, without_schemes
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import check_run
@@ -115,7 +118,10 @@ def _run_errors(scene: "Scene", spec: "PipelineSpec", file: Path, *, named: bool
     except ConfigError as error:
         field, _, told = str(error).partition(": ")
         message, _, mend = told.partition("; ")
-        return [error_at(str(file), field, message, mend)]
+        place = files[0] if field.startswith("ris.") else files[1]
+        if any(setting.partition("=")[0].strip() == field for setting in changed):
+            place = "--set"
+        return [error_at(place, field, message, mend)]
     return []
 
 

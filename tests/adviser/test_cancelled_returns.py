@@ -19,11 +19,11 @@ MIDDLE = 2.0
 
 
 def looked(off, heading=0.0, *changed):
-    """Survey of the empty box, its agent going along the walls, so far [m] off the middle between them."""
+    """Survey of the empty box, its agent going along the walls, so far [m], (15,), off the middle between them."""
     scene = load_scene(ROOT / "scenes" / "empty_box")
-    along = np.linspace(1.0, 1.6, 15)
+    along, across = np.linspace(1.0, 1.6, 15), MIDDLE + np.broadcast_to(off, 15)
     way = replace(
-        scene.agent[:15], position=np.column_stack([along, np.full(15, MIDDLE + off), np.full(15, 1.1)]),
+        scene.agent[:15], position=np.column_stack([along, across, np.full(15, 1.1)]),
         heading=np.full(15, heading),
     )  # fmt: skip
     settings = build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
@@ -48,7 +48,7 @@ def lines(found):
 def test_the_middle_between_two_walls_is_named_and_neither_is_heard():
     found = looked(0.0)
     (line,) = lines(found)
-    assert line.startswith("scene.toml: agent.trajectory: at 100% of the places")
+    assert line.startswith("scene.toml: agent.trajectory: at 100% of the places along the way")
     assert "('wall_y0' and 'wall_y4')" in line
     assert "at least 0.075 m off the middle" in line
     assert not len(heard_across(found))
@@ -62,6 +62,14 @@ def test_the_middle_between_two_walls_is_named_and_neither_is_heard():
 def test_elsewhere_they_are_heard(found):
     assert lines(found) == []
     assert len(heard_across(found))
+
+
+def test_who_starts_in_the_middle_or_crosses_it_is_not_warned():
+    assert lines(looked(np.linspace(0.0, 0.7, 15))) == []
+    assert lines(looked(np.linspace(-0.7, 0.7, 15))) == []
+    held = np.where(np.arange(15) < 3, 0.0, 0.3)
+    (line,) = lines(looked(held))
+    assert "at 20% of the places" in line
 
 
 def test_the_shipped_rooms_have_none():

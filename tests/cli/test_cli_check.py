@@ -1,8 +1,13 @@
 """`rislam-rt check` as an adviser: what it says, writes and refuses."""
 
 import json
+import re
+import shutil
+from pathlib import Path
 
 import pytest
+
+SCENES = Path(__file__).parents[2] / "scenes"
 
 
 @pytest.fixture
@@ -68,9 +73,14 @@ def test_what_keeps_a_pipeline_from_running_in_a_room_is_an_error_in_the_words_o
     found = json.loads((tmp_path / "c.json").read_text())
     assert (found["errors"], found["findings"][0]["field"]) == (1, "schemes")
     assert "advice" in found
-    assert told in check("empty_box", "--set", 'schemes=["optimized"]')[1]
+    assert f"error: --set: {told}\n" in check("empty_box", "--set", 'schemes=["optimized"]')[1]
     mine.write_text(f'name = "mine"\n{named}\n[budget]\nmeasure_s = 0.05\n')
     assert "mine.toml: budget: the four steps sum to 0.14 s; make them" in check("paper_room", "--pipeline", mine)[1]
+    room = tmp_path / "room"
+    shutil.copytree(SCENES / "paper_room", room)
+    scene = room / "scene.toml"
+    scene.write_text(re.sub(r"(?m)^levels = .*$", "levels = 3", scene.read_text()))
+    assert f"error: {scene}: ris.levels: 3 received" in check(room, "--pipeline", "trace_then_slam")[1]
 
 
 @pytest.mark.parametrize("words", [(), ("--pipeline", "trace_then_slam"), ("--set", "radio.reference_snr_db=3")])

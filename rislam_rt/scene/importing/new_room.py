@@ -109,7 +109,7 @@ def write_room(
         raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", mend)
     write_files(files, folder, overwrite=overwrite)
     return remarks + [
-        f"{f.field}: {f.message}; {f.mend} (--material NAME=itu:MATERIAL:THICKNESS_M, or thickness_m in scene.toml)"
+        f"{f.field}: {f.message}; {f.mend} (--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"
         for f in findings
         if ".material." in f.field
     ]

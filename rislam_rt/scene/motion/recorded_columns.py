@@ -67,6 +67,11 @@ def find_columns(header: Sequence[str], named: Mapping[str, str]) -> dict[str, P
     return found
 
 
+def has_unit(what: str, name: str) -> bool:
+    """Whether the name of a recording's column that holds one quantity says its unit."""
+    return _words(name)[-1] in UNITS.get(what, {})
+
+
 def few_names(header: Sequence[str]) -> str:
     """Names of a recording's columns for an error message, a dozen at most."""
     return ", ".join(f"'{name[:20]}'" for name in header[:12]) or "no columns"

@@ -11,7 +11,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.input_messages import counted, parse_number
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.recorded_columns import QUATERNION, few_names, find_columns
+from rislam_rt.scene.motion.recorded_columns import QUATERNION, few_names, find_columns, has_unit
 from rislam_rt.scene.schema import SMALLEST
 
 MAX_TIME = 1e11
@@ -28,8 +28,9 @@ start."""
 FASTEST_TURN = np.pi
 """Largest turn [rad] within a second of a heading that turns on: half a turn, a TurtleBot3 makes up to 2.84 rad. Of
 degrees 3.2 a second exceed it."""
-ALONG_WAY = 0.9
-"""Share of the way that headings point along from which on they are headings of that way, whatever their unit."""
+UNEXPLAINED = 0.5
+"""Share of what radians, and one heading all along, leave of the way unexplained: if degrees leave less than that, they
+are the way's headings."""
 SEPARATORS = {";": "semicolons", "\t": "tabs", " ": "blanks"}
 """What other separators of CSV files than commas are called."""
 COMMAS = "separate columns by commas, write decimals with a point"
@@ -96,7 +97,8 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
     if "heading" in table:
         heading = table["heading"]
-        _check_radians(heading, time, position, told=place["heading"].unit != 1.0)
+        if not has_unit("heading", header[place["heading"].column]):
+            _check_radians(heading, time, position)
         return RecordedPoses(time, position, wrap(heading) if np.abs(heading).max() > MAX_HEADING else heading)
     turned = all(part in table for part in QUATERNION)
     return RecordedPoses(time, position, _heading(np.column_stack([table[q] for q in QUATERNION])) if turned else None)
@@ -136,11 +138,10 @@ def _check_lengths(lines: Sequence[Sequence[str]]) -> None:
             raise Fault(what, COMMAS)
 
 
-def _check_radians(heading: Floats, time: Floats, position: Floats, *, told: bool) -> None:
-    """Check that the headings (K,) [rad] of recorded poses may be radians; they are where their column `told` that it
-    holds degrees."""
+def _check_radians(heading: Floats, time: Floats, position: Floats) -> None:
+    """Check that the headings (K,) [rad] of recorded poses, whose column has no unit in its name, may be radians."""
     largest = float(heading[np.argmax(np.abs(heading))])
-    why = "" if told or abs(largest) <= MAX_HEADING else _reason_for_degrees(heading, time, position)
+    why = "" if abs(largest) <= MAX_HEADING else _reason_for_degrees(heading, time, position)
     if why:
         mend = "call the column 'heading_deg' if these are degrees, or bring them to -pi to pi"
         raise Fault(f"a heading of {largest:.4g} rad in the trajectory, {why}", mend)
@@ -156,14 +157,14 @@ def _reason_for_degrees(heading: Floats, time: Floats, position: Floats) -> str:
         return f"and it begins at {heading[0]:.4g} rad"
     if step.max(initial=0.0) >= np.pi:
         pose = int(np.argmax(step >= np.pi))
-        return f"and {step[pose]:.4g} rad from pose {pose} to the next"
+        return f"and {step[pose]:.4g} rad from pose {pose} to the next, more than half a turn"
     if np.abs(turn).max() > FASTEST_TURN:
         pose = int(np.argmax(np.abs(turn) > FASTEST_TURN))
         return f"and {abs(turn[pose]):.4g} rad in the second after pose {pose}"
     way = x + 1j * y
-    length = max(float(np.abs(way).sum()), 1e-300)
-    as_radians, as_degrees = (abs(way @ np.exp(-1j * angle)) / length for angle in (heading, np.radians(heading)))
-    return "and as degrees they point along the way" if as_degrees > max(ALONG_WAY, as_radians) else ""
+    along = [abs(way @ np.exp(-1j * angle)) for angle in (heading, 0.0 * heading, np.radians(heading))]
+    radians, one_heading, degrees = np.abs(way).sum() * (1.0 + 1e-9) - np.array(along)  # of a straight way, rounding
+    return "and as degrees they point along the way" if degrees < UNEXPLAINED * min(radians, one_heading) else ""
 
 
 def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[float]:

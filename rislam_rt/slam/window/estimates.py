@@ -41,10 +41,11 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     by, further = np.eye(6, len(mean)), state.heave_uncertainty
     if ahead and state.heaves:  # the next step's heave is another one
         mean[2] -= state.window.heave[-1]
-        further = state.heave_variance
+        further = state.heave_variance or further
     elif state.heaves:  # what was heard tells of floor and heave together
-        slope, further = heave_now(state)
+        slope, own = heave_now(state)
         by[2] -= slope
+        further = own if state.window.heave_variance[-1] else own + further  # where it has ended, there may be one
     spread = by @ covariance @ by.T + by[:, :6] @ excess @ by[:, :6].T
     spread[:3, :3] += np.diag(state.shift**2)
     spread[2, 2] += further

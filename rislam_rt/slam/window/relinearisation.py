@@ -55,10 +55,7 @@ def relinearise(
     `predictions`, where they are known."""
     found = found or predictions(state, first)
     window, variance, heard = state.window, state.nuisance_variance, whitened(state, found)
-    weight = np.sqrt(trust(heard.left))[:, None, None]
-    parts = [weight * part for part in (heard.slopes, heard.turned, heard.left[..., None])]
-    flat = _side_by_side(heard.slot - first, window.num_poses - first, *parts)
-    product = _with_start(np.swapaxes(flat, 1, 2) @ flat, state, first, [2, -2])
+    product = _products(state, first, heard, heard.slopes, heard.turned, heard.left[..., None])
     one = attitude.marginalise(product, state.nuisance[first:], variance[first:])
     hessian, gradient, middle = (field.copy() for field in window.slots)
     hessian[first:], gradient[first:] = one.hessian, -one.slope
@@ -75,10 +72,7 @@ def levelled(state: WindowState, first: int, found: Predictions) -> tuple[Window
 def _levelled(state: WindowState, first: int, heard: Whitened) -> tuple[WindowState, Residuals]:
     """Level measurements by the attitudes that their whitened residuals tell."""
     of, sharper = heard.slot - first, state.log.sharper(heard.row)[..., None]
-    weight = np.sqrt(trust(heard.left))[:, None, None]
-    parts = [weight * part * sharper for part in (heard.turned, heard.left[..., None])]
-    own = _side_by_side(of, state.window.num_poses - first, *parts)
-    product = _with_start(np.swapaxes(own, 1, 2) @ own, state, first, [-2])
+    product = _products(state, first, heard, heard.turned * sharper, heard.left[..., None] * sharper)
     change = attitude.change(product, state.nuisance[first:], state.nuisance_variance[first:])
     left = heard.left - (heard.turned @ change[of][..., None])[..., 0]
     return level(state, first, change), Residuals(heard.row, heard.slot, left, heard.slopes, np.zeros(len(left)))
@@ -90,23 +84,30 @@ def heave_now(state: WindowState) -> tuple[Floats, float]:
     these."""
     state, last = state._replace(cycle=state.cycle - 1), state.window.num_poses - 1
     heard = whitened(state, predictions(state, last))
-    weight, axes = np.sqrt(trust(heard.left))[:, None, None], heard.turned.shape[2]
-    flat = weight * np.concatenate([heard.slopes, heard.turned], axis=2)
-    flat = flat.reshape(-1, flat.shape[2])
-    product = _with_start(np.pad(flat.T @ flat, (0, 1))[None], state, last, [2, -2])[0, :-1, :-1]
-    spread = np.linalg.inv(product[-axes:, -axes:] + np.diag(1.0 / state.nuisance_variance[-1]))
-    slope = spread[-1] @ product[-axes:, :-axes]
+    product = _products(state, last, heard, heard.slopes, heard.turned, heard.left[..., None])[0]
+    own = slice(-1 - heard.turned.shape[2], -1)
+    spread = np.linalg.inv(product[own, own] + np.diag(1.0 / state.nuisance_variance[-1]))
+    slope = spread[-1] @ product[own, : own.start]
     return np.concatenate([slope[:3], np.zeros(3), slope[3:]]), float(spread[-1, -1])
 
 
-def _with_start(product: Floats, state: WindowState, first: int, by: list[int]) -> Floats:
-    """Products (K, D, D) of slopes and residuals for the re-linearisation, with the start's height in those of the
-    run's first pose: floor and heave, whose columns are `by`, add up to what was told."""
+def _products(state: WindowState, first: int, heard: Whitened, *parts: Floats) -> Floats:
+    """Products (K, D, D) of slopes and residuals for the re-linearisation of the poses from `first` on: of `parts`
+    (A, 3, ...) side by side, by pose and features (if they count), by nuisances, and residuals.
+
+    The start's height joins those of the run's first pose: floor, if it counts, and heave add up to what was told.
+    """
+    weight = np.sqrt(trust(heard.left))[:, None, None]
+    weighed = [weight * part for part in parts]
+    flat = _side_by_side(heard.slot - first, state.window.num_poses - first, *weighed)
+    product = np.asarray(np.swapaxes(flat, 1, 2) @ flat)
     if first or state.window.num_poses <= state.cycle or not state.heaves:
         return product
     row = np.zeros(product.shape[1])
     height, std = state.start_height
-    row[by], row[-1] = 1.0, height - poses(state.window)[0, 2]
+    row[-2:] = 1.0, height - poses(state.window)[0, 2]
+    if len(parts) > 2:
+        row[2] = 1.0
     product[0] += np.outer(row, row) / (std**2 + TOLD**2)
     return product
 

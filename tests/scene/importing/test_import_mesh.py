@@ -149,7 +149,7 @@ def test_an_import_remarks_on_a_pane_of_half_a_wave(node_file: Path, carrier_ghz
     _, remarks = imported(node_file, materials=glass, carrier_ghz=carrier_ghz)
     found = [remark for remark in remarks if "and 1 more): 6 mm of 'glass' reflect 0.04" in remark]
     assert len(found) == faint
-    mend = "(--material NAME=itu:MATERIAL:THICKNESS_M, or thickness_m in scene.toml)"
+    mend = "(--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"
     assert all(remark.endswith(mend) for remark in found)
 
 

@@ -110,6 +110,27 @@ def test_degrees_that_are_called_radians_are_refused(degrees: np.ndarray, step: 
     np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * np.radians(degrees)), atol=1e-9)
 
 
+@pytest.mark.parametrize("turned_out", [0.0, 0.01, 0.05])
+def test_who_turns_on_the_spot_and_then_goes_straight_is_believed(turned_out: float) -> None:
+    """On a straight way headings that stay, read as degrees, point along it as well as any one heading does."""
+    heading = turning(1.0, 8.0 * np.pi, 0.1)
+    noise = turned_out * np.random.default_rng(1).standard_normal(len(heading))
+    moves = np.arange(len(heading)) > len(heading) - 40
+    rows = "".join(
+        f"{0.1 * k},{0.03 * moves[:k].sum()},1,1,{heading[k] + noise[k]}\n" for k in range(len(heading))
+    )  # fmt: skip
+    found = parse_csv(f"t,x,y,z,yaw\n{rows}".encode(), {}).heading
+    assert found is not None
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * (heading + noise)), atol=1e-12)
+
+
+def test_a_column_that_says_its_unit_is_not_doubted() -> None:
+    degrees = turning(1.0, 90.0, 0.1)
+    found = parse_csv(recording("yaw_rad", degrees, 0.1, np.radians(degrees)), {}).heading
+    assert found is not None
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * degrees), atol=1e-9)
+
+
 def test_headings_without_measure_are_refused_in_one_line() -> None:
     with pytest.raises(
         Fault, match=r"a heading of 1e\+308 rad in the trajectory, and 1e\+11 rad from pose 0 to the next"

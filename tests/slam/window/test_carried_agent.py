@@ -14,8 +14,9 @@ from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.window import estimates
 from rislam_rt.slam.window.relinearisation import heave_now, predictions, relinearise, trust, whitened
-from rislam_rt.slam.window.smoother import window_gaussian
+from rislam_rt.slam.window.smoother import heave, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, POSE
 
 ROOM, COUNT, DT = Path(__file__).parents[3] / "scenes" / "paper_room", 90, 0.1
@@ -59,6 +60,18 @@ def test_a_bob_is_followed_above_a_level_floor(phase):
     assert np.sqrt(np.mean(error[40:] ** 2)) < 0.25 * bob / np.sqrt(2.0)
     assert np.sqrt(np.mean((slam.smoothed(state)[:, 2] - place[:, 2]) ** 2)) < 0.25 * bob / np.sqrt(2.0)
     assert np.mean(error[40:] ** 2 / std[40:] ** 2) < 4.0  # nearly one draw of one number: 95 % are below
+
+
+def test_where_a_bob_has_ended_there_may_be_one():
+    """In the cycles after, while the window still holds a heave; and in the next one, ahead."""
+    place, velocity = course(0.012 * np.sin(STEP * TIME), 0.012 * STEP * np.cos(STEP * TIME))
+    *_, state = carried(place, velocity, 1)
+    variance = state.window.heave_variance.copy()
+    variance[-1] = 0.0
+    ended = state._replace(window=state.window._replace(heave_variance=variance), heave_levels=heave.first_levels())
+    assert ended.heave_variance == 0.0
+    for ahead in (0.0, DT):
+        assert estimates.estimate(ended, CONFIG, ahead).covariance[2, 2] > ended.heave_uncertainty > 0.0
 
 
 def test_wheels_have_no_heave():
