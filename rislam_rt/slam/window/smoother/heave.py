@@ -44,16 +44,21 @@ def at_start(up: float, std: float) -> tuple[float, float, Floats]:
     and the variance of both.
     """
     level = first_levels()
-    density, spread = scipy.stats.norm.pdf, np.sqrt(std**2 + CONSTANTS.liveliest * HEAVES[1:])
-    bobs = CONSTANTS.upright * level[1:] * density(up, scale=spread)
-    climbs = (1.0 - CONSTANTS.upright) * level[0] * density(up, scale=np.hypot(std, CONSTANTS.walk))
+    spread = np.sqrt(std**2 + CONSTANTS.liveliest * HEAVES[1:])
+    bobs = CONSTANTS.upright * level[1:] * _density(up, spread)
+    climbs = (1.0 - CONSTANTS.upright) * level[0] * _density(up, np.hypot(std, CONSTANTS.walk))
     # an uneven floor's accelerations give as much in a second
-    rests = CONSTANTS.upright * level[0] * density(up, scale=max(std, CONSTANTS.level))
+    rests = CONSTANTS.upright * level[0] * _density(up, max(std, CONSTANTS.level))
     if max(climbs, rests) > bobs.sum():
         return up, std, level
     levels = np.append(climbs, bobs) / (climbs + bobs.sum())
     share = float(levels[0])
     return share * up, float(np.sqrt(std**2 + share * (1.0 - share) * up**2)), levels
+
+
+def _density(value: float, std: Floats | float) -> Floats:
+    """Density of a centred normal variable of deviations (L,) at a value, but for a common factor."""
+    return np.asarray(np.exp(-0.5 * (value / std) ** 2) / std)
 
 
 def window_levels(information: Floats, slope: Floats, rises: Floats) -> Floats:
