@@ -49,7 +49,7 @@ def carried(place, velocity, seed):
     return error, std, state
 
 
-@pytest.mark.parametrize("phase", [0.0, 1.0, 1.5, 4.5])
+@pytest.mark.parametrize("phase", [0.0, *(pytest.param(x, marks=pytest.mark.slow) for x in (1.0, 1.5)), 4.5])
 def test_a_bob_is_followed_above_a_level_floor(phase):
     """Wherever in its step the walker is at the start: told that it rises, stands, or sinks."""
     bob = 0.012

@@ -61,13 +61,16 @@ def log_unheard(
     gap = scene.sensor.nearest(log.seen[:, 0] - length[:, slot])
     wall, heard = (np.abs(gap) < near[:, :1]).nonzero()
     off, spacing = log.seen[heard, 1:] - ray[wall, slot[heard], :2], scene.radio.array.spacing
-    off -= np.where(log.mirrored(heard, spacing), np.round(off * spacing) / spacing, 0.0)
-    off = (rotation_z(ends.heading)[:, :2, :2][slot[heard]] @ off[..., None])[..., 0]
-    inside = (np.abs(off) < near[wall, 1:]).all(axis=1)
+    twofold = log.mirrored(np.arange(len(log.cycle)), spacing)[heard]
+    off[twofold] -= np.round(off[twofold] * spacing) / spacing
+    (cos, sin), (x, y) = (side(ends.heading)[slot[heard]] for side in (np.cos, np.sin)), off.T
+    off = np.abs(np.stack([cos * x - sin * y, sin * x + cos * y], axis=1))
+    inside = (off[:, 0] < near[wall, 1]) & (off[:, 1] < near[wall, 2])
+    wall, heard, off = wall[inside], heard[inside], off[inside]
     present, itself = np.zeros((2, *length.shape), dtype=np.bool_)
-    present[wall[inside], slot[heard[inside]]] = True
-    fits = inside & (np.abs(gap[wall, heard]) < exact[wall, 0] + CONSTANTS.fit * log.std[heard, 0])
-    fits &= (np.abs(off) < exact[wall, 1:] + CONSTANTS.fit * log.std[heard, 1:]).all(axis=1)
+    present[wall, slot[heard]] = True
+    left = np.concatenate([np.abs(gap[wall, heard])[:, None], off], axis=1)
+    fits = (left < exact[wall] + CONSTANTS.fit * log.std[heard]).all(axis=1)
     itself[wall[fits], slot[heard[fits]]] = True
     # no elevation is known to less than `STEP`
     rise, std = out[..., 2] / length, np.sqrt(spread[rows, 2, 2])[:, None] / length + STEP

@@ -143,7 +143,7 @@ def test_a_wall_that_leans_out_is_found_by_what_comes_down_from_the_ceiling() ->
     assert angle.min(axis=1).max() < 10.0
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_beam_before_known_things_is_found_by_what_comes_over_the_ceiling(seed: int) -> None:
     """A beam hangs 0.7 m down from the ceiling before a wall and three spheres, and begins 2 m on: it is never heard by
     itself, and they are known when the return over ceiling and beam begins."""

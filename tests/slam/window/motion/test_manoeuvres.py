@@ -174,7 +174,7 @@ def test_a_climb_for_one_cycle_that_the_steps_contradict_leaves_no_height_open(m
     assert np.sqrt(slam.estimate(state, CONFIG).covariance[2, 2] - state.heave_uncertainty) < 1e-3
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(x, marks=pytest.mark.slow) for x in (1, 2))])
 def test_who_takes_the_stairs_is_followed(seed):
     """From a level floor to 0.34 m/s upwards within half a second, as the ceiling is known."""
     climb = np.clip(0.068 * (np.arange(COUNT) - 15), 0.0, 0.34)
@@ -188,7 +188,7 @@ def test_who_takes_the_stairs_is_followed(seed):
     assert np.abs(off[-3:, 2]).max() < 5e-3
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(x, marks=pytest.mark.slow) for x in (1, 2))])
 def test_a_climb_that_one_return_tells_of_is_no_pull(seed):
     """At 0.1 m/s after half a second, where the ceiling's own return alone tells of it: what grows from cycle to cycle
     was held for a neighbour's pull, until its variance let the floor be level."""
@@ -226,7 +226,7 @@ def test_steady_motion_is_no_manoeuvre(dark, monkeypatch):
     assert max(odds for odds, _ in found) < 0.0
 
 
-@pytest.mark.parametrize("seed", [0, 6, 7])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(x, marks=pytest.mark.slow) for x in (6, 7))])
 def test_who_takes_off_where_the_map_knows_the_height_is_followed(seed):
     """At 0.8 m/s^2 from rest, straight up: what the map explains follows the climb, and the tracks that are left are
     those that keep their lengths, as what goes over floor and ceiling does."""
