@@ -18,6 +18,7 @@ from rislam_rt.slam.window.relinearisation import heave_now
 from rislam_rt.slam.window.ris_candidate import find_candidate
 from rislam_rt.slam.window.smoother import heave, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.start_frame import present_in_room
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -28,9 +29,9 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
     unknown = [panel for panel, row in enumerate(state.landmarks.panels) if row < 0]
     if state.scene.ris is None or not unknown:
         return ahead
-    mean = window_gaussian.mean_now(state.window)
+    mean, _, landmarks = _present(state, *window_gaussian.now(state.window))
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-    found = [find_candidate(state.tracks, state.landmarks, mean, state.cycle - 1, poses, panel) for panel in unknown]
+    found = [find_candidate(state.tracks, landmarks, mean, state.cycle - 1, poses, panel) for panel in unknown]
     return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
 
 
@@ -46,6 +47,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         slope, own = heave_now(state)
         by[2] -= slope
         further = own if state.window.heave_variance[-1] else own + further  # where it has ended, there may be one
+    mean, covariance, landmarks = _present(state, mean, covariance)
     spread = by @ covariance @ by.T + by[:, :6] @ excess @ by[:, :6].T
     spread[:3, :3] += np.diag(state.shift**2)
     spread[2, 2] += further
@@ -58,8 +60,14 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         spread,
         position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.scene.body,
-        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], state.landmarks, state.shift, mean[:3]),
+        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], landmarks, state.shift, mean[:3]),
     )
+
+
+def _present(state: WindowState, mean: Floats, covariance: Floats) -> tuple[Floats, Floats, WindowTable]:
+    """Mean (7 + 3F,) and covariance of the window filter's present in the room, for estimates, and its landmark table
+    there."""
+    return present_in_room(state.frame, state.window, state.landmarks, mean, covariance)
 
 
 def shift_covariance(features: Floats, landmarks: WindowTable, shift: Floats) -> Floats:
@@ -85,16 +93,17 @@ def revisit(
     the start's. What is measured tells of the start then, so that its error stands within the Gaussian.
     """
     scene = state.scene
-    fresh = init(start, scene.body, scene.ris, scene.sensor, config, rng=rng)
-    mean, covariance = window_gaussian.now(state.window)
+    fresh = init(replace(start, heading_std=0.0), scene.body, scene.ris, scene.sensor, config, rng=rng)
+    mean, covariance, earlier = _present(state, *window_gaussian.now(state.window))
     features = mean[HEAD:].reshape(-1, 3)
-    spread = covariance[HEAD:, HEAD:] + shift_covariance(features, state.landmarks, state.shift)
+    spread = covariance[HEAD:, HEAD:] + shift_covariance(features, earlier, state.shift)
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
+    std[6] = max(std[6], start.heading_std * (config.heading == "estimated"))
     velocity, turns = fresh.window.head[3:6], fresh.window.turns
     window = window_gaussian.begin_with(start.position, velocity, std, mean[HEAD:], spread, turns=turns)
     height = np.array([start.position[2], fresh.shift[2]])
     window = heave.with_heave(window, fresh.heave_variance, height)
-    landmarks = state.landmarks._replace(hidden=np.zeros(state.landmarks.hidden.shape))
+    landmarks = earlier._replace(hidden=np.zeros(earlier.hidden.shape))
     return fresh._replace(window=window, landmarks=landmarks, shift=np.zeros(3), start_height=height)
 
 

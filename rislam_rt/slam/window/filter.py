@@ -40,6 +40,7 @@ from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import CLIMBED, LASTED, LATELY, REFRESH
+from rislam_rt.slam.window.start_frame import in_room, no_frame, settled, turned_with, with_velocity_turned
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -50,14 +51,17 @@ def init(
     """State of the window filter before the first cycle: one pose at the start prior, and an empty map."""
     free = np.array([1.0, 1.0, float(config.height == "estimated")])
     offset = start.heading_std if config.heading == "estimated" else 0.0
-    turns = config.heading != "known"
-    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [offset]])
+    turns, turned = config.heading != "known", offset > 0.0 and config.filter == "window"
+    std = np.concatenate([np.full(3, 1e-5), start.velocity_std * free, [0.0 if turned else offset]])
     velocity, heave_levels = start.velocity.copy(), heave.first_levels()
     if config.filter == "window" and config.motion == "learnt" and config.use_vt:
         velocity[2], std[5], heave_levels = heave.at_start(float(velocity[2]), float(std[5]))
     height = np.array([start.position[2], 0.0])
     window = window_gaussian.begin(start.position, velocity, std, turns=turns)
     window = heave.with_heave(window, heave.variance(heave_levels), height)
+    frame = no_frame(start)
+    if turned:
+        window, frame = with_velocity_turned(window, start), turned_with(start)
     scene = KnownEnvironment(body, sensor.radio, sensor, ris, config.max_bounces, config.use_vt)
     # what turns at all does so by ten times what a random walk of the heading tells in a cycle
     lively = (config.sigma_a, 0.0, *((10.0 * config.turn_std,) if turns else ()))
@@ -68,7 +72,7 @@ def init(
         motion_mode, motion_mode, True, True, float(scipy.special.logit(CONSTANTS.stay)),
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
         attitude.first_levels(compass=not turns), heave_levels, height,
-        start.position_std * free, scene, CONSTANTS.log_lost, False, 0.0,
+        start.position_std * free, frame, scene, CONSTANTS.log_lost, False, 0.0,
         (None,), np.zeros((0, 3)),
     )  # fmt: skip
 
@@ -133,6 +137,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         told_of_first = motion_learning.likelihoods(window, 1, motion_learning.vertical_information(window))[:, 0]
         motion_mode = motion.forward(motion_mode, told_of_first, CONSTANTS.stay)
         passed = np.concatenate([passed, window_gaussian.poses(window)[:1, :3]])
+        state = state._replace(frame=settled(state.frame, window))
         window, headings = window_gaussian.slide(window), headings[1:]
         rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)
@@ -153,7 +158,8 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
 def smoothed(state: WindowState) -> Floats:
     """Smoothed positions (K, 3) [m] by the window filter in all cycles so far, each from a window's length of later
     cycles, fewer for the last ones."""
-    return np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
+    places = np.concatenate([state.passed, window_gaussian.poses(state.window)[:, :3]])
+    return in_room(state.frame, state.window, places)
 
 
 def _associate_over_motions(

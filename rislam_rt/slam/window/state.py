@@ -14,6 +14,7 @@ from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.smoother import attitude, heave
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import STILL
+from rislam_rt.slam.window.start_frame import StartFrame
 from rislam_rt.slam.window.tracks import WindowTracks
 
 
@@ -61,6 +62,8 @@ class WindowState(NamedTuple):
     """(2,) [m] height that was told of the start, and its standard deviation within the Gaussian."""
     shift: Floats
     """(3,) [m] standard deviation of the start's position, an error that no measurement tells."""
+    frame: StartFrame
+    """Frame of the poses and the map, which may be turned with the start (see `start_frame`)."""
     scene: KnownEnvironment
     """What the filter is told beforehand: body, radio, sensor, panels."""
     lost_log_odds: float

@@ -41,6 +41,7 @@ from rislam_rt.slam.window.hypotheses.path_feasibility import log_possible
 from rislam_rt.slam.window.hypotheses.point_identification import identify
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.hypotheses.unheard_returns import log_unheard
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.solver_limits import CERTAIN
@@ -233,7 +234,7 @@ def decide_tracks(
             TrackDecision(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
-                _holds(table, fits.place[at], summary.middle, known, landmarks.walls, at),
+                _holds(table, fits.place[at], summary.middle, known, landmarks, at),
                 float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]),
             )
         )  # fmt: skip
@@ -279,7 +280,7 @@ def _alike(table: Hypotheses, fits: Fits, own: Integers, at: int) -> Booleans:
 
 
 def _holds(
-    table: Hypotheses, place: Floats, middle: Floats, known: KnownFeatures, walls: Integers, at: int
+    table: Hypotheses, place: Floats, middle: Floats, known: KnownFeatures, landmarks: WindowTable, at: int
 ) -> DirectionPriors:
     """Direction priors of a new wall at `place` (3,) by hypothesis `at`: where it is met in both orders with an upright
     or level wall, none that it is at right angles to that or any other."""
@@ -287,7 +288,9 @@ def _holds(
         return no_holds()
     out = _directions(known.place[table.known[at]] - middle) if table.kind[at] == BOTH_WAYS else None
     acute = out if out is not None and _is_aligned(out) else None
-    return direction_beliefs(place, middle, known.place[walls], acute)
+    found, walls = direction_beliefs(place, middle, known.place[landmarks.walls], acute), landmarks.walls
+    other = np.append(walls, -1)[found.other]
+    return found._replace(other=other, base=np.concatenate([landmarks.anchor, np.zeros((1, 3))])[other])
 
 
 def _cautious(oblique: Booleans, own: Integers, evidence: Floats, same: Booleans, at: int) -> int:

@@ -11,6 +11,7 @@ from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.start_frame import settled, without_velocity
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -33,7 +34,8 @@ def check_motion(state: WindowState) -> tuple[WindowState, bool]:
         return state, False
     state = state._replace(start_was_wrong=True)
     if not told.is_compass:
-        return state._replace(window=divergence_monitor.with_velocity(state.window, told.velocity, told.std)), True
+        window = divergence_monitor.with_velocity(state.window, told.velocity, told.std)
+        return state._replace(window=window, frame=without_velocity(state.frame)), True
     # a compass that was wrong is not trusted: its offset is estimated from now on
     window = divergence_monitor.with_free_compass(state.window, told.std / float(np.linalg.norm(told.velocity)))
     state = state._replace(heading=state.heading + told.turn, turned=state.turned + told.turn)
@@ -66,6 +68,7 @@ def restart(state: WindowState) -> WindowState:
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
+        frame=settled(state.frame, window),
     )  # fmt: skip
 
 
@@ -77,5 +80,5 @@ def after_jump(state: WindowState, by: Floats) -> WindowState:
         window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level,
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], codes=state.codes[-1:],
-        passed=passed, lost_log_odds=0.0,
+        passed=passed, lost_log_odds=0.0, frame=settled(state.frame, state.window),
     )  # fmt: skip

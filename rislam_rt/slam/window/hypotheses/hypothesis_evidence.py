@@ -228,26 +228,29 @@ LEVEL_RISE = 0.9
 def direction_beliefs(place: Floats, middle: Floats, others: Floats, acute: Floats | None = None) -> DirectionPriors:
     """Direction priors of a hypothesis's wall, the image `place` (3,) [m] of `middle` (3,), whose images in known walls
     are `others` (W, 3): upright, at right angles to one of them, or level. To an upright or level wall that it is met
-    with in both orders, and that lies in direction `acute` (3,), it is at no right angle."""
+    with in both orders, and that lies in direction `acute` (3,), it is at no right angle. The other wall is a row of
+    `others`, of no `base` as yet."""
     span = place - middle
     reach = max(float(np.linalg.norm(span)), 0.1)
     rise, std = abs(span[2]) / reach, CONSTANTS.lean * reach
     axes: list[Floats] = []
     log_odds: list[float] = []
+    to = AXES[:0, 0].astype(np.int64)
     if rise > LEVEL_RISE:
         axes += [AXES[0], AXES[1]] if acute is None else _along(acute)
         log_odds += len(axes) * [CONSTANTS.log_upright + np.log(reach)]
     elif rise < UPRIGHT_RISE and (acute is None or abs(acute[2]) < UPRIGHT_RISE):
         axes.append(AXES[2])
         log_odds.append(CONSTANTS.log_upright + np.log(reach))
-        square = _square_axes(span[None], others - middle)[1] if acute is None else AXES[:0]
-        axes += list(square)
-        log_odds += [float(_log_square(np.asarray(reach)))] * len(square)
+        if acute is None:
+            _, square, to = _square_axes(span[None], others - middle)
+            axes += list(square)
+            log_odds += [float(_log_square(np.asarray(reach)))] * len(square)
     count = len(axes)
-    axis = np.array(axes).reshape(count, 3)
+    other = np.append(np.full(count - len(to), -1), to)
     return DirectionPriors(
-        np.zeros(count, dtype=np.int64), axis, axis @ middle, np.full(count, std), np.array(log_odds),
-        np.full(count, 0.5),
+        np.zeros(count, dtype=np.int64), other, np.array(axes).reshape(count, 3), np.tile(middle, (count, 1)),
+        np.zeros((count, 3)), np.full(count, std), np.array(log_odds), np.full(count, 0.5),
     )  # fmt: skip
 
 
@@ -258,19 +261,22 @@ def _along(acute: Floats) -> list[Floats]:
     return [np.array([-acute[1], acute[0], 0.0]) / flat] if flat > UPRIGHT_RISE else []
 
 
-def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats]:
+def _square_axes(span: Floats, others: Floats) -> tuple[Integers, Floats, Integers]:
     """Upright walls, of N with images at `span` (N, 3), that are nearly parallel or at right angles to one of `others`
-    (W, 3): rows (A,), and the axes (A, 3) along which their images do not lie if they exactly are."""
-    flat = others[np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)]
+    (W, 3): rows (A,), the axes (A, 3) along which their images do not lie if they exactly are, and rows (A,) of these
+    others."""
+    upright = (np.linalg.norm(others[:, :2], axis=1) > 0.95 * np.linalg.norm(others, axis=1)).nonzero()[0]
+    flat = others[upright]
     if not len(flat):
-        return np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        return upright, np.zeros((0, 3)), upright
     own = np.arctan2(span[:, 1], span[:, 0])
     off = np.arctan2(flat[:, 1], flat[:, 0]) - own[:, None]
     off = (off + np.pi / 4.0) % (np.pi / 2.0) - np.pi / 4.0
-    off = off[np.arange(len(own)), np.argmin(np.abs(off), axis=1)]
+    best = np.argmin(np.abs(off), axis=1)
+    off = off[np.arange(len(own)), best]
     rows = (np.abs(off) < 0.15).nonzero()[0]
     aim = own[rows] + off[rows]
-    return rows, np.stack([-np.sin(aim), np.cos(aim), np.zeros(len(aim))], axis=1)
+    return rows, np.stack([-np.sin(aim), np.cos(aim), np.zeros(len(aim))], axis=1), upright[best[rows]]
 
 
 def _log_square(reach: Floats) -> Floats:
@@ -335,7 +341,7 @@ def log_upright(
         held.covariance[rows] -= pull @ across
         held.log_odds[rows] = each[own, 0] - free[rows]
     rows = (upright & ~(pair & (turn[:, 0, 0] < 0.0))).nonzero()[0]
-    square, axis = _square_axes(span[rows], known.place[landmarks.walls] - summary.middle)
+    square, axis, _ = _square_axes(span[rows], known.place[landmarks.walls] - summary.middle)
     rows = rows[square]
     variance = np.vecdot(axis, (spread[rows] @ axis[..., None])[..., 0]) + noise[rows]
     each = log_right(_log_square(reach[rows]), np.vecdot(axis, span[rows]), variance)

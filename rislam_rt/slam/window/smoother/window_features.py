@@ -52,9 +52,9 @@ def drop_features(window: Window, keep: Booleans) -> Window:
     old = window.slots
     slots = Quadratic(old.hessian[:, rows[:, None], rows], old.gradient[:, rows], old.middle[:, rows])
     kept = np.concatenate([inside, np.arange(size, len(window.covariance))])
-    stay = keep[window.holds.feature]
-    holds = window.holds._replace(feature=(np.cumsum(keep) - 1)[window.holds.feature])
-    holds = DirectionPriors._make(field[stay] for field in holds)
+    stay, number = keep[window.holds.pair].all(axis=1), np.append(np.cumsum(keep) - 1, -1)
+    feature, other = number[window.holds.feature], number[window.holds.other]
+    holds = DirectionPriors._make(field[stay] for field in window.holds._replace(feature=feature, other=other))
     return window._replace(
         holds=holds,
         head=window.head[inside],

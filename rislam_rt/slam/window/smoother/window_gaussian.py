@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.window.smoother.attitude import marginalise
 from rislam_rt.slam.window.smoother.cholesky import inverse, solution
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
@@ -368,8 +368,8 @@ def _normal(window: Window) -> tuple[Floats, Floats]:
     gradient[HEAD:size] = slope[:, POSE:].sum(axis=0)
     hessian[:size, :size] += window.prior.hessian
     gradient[:size] += window.prior.slope(window.head)
-    force, information = window.holds.pulls(window.features[window.holds.feature])
-    own = HEAD + 3 * window.holds.feature[:, None] + np.arange(3)
+    force, information = window.holds.pulls(window.features)
+    own = _rows(window.holds)
     np.add.at(hessian, (own[:, :, None], own[:, None, :]), information)
     np.add.at(gradient, own, force)
     at = np.arange(size, len(hessian))
@@ -390,6 +390,11 @@ def weigh_holds(window: Window) -> Window:
     holds = window.holds
     if not len(holds.feature):
         return window
-    rows = HEAD + 3 * holds.feature[:, None] + np.arange(3)
+    rows = _rows(holds)
     blocks = window.covariance[rows[:, :, None], rows[:, None, :]]
-    return window._replace(holds=holds.weighed(window.features[holds.feature], blocks))
+    return window._replace(holds=holds.weighed(window.features, blocks))
+
+
+def _rows(holds: DirectionPriors) -> Integers:
+    """Rows (N, 6) of the head at which stand the features that direction priors are about."""
+    return np.asarray(HEAD + 3 * holds.pair[:, :, None] + np.arange(3)).reshape(-1, 6)
