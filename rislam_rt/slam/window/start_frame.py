@@ -113,8 +113,14 @@ def present_in_room(
         spin @ (spots[0] - frame.pivot), spin @ velocity, [1.0],
         (moved - np.where(landmarks.is_wall[:, None], held, 0.0)).ravel(),
     ])  # fmt: skip
+    # to second order an arm is the shorter, the more it is turned, either way: by 1 - cos, of mean square 3/4 std^4
+    point = ~landmarks.is_wall[:, None]
+    bow = np.concatenate(
+        [spots[0] - frame.pivot, velocity, [0.0], np.where(point, spots[1:] - frame.pivot, 0.0).ravel()]
+    )
+    bow[[2, 5]], bow[HEAD + 2 :: 3] = 0.0, 0.0
     mean[:3], mean[3:6], mean[6], mean[HEAD:] = spots[0], velocity, mean[6] + angle, spots[1:].ravel()
-    wide = by @ covariance @ by.T + variance * np.outer(slope, slope)
+    wide = by @ covariance @ by.T + variance * np.outer(slope, slope) + 0.75 * variance**2 * np.outer(bow, bow)
     if frame.gain.any():  # what the first velocity tells of the turn errs with all else
         shared = np.outer(by @ (_first_velocity_covariance(window) @ frame.gain), slope)
         wide += shared + shared.T
