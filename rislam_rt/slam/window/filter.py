@@ -40,7 +40,7 @@ from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import CLIMBED, LASTED, LATELY, REFRESH
-from rislam_rt.slam.window.start_frame import in_room, no_frame, settled, turned_with, with_velocity_turned
+from rislam_rt.slam.window.start_frame import in_room, no_frame, turned_with, with_turn_fixed, with_velocity_turned
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -137,7 +137,7 @@ def _move(state: WindowState, dt: float, heading: float) -> WindowState:
         told_of_first = motion_learning.likelihoods(window, 1, motion_learning.vertical_information(window))[:, 0]
         motion_mode = motion.forward(motion_mode, told_of_first, CONSTANTS.stay)
         passed = np.concatenate([passed, window_gaussian.poses(window)[:1, :3]])
-        state = state._replace(frame=settled(state.frame, window))
+        state = state._replace(frame=with_turn_fixed(state.frame, window))
         window, headings = window_gaussian.slide(window), headings[1:]
         rotation, told = rotation[1:], told[1:]
     level = state.level @ motion.transition(CONSTANTS.stay)

@@ -66,7 +66,7 @@ def without_velocity(frame: StartFrame) -> StartFrame:
     return frame._replace(gain=np.zeros(2), turn=0.0, variance=frame.variance / max(1.0 - share, 1e-9))
 
 
-def settled(frame: StartFrame, window: Window) -> StartFrame:
+def with_turn_fixed(frame: StartFrame, window: Window) -> StartFrame:
     """Start frame as the window's first velocity tells of it, before its first pose leaves."""
     if not frame.gain.any():
         return frame

@@ -117,7 +117,7 @@ def test_what_the_velocity_tells_of_the_turn_is_that_of_the_joint_gaussian():
     wrong = start_frame.without_velocity(frame)
     assert wrong.variance == pytest.approx(0.1**2, rel=1e-9)
     assert start_frame.turn_now(wrong, window)[0] == 0.0
-    kept = start_frame.settled(frame, window)
+    kept = start_frame.with_turn_fixed(frame, window)
     assert (start_frame.turn_now(kept, window), kept.gain.any()) == (start_frame.turn_now(frame, window), False)
 
 

@@ -11,7 +11,7 @@ from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
-from rislam_rt.slam.window.start_frame import settled, without_velocity
+from rislam_rt.slam.window.start_frame import with_turn_fixed, without_velocity
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -68,7 +68,7 @@ def restart(state: WindowState) -> WindowState:
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], shift=shift, lost_log_odds=0.0, start_was_wrong=False,
         codes=state.codes[-1:], passed=np.concatenate([state.passed, window_gaussian.poses(window)[:-1, :3]]),
-        frame=settled(state.frame, window),
+        frame=with_turn_fixed(state.frame, window),
     )  # fmt: skip
 
 
@@ -80,5 +80,5 @@ def after_jump(state: WindowState, by: Floats) -> WindowState:
         window=divergence_monitor.after_jump(state.window, by), motion_mode=state.level,
         heading=state.heading[-1:], attitude=state.attitude[-1:],
         attitude_information=state.attitude_information[-1:], codes=state.codes[-1:],
-        passed=passed, lost_log_odds=0.0, frame=settled(state.frame, state.window),
+        passed=passed, lost_log_odds=0.0, frame=with_turn_fixed(state.frame, state.window),
     )  # fmt: skip

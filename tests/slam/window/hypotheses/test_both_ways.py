@@ -154,7 +154,8 @@ def test_what_is_met_in_both_orders_is_not_presumed_to_be_at_right_angles(turned
 
     def axes(at, new, old):
         known = SimpleNamespace(place=_image(flat @ old)[None])
-        return track_classification._holds(table, _image(flat @ new), MIDDLE, known, np.zeros(1, int), at).axis
+        landmarks = enter(empty_table(1), True, MIDDLE, 10, 5.0, unknown(1, 1))
+        return track_classification._holds(table, _image(flat @ new), MIDDLE, known, landmarks, at).axis
 
     sloping, upright = _ceiling(0.08), np.array([-1.0, 2.0, 0.0])
     assert len(axes(0, sloping, WALL_AT)) == 2

@@ -21,8 +21,7 @@ def _sighting(rng):
 def _filtered(sightings, start, std, keep, turned):
     """The window's answer, at most `keep` poses long."""
     window = window_gaussian.begin(start[:3], start[3:6], std)
-    nothing = DirectionPriors(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), *(np.zeros(0) for _ in range(4)))
-    window = window_features.add_feature(window, np.ones(3), nothing, ridge=1.0)
+    window = window_features.add_feature(window, np.ones(3), no_holds(), ridge=1.0)
     for cycle, (rows, value, weight) in enumerate(sightings):
         if cycle:
             while window.num_poses >= keep:
@@ -92,8 +91,8 @@ def test_a_belief_about_a_wall_gives_way_to_what_contradicts_it():
     rng = np.random.default_rng(4)
     window = window_gaussian.begin(np.zeros(3), np.zeros(3), np.full(7, 1e-3))
     hold = DirectionPriors(
-        np.zeros(1, dtype=np.int64), np.array([[0.0, 0.0, 1.0]]), np.zeros(1), np.full(1, 0.05),
-        np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
+        np.zeros(1, dtype=np.int64), np.full(1, -1), np.array([[0.0, 0.0, 1.0]]), np.zeros((1, 3)), np.zeros((1, 3)),
+        np.full(1, 0.05), np.array([np.log(9.0) + np.log(5.0)]), np.full(1, 0.5),
     )  # fmt: skip
     for truth, right in ((0.02, True), (0.6, False)):
         held = window_features.add_feature(window, np.array([5.0, 0.0, truth]) + 0.1 * rng.standard_normal(3), hold)
