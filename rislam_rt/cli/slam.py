@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 LONGEST_ARM = 2.0
 """Distance [m] of Tx and Rx from the agent's position above which a unit is wrong."""
+TURN_DEG = 360.0
+"""Largest start heading [degrees] of either sign, as `heading_deg` in a scene."""
 
 
 def command(
@@ -35,7 +37,17 @@ def command(
         str | None,
         typer.Option(metavar="X,Y,Z", help="Where the agent starts, in m; a NetCDF file brings its own."),
     ] = None,
-    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Its first velocity, in m/s.")] = "0,0,0",
+    velocity: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Its first velocity, in m/s; at rest if left out.")
+    ] = None,
+    heading: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEG",
+            help="Its first heading, in degrees from x towards y, where there is no compass; if left out, the "
+            "direction of --velocity, as well as that is known.",
+        ),
+    ] = None,
     tx: Annotated[
         str | None,
         typer.Option(metavar="X,Y,Z", help="Tx from the agent's position in m, x forward, y left, z up."),
@@ -52,8 +64,10 @@ def command(
     """Localise and map from measurements of your own: no scene is needed.
 
     The columns of a CSV file are listed in docs/own_measurements.md; delays are in seconds, angles of arrival as
-    direction cosines or in radians, body frame. How well the start is known is set by start.position_std_m and
-    start.velocity_std_m_s.
+    direction cosines or in radians, body frame. How well the start is known is set by start.position_std_m,
+    start.velocity_std_m_s and start.heading_std_deg (0: a heading that is given is exact; one taken from --velocity
+    has at least the deviation that the velocity's own gives its direction). Without a compass, a column heading_rad,
+    set slam.heading=estimated.
 
     A run's folder holds its measurements, too: with its config.toml they give the run's estimate again.
 
@@ -69,8 +83,12 @@ def command(
 
     spec = load_spec(config, set_ or ())
     stds = (spec.start.position_std_m, spec.start.velocity_std_m_s, float(np.deg2rad(spec.start.heading_std_deg)))
-    prior = None if start is None else _prior(start, velocity, stds)
+    prior = None if start is None else _prior(start, velocity or "0,0,0", stds, heading)
+    options = {"--start": start, "--velocity": velocity, "--heading": heading, "--tx": tx, "--rx": rx}
+    _check_no_second_start(measurements, options)
     inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
+    if prior is not None:
+        inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
     for line in input_warnings(inputs):
         warn(f"{measurements}: {line}")
     true = None if truth is None else _true_positions(truth, inputs.time + inputs.since)
@@ -85,17 +103,55 @@ def command(
     write_json(json, summary)
 
 
-def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "StartPrior":
-    """Start prior for `rislam-rt slam` from the options `--start` and `--velocity`, along which the heading is."""
+def _check_no_second_start(measurements: Path, options: dict[str, str | None]) -> None:
+    """Check that `rislam-rt slam` is not given by options what a NetCDF file of measurements brings: start, offsets."""
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.storage.netcdf import NETCDF
+
+    given = [option for option, value in options.items() if value is not None]
+    if given and measurements.suffix.lower() in NETCDF:
+        raise ConfigError(f"{', '.join(given)}: {measurements} brings its own start, Tx and Rx; leave it out")
+
+
+def _prior(start: str, velocity: str, stds: tuple[float, float, float], heading: str | None = None) -> "StartPrior":
+    """Start prior for `rislam-rt slam` from the options `--start`, `--velocity` and `--heading`; without a heading, it
+    is along the velocity."""
     import numpy as np
 
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.input_messages import parse_number
     from rislam_rt.slam import StartPrior
 
     first, speed = parse_point("--start", start), parse_point("--velocity", velocity)
     if np.linalg.norm(speed) > MAX_SPEED:
         warn(f"--velocity: {np.linalg.norm(speed):.3g} m/s; give metres a second")
-    heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
-    return StartPrior(first, speed, heading, *stds)
+    if heading is None:
+        return StartPrior(first, speed, float(np.arctan2(speed[1] + 0.0, speed[0] + 0.0)), *stds)
+    try:
+        degrees = parse_number(heading)
+    except ValueError:
+        degrees = np.nan
+    if not abs(degrees) <= TURN_DEG:
+        raise ConfigError(f"--heading: '{heading[:60]}' received; give degrees from -{TURN_DEG:g} to {TURN_DEG:g}")
+    return StartPrior(first, speed, float(np.deg2rad(degrees)), *stds)
+
+
+def _with_heading(inputs: "Inputs", heading: str | None, mode: str, measurements: Path) -> "Inputs":
+    """Inputs of `rislam-rt slam` with the start heading of the option `--heading`, which must not contradict a compass;
+    without either, the direction of the velocity and its deviation where the heading is estimated."""
+    import numpy as np
+
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.slam.start_prior import heading_from_velocity
+
+    compass = not np.isnan(inputs.heading).any()
+    if compass and heading is not None:
+        raise ConfigError(
+            f"--heading: {measurements} has a compass (heading_rad), whose first row is the start's; leave one out"
+        )
+    if compass or heading is not None or mode != "estimated":
+        return inputs
+    return inputs._replace(start=heading_from_velocity(inputs.start))
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
