@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,11 +12,9 @@ from rislam_rt.cli.verbosity import warn
 from rislam_rt.constants import MAX_SPEED
 
 if TYPE_CHECKING:
-    from rislam_rt.arrays import Floats
     from rislam_rt.model import Body
     from rislam_rt.pipeline.recordings.inputs import Inputs
     from rislam_rt.slam import StartPrior
-    from rislam_rt.studies.unseen import Answers
 
 
 LONGEST_ARM = 2.0
@@ -50,7 +48,10 @@ def command(
     ] = None,
     tx: Annotated[
         str | None,
-        typer.Option(metavar="X,Y,Z", help="Tx from the agent's position in m, x forward, y left, z up."),
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Tx from the agent's position in m, x forward, y left, z up; a NetCDF file brings its own.",
+        ),
     ] = None,
     rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
     truth: Annotated[
@@ -71,32 +72,36 @@ def command(
 
     A run's folder holds its measurements, too: with its config.toml they give the run's estimate again.
 
-    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --set radio.noise_psd=1e-12
+    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --tx 0.05,0,0 --rx -0.05,0,0 --set radio.noise_psd=1e-12
 
     Example: rislam-rt slam RUN/measurements_random.nc --config RUN/config.toml --truth RUN/truth.tum
     """
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.recordings.answer_files import answer_files, summarise_answers, true_positions
     from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
     from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.storage.files import write_all
 
     spec = load_spec(config, set_ or ())
     stds = (spec.start.position_std_m, spec.start.velocity_std_m_s, float(np.deg2rad(spec.start.heading_std_deg)))
     prior = None if start is None else _prior(start, velocity or "0,0,0", stds, heading)
     options = {"--start": start, "--velocity": velocity, "--heading": heading, "--tx": tx, "--rx": rx}
     _check_no_second_start(measurements, options)
-    inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
+    body = _body(tx, rx)
+    inputs = read_inputs(measurements, prior, build_radio(spec.radio), body)
     if prior is not None:
+        _check_body(measurements, body)
         inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
     for line in input_warnings(inputs):
         warn(f"{measurements}: {line}")
-    true = None if truth is None else _true_positions(truth, inputs.time + inputs.since)
+    true = None if truth is None else true_positions(truth, inputs.time + inputs.since)
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
     answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed))
-    summary = _summary(inputs, answers, true)
-    _write(_new_folder(folder), inputs, answers)  # another command may have filled it meanwhile
+    summary = summarise_answers(inputs, answers, true)
+    write_all(_new_folder(folder), answer_files(inputs, answers))  # another command may have filled it meanwhile
     for name, value in summary.items():
         typer.echo(f"{name}: {f'{value:.4g}' if isinstance(value, float) else value}")
     typer.echo(f"folder: {folder}")
@@ -172,30 +177,14 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
     return Body(*ends)
 
 
-def _true_positions(file: Path, cycles: "Floats") -> "Floats":
-    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM or CSV file of `--truth`, one at each of the cycles'
-    times (K,) [s]."""
-    import numpy as np
-
+def _check_body(measurements: Path, body: "Body | None") -> None:
+    """Check that `rislam-rt slam` is given the offsets of Tx and Rx with a table of measurements, which has none: a
+    baseline that is not the agent's own is an error of centimetres that no deviation shows."""
     from rislam_rt.errors import ConfigError
-    from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
 
-    try:
-        content = file.read_bytes()
-        time, position = (parse_csv(content, {}) if file.suffix.lower() == ".csv" else parse_tum(content))[:2]
-    except OSError as error:
-        raise ConfigError(f"--truth {file}: cannot be read ({error.strerror}); give a TUM or CSV file") from None
-    except Fault as fault:
-        raise ConfigError(fault.at(f"--truth {file}", "").line) from None
-    if len(position) != len(cycles):
-        raise ConfigError(f"--truth {file}: {len(position)} poses for {len(cycles)} cycles; give one a cycle")
-    apart = np.abs(time - cycles)
-    if len(cycles) > 1 and apart.max() > 0.5 * float(np.median(np.diff(cycles))):
-        pose = int(np.argmax(apart))
-        what = f"pose {pose} is at {time[pose]:.10g} s, its cycle at {cycles[pose]:.10g} s"
-        raise ConfigError(f"--truth {file}: {what}, more than half a cycle apart; give both by one clock")
-    return position
+    if body is None:
+        where = "a CSV file does not say where Tx and Rx sit on the agent"
+        raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
 
 
 def _new_folder(folder: Path) -> Path:
@@ -212,55 +201,3 @@ def _new_folder(folder: Path) -> Path:
         raise ConfigError(f"--out {folder}: exists and is not empty; give a new folder")
     check_writable(folder)
     return folder
-
-
-def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dict[str, Any]:
-    import numpy as np
-
-    from rislam_rt.pipeline.scores.loss_causes import LossTally, words_of_loss
-
-    last = answers.estimates[-1]
-    outcomes, tally = [str(info.outcome) for info in answers.infos], LossTally()
-    tally.add(inputs.time, outcomes, [getattr(info, "cause", 0) for info in answers.infos])
-    panels = 1 if inputs.panel is None else len(inputs.panel.panels)
-    found: dict[str, Any] = {
-        "cycles": len(inputs.time),
-        "components": sum(len(m) for m in inputs.measurements),
-        "ended": outcomes[-1],
-        "cycles_diverged": outcomes.count("diverged"),
-        **({"lost_because": words_of_loss(tally.scores(float(inputs.time[0])))} if tally.causes else {}),
-        "last_position_m": [round(float(value), 4) for value in last.position],
-        "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
-        "landmarks": int(np.sum(last.map.parent < 0)),
-        "walls": len(last.map.wall_offset),
-        "panel_found": all(last.map.panel_row(panel) >= 0 for panel in range(panels)),
-        "ms_a_cycle": 1000.0 * answers.seconds,
-    }
-    if true is not None:
-        error = np.array([one.position for one in answers.estimates]) - true
-        found["rmse_m"] = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
-    return found
-
-
-def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
-    """Write the results of `rislam-rt slam`: estimated trajectory as TUM and CSV, and the last map as JSON."""
-    from dataclasses import fields
-
-    import numpy as np
-
-    from rislam_rt.scene.write import tum_bytes
-    from rislam_rt.storage.files import csv_file, json_file, write_all
-    from rislam_rt.sweeps.cell_work import plain_result
-
-    position = np.array([one.position for one in answers.estimates])
-    heading = np.array([one.heading for one in answers.estimates])
-    head = ["time_s", "x_m", "y_m", "z_m", "std_x_m", "std_y_m", "std_z_m", "heading_rad", "components", "outcome"]
-    rows, times = [], inputs.time + inputs.since
-    for time, one, info, heard in zip(times, answers.estimates, answers.infos, inputs.measurements, strict=True):
-        std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
-        numbers = [*one.position, *std, one.heading]
-        rows.append([repr(float(time)), *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
-    last = answers.estimates[-1].map
-    files = {"estimate.tum": tum_bytes(times, position, heading), "estimate.csv": csv_file(head, rows)}
-    content = plain_result({f.name: value for f in fields(last) if (value := getattr(last, f.name)) is not None})
-    write_all(folder, files | {"map.json": json_file(content)})

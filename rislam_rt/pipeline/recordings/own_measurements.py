@@ -79,6 +79,8 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
         Prior of the first pose; a NetCDF file has its own, a CSV file needs it.
     radio
         Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
+    body
+        Offsets of Tx and Rx for a CSV file; None as in `inputs_of`.
 
     Raises
     ------
@@ -118,6 +120,16 @@ def inputs_of(
     table: Mapping[str, Any], start: StartPrior, radio: RadioConfig, body: Body | None = None, *, place: str = "table"
 ) -> Inputs:
     """Inputs of an estimator from a table of measurements, a row a component: a mapping or data frame with `COLUMNS`.
+
+    Parameters
+    ----------
+    start
+        Prior of the first pose; a column `heading_rad` takes the place of its heading.
+    radio
+        Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
+    body
+        Offsets of Tx and Rx; None is the paper's baseline, right for its agent alone: Rx at (0.0439, 0.0240, 0) m in
+        the body frame (x forward, y left, z up), 0.05 m off and 0.5 rad to the left, and Tx opposite.
 
     Raises
     ------
