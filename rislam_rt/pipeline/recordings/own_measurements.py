@@ -32,6 +32,9 @@ from rislam_rt.storage.netcdf import NETCDF, read_dataset
 
 LONGEST_STEP = 10.0
 """[s] Median time between cycles from which on the times are warned of, as milliseconds given as seconds would be."""
+LONGEST_STRIDE = 5.0
+"""[m] Way at the start's speed in a median time above `LONGEST_STEP` from which on the times are refused: an agent that
+goes across a room from one cycle to the next has its times in another unit."""
 SHORTEST_STEP = 1e-3
 """[s] Median time between cycles of one component each below which the times are warned of: each row has its own."""
 
@@ -134,7 +137,8 @@ def inputs_of(
     Raises
     ------
     ConfigError
-        A column is unknown, missing, or has a value of a wrong unit or range.
+        A column is unknown, missing, or has a value of a wrong unit or range; with the start's velocity, the agent
+        would go across a room within a cycle of many seconds.
     """
     columns = {str(name): _numbers(table[name], str(name), place) for name in table}
     check_names(columns, place)
@@ -168,6 +172,7 @@ def inputs_of(
         start = replace(start, heading=float(heading[0]))
     else:
         heading = np.full(len(cycles), np.nan)
+    _check_stride(cycles, start, place)
     nothing = (None,) * len(cycles)
     made = Inputs(
         start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing, float(cycles[0])
@@ -176,17 +181,50 @@ def inputs_of(
 
 
 def input_warnings(inputs: Inputs) -> list[str]:
-    """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, or each
-    component with a time of its own."""
-    step = float(np.median(np.diff(inputs.time))) if len(inputs.time) > 1 else 0.0
-    counts = {len(one) for one in inputs.measurements}
+    """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
+    component with a time of its own, or components that are there twice."""
+    step = _median_step(inputs.time)
+    counts, lines = {len(one) for one in inputs.measurements}, []
     if step > LONGEST_STEP:
-        return [f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds"]
+        lines.append(f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds")
     if counts == {1} and 0.0 < step < SHORTEST_STEP:
-        return [
+        lines.append(
             f"time_s: every cycle holds one component, {step:g} s apart; rows of one time are one cycle: round them"
-        ]
-    return []
+        )
+    return lines + _copies(inputs)
+
+
+def _copies(inputs: Inputs) -> list[str]:
+    """Warning of components that are exact copies of another one in their cycle, none or one: noise never draws two."""
+    total, first, row = 0, "", 0
+    for time, one in zip(inputs.time + inputs.since, inputs.measurements, strict=True):
+        seen: set[bytes] = set()
+        for number, values in enumerate(np.column_stack([getattr(one, name) for name in PARTS])):
+            if values.tobytes() in seen:
+                total += 1
+                first = first or f"row {row + number + 1} of the data, at {time:.10g} s"
+            seen.add(values.tobytes())
+        row += max(len(one), 1)  # a cycle in which nothing was heard is a row, too
+    if not total:
+        return []
+    what = "component is an exact copy" if total == 1 else "components are exact copies"
+    return [f"{total} {what} of another in the same cycle, the first in {first}; leave copies out"]
+
+
+def _median_step(time: Floats) -> float:
+    """Median time [s] between cycles at times (K,) [s]; 0 for one cycle."""
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+
+def _check_stride(time: Floats, start: StartPrior, place: str) -> None:
+    """Raise an error where cycles at times (K,) [s] are so far apart that the agent of a start prior crosses a room
+    from one to the next."""
+    step, speed = _median_step(time), float(np.linalg.norm(start.velocity))
+    if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
+        raise ConfigError(
+            f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
+            f"{step * speed:.3g} m; give seconds (were these milliseconds?), or mend the velocity"
+        )
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:

@@ -246,6 +246,42 @@ def test_times_that_are_most_often_a_mistake_are_warned_of(
     assert said in line
 
 
+def test_times_in_which_the_agent_would_cross_rooms_are_refused(table: Table, spec: PipelineSpec) -> None:
+    """Milliseconds for seconds at 0.1 m/s: 10 m a cycle. Who stands still may be sounded at any interval."""
+    radio = build_radio(spec.radio)
+    for factor, speed, refused in ((1e3, 0.1, True), (1e6, 0.1, True), (1e3, 0.0, False), (1.0, 9.0, False)):
+        rows = {**table, "time_s": [factor * time for time in table["time_s"]]}
+        start = StartPrior(np.zeros(3), np.array([0.6 * speed, 0.8 * speed, 0.0]), 0.0)
+        if not refused:
+            inputs_of(rows, start, radio)
+            continue
+        with pytest.raises(
+            ConfigError, match=r"time_s: cycles are 1e?0+5? s apart, in which an agent at 0\.1 m/s goes"
+        ):
+            inputs_of(rows, start, radio)
+
+
+def test_rows_that_are_there_twice_are_warned_of(
+    recorded: tuple[Inputs, np.ndarray], table: Table, spec: PipelineSpec
+) -> None:
+    radio, start = build_radio(spec.radio), recorded[0].start
+    count = len(table["time_s"])
+    late = [*range(count), count - 2, count - 1]  # two of the last cycle
+    doubled = [row for row in range(count) for _ in range(2)]
+    for rows, said in (
+        (doubled, f"{count} components are exact copies of another in the same cycle, the first in row 2 of the data"),
+        (late, f"2 components are exact copies of another in the same cycle, the first in row {count + 1} of the data"),
+    ):
+        given = {name: [column[row] for row in rows] for name, column in table.items()}
+        (line,) = input_warnings(inputs_of(given, start, radio))
+        assert line.startswith(said)
+    silent = {name: [np.nan, *column] for name, column in table.items()}  # a first cycle without a component
+    silent["time_s"][0], silent["heading_rad"][0] = -1.0, 0.0
+    again = {name: [*column[:2], column[1], *column[2:]] for name, column in silent.items()}
+    (line,) = input_warnings(inputs_of(again, start, radio))
+    assert line.startswith("1 component is an exact copy of another in the same cycle, the first in row 3 of the data")
+
+
 def test_a_start_that_is_too_far_is_told_so() -> None:
     """UTM coordinates are three numbers: the line must not say that they are not."""
     with pytest.raises(ConfigError, match=r"--start: '500000,5400000,100' received; give at most 100000"):
