@@ -16,6 +16,7 @@ from rislam_rt.input_messages import parse_number
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.measurement_columns import (
+    BACK_TO_HORIZON,
     FINEST_STD,
     LONGEST_DELAY,
     ROUNDING,
@@ -23,6 +24,7 @@ from rislam_rt.pipeline.recordings.measurement_columns import (
     check_components,
     check_heading,
     check_names,
+    cosine_wanted,
 )  # fmt: skip
 from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.run_datasets import dataset_checksum
@@ -240,12 +242,12 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
             raise ConfigError(f"{where}: delay of {one.tau.min():g} s received; give none below 0")
         reach = np.abs(one.cosines).max(initial=0.0)
         if reach > 1.0:
-            raise ConfigError(f"{where}: cosine of {reach:g} received; give direction cosines from -1 to 1, not angles")
+            raise ConfigError(f"{where}: cosine of {reach:g} received; give {cosine_wanted(reach)}")
         squares = np.sum(one.cosines**2, axis=-1).max(initial=0.0)
         if squares > 1.0 + ROUNDING:
             raise ConfigError(
                 f"{where}: cosines whose squares sum to {squares:g} received, which no direction has; give at most 1 "
-                "(bring estimates beyond the horizon back to it)"
+                f"({BACK_TO_HORIZON})"
             )
         for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
             value = getattr(one, name)

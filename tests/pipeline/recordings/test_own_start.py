@@ -118,3 +118,9 @@ def test_the_page_and_the_docstrings_say_the_default_body_in_numbers() -> None:
     page = (Path(__file__).parents[3] / "docs" / "own_measurements.md").read_text()
     for text in (page, rislam_rt.inputs_of.__doc__, rislam_rt.Body.__doc__):
         assert said in text
+
+
+def test_the_help_says_how_well_the_heading_is_known() -> None:
+    said = " ".join(str(command.__doc__).split())
+    for words in ("start.heading_std_deg", "taken from --velocity", "slam.heading=estimated"):
+        assert words in said
