@@ -50,7 +50,7 @@ def command(
         str | None,
         typer.Option(
             metavar="X,Y,Z",
-            help="Tx from the agent's position in m, x forward, y left, z up; a NetCDF file brings its own.",
+            help="Tx from the agent's position in m, x forward, y left, z up; a CSV file needs it.",
         ),
     ] = None,
     rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
@@ -58,7 +58,10 @@ def command(
         Path | None, typer.Option(metavar="FILE", help="True poses (TUM, CSV), one a cycle, for scoring alone.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="New folder for the estimate; <file>-slam by default.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="New folder for the estimate; <file>-slam, in the working folder, by default."
+        ),
     ] = None,
     json: JsonFile = None,
 ) -> None:

@@ -40,7 +40,7 @@ FINEST_STD = 1e-15
 ABOVE_ZERO = float(np.nextafter(0.0, 1.0))
 """Least positive number."""
 NOISY_COSINE = 1.5
-"""Modulus of a direction cosine up to which one above 1 is an estimate beyond the horizon; a larger one is no cosine."""
+"""Modulus of a direction cosine up to which one above 1 is an estimate beyond the horizon; a larger is no cosine."""
 _COSINE = (-1.0, 1.0, "direction cosines from -1 to 1, not angles")
 BACK_TO_HORIZON = "bring estimates beyond the horizon back to it: divide both cosines by their norm"
 _COSINE_STD = (ABOVE_ZERO, 2.0, "positive deviations of a direction cosine, not degrees")
