@@ -17,7 +17,10 @@ from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
 from rislam_rt.scene.write import tum_bytes
 from rislam_rt.storage.files import csv_file, json_file
 
-COLUMNS = ("time_s", "x_m", "y_m", "z_m", "std_x_m", "std_y_m", "std_z_m", "heading_rad", "components", "outcome")
+COLUMNS = (
+    "time_s", "x_m", "y_m", "z_m", "std_x_m", "std_y_m", "std_z_m", "heading_rad", "components", "outcome",
+    "std_heading_rad", "cov_xy_m2",
+)  # fmt: skip
 """Columns of `estimate.csv`, a row a cycle; docs/own_measurements.md says what they are."""
 
 
@@ -57,10 +60,11 @@ def answer_files(inputs: Inputs, answers: Answers) -> dict[str, bytes]:
     for time, one, info, heard in zip(times, answers.estimates, answers.infos, inputs.measurements, strict=True):
         std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
         numbers = [*one.position, *std, one.heading]
-        rows.append([repr(float(time)), *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
+        more = "" if one.heading_std is None else f"{one.heading_std:.9g}", f"{one.covariance[0, 1]:.9g}"
+        rows.append([repr(float(time)), *(f"{value:.9g}" for value in numbers), len(heard), info.outcome, *more])
     last = answers.estimates[-1].map
     known = {field.name: value for field in fields(last) if (value := getattr(last, field.name)) is not None}
-    content = {name: np.where(np.isfinite(value), value, None).tolist() for name, value in known.items()}
+    content = {name: np.asarray(np.where(np.isfinite(value), value, None)).tolist() for name, value in known.items()}
     return {
         "estimate.tum": tum_bytes(times, position, heading),
         "estimate.csv": csv_file(COLUMNS, rows),

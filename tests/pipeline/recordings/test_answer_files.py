@@ -4,9 +4,11 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import rislam_rt
 from rislam_rt.model import MapEstimate
@@ -15,6 +17,7 @@ from rislam_rt.pipeline.recordings.replay import Answers
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.studies.unseen import Inputs
 
+CYCLES = 30
 PAGE = Path(__file__).parents[3] / "docs" / "own_measurements.md"
 
 
@@ -49,4 +52,21 @@ def test_a_row_a_cycle(recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec) 
     answers = answers_of(recorded, spec)
     rows = list(csv.DictReader(io.StringIO(answer_files(recorded[0], answers)["estimate.csv"].decode())))
     assert [float(row["heading_rad"]) for row in rows] == [float(f"{one.heading:.9g}") for one in answers.estimates]
+    assert [float(row["cov_xy_m2"]) for row in rows] == [
+        float(f"{one.covariance[0, 1]:.9g}") for one in answers.estimates
+    ]
+    assert {row["std_heading_rad"] for row in rows} == {""}  # of a compass
     assert [int(row["components"]) for row in rows] == [len(one) for one in recorded[0].measurements]
+
+
+def test_the_heading_s_deviation_begins_with_the_start_s(
+    recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec
+) -> None:
+    free = spec.model_copy(update={"slam": spec.slam.model_copy(update={"heading": "estimated"})})
+    start = replace(recorded[0].start, heading_std=0.03, velocity_std=0.1)
+    inputs = recorded[0]._replace(start=start, heading=np.full(CYCLES, np.nan))
+    answers = rislam_rt.localise(inputs, free, rng=np.random.default_rng(0))
+    rows = list(csv.DictReader(io.StringIO(answer_files(inputs, answers)["estimate.csv"].decode())))
+    found = [float(row["std_heading_rad"]) for row in rows]
+    assert found == [float(f"{one.heading_std:.9g}") for one in answers.estimates]
+    assert found[0] == pytest.approx(0.03, rel=1e-3)
