@@ -35,7 +35,10 @@ def heading_from_velocity(start: StartPrior) -> StartPrior:
     """Start prior whose heading, of which nothing was given, is the direction of its velocity, as of an agent that
     looks where it goes.
 
-    The heading's deviation is `hypot(heading_std, atan(velocity_std / speed))` [rad], of the horizontal speed [m/s].
+    One error turns both, while the prior has them independent, and a filter that hears how the agent moves in its own
+    frame would learn the turn from either. So each counts half (covariance intersection: Julier and Uhlmann 1997): with
+    `a = atan(velocity_std / speed)` [rad] of the horizontal speed [m/s], the heading's deviation becomes
+    `hypot(heading_std, sqrt(2) a)`, the velocity's `sqrt(2) velocity_std`; together they know the turn to `a`.
 
     Raises
     ------
@@ -48,4 +51,5 @@ def heading_from_velocity(start: StartPrior) -> StartPrior:
             f"start: no heading, and a speed of {speed:g} m/s known to {std:g} m/s has no direction; give --heading DEG"
         )
     heading = float(np.arctan2(start.velocity[1], start.velocity[0]))
-    return replace(start, heading=heading, heading_std=float(np.hypot(start.heading_std, np.arctan(std / speed))))
+    heading_std = float(np.hypot(start.heading_std, np.sqrt(2.0) * np.arctan(std / speed)))
+    return replace(start, heading=heading, heading_std=heading_std, velocity_std=float(np.sqrt(2.0)) * std)
