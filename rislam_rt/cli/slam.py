@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,15 +12,15 @@ from rislam_rt.cli.verbosity import warn
 from rislam_rt.constants import MAX_SPEED
 
 if TYPE_CHECKING:
-    from rislam_rt.arrays import Floats
     from rislam_rt.model import Body
     from rislam_rt.pipeline.recordings.inputs import Inputs
     from rislam_rt.slam import StartPrior
-    from rislam_rt.studies.unseen import Answers
 
 
 LONGEST_ARM = 2.0
 """Distance [m] of Tx and Rx from the agent's position above which a unit is wrong."""
+TURN_DEG = 360.0
+"""Largest start heading [degrees] of either sign, as `heading_deg` in a scene."""
 
 
 def command(
@@ -35,67 +35,131 @@ def command(
         str | None,
         typer.Option(metavar="X,Y,Z", help="Where the agent starts, in m; a NetCDF file brings its own."),
     ] = None,
-    velocity: Annotated[str, typer.Option(metavar="X,Y,Z", help="Its first velocity, in m/s.")] = "0,0,0",
+    velocity: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Its first velocity, in m/s; at rest if left out.")
+    ] = None,
+    heading: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DEG",
+            help="Its first heading, in degrees from x towards y, where there is no compass; if left out, the "
+            "direction of --velocity, as well as that is known.",
+        ),
+    ] = None,
     tx: Annotated[
         str | None,
-        typer.Option(metavar="X,Y,Z", help="Tx from the agent's position in m, x forward, y left, z up."),
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Tx from the agent's position in m, x forward, y left, z up; a CSV file needs it.",
+        ),
     ] = None,
     rx: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Centre of the Rx array, likewise.")] = None,
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="True poses (TUM, CSV), one a cycle, for scoring alone.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="New folder for the estimate; <file>-slam by default.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="New folder for the estimate; <file>-slam, in the working folder, by default."
+        ),
     ] = None,
     json: JsonFile = None,
 ) -> None:
     """Localise and map from measurements of your own: no scene is needed.
 
     The columns of a CSV file are listed in docs/own_measurements.md; delays are in seconds, angles of arrival as
-    direction cosines or in radians, body frame. How well the start is known is set by start.position_std_m and
-    start.velocity_std_m_s.
+    direction cosines or in radians, body frame. How well the start is known is set by start.position_std_m,
+    start.velocity_std_m_s and start.heading_std_deg (0: a heading that is given is exact; one taken from --velocity
+    has at least the deviation that the velocity's own gives its direction). Without a compass, a column heading_rad,
+    set slam.heading=estimated.
 
     A run's folder holds its measurements, too: with its config.toml they give the run's estimate again.
 
-    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --set radio.noise_psd=1e-12
+    Example: rislam-rt slam mine.csv --start 0.5,0.7,0.5 --tx 0.05,0,0 --rx -0.05,0,0 --set radio.noise_psd=1e-12
 
     Example: rislam-rt slam RUN/measurements_random.nc --config RUN/config.toml --truth RUN/truth.tum
     """
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.recordings.answer_files import answer_files, summarise_answers, true_positions
     from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
     from rislam_rt.pipeline.specification.radio import build_radio
+    from rislam_rt.storage.files import write_all
 
     spec = load_spec(config, set_ or ())
     stds = (spec.start.position_std_m, spec.start.velocity_std_m_s, float(np.deg2rad(spec.start.heading_std_deg)))
-    prior = None if start is None else _prior(start, velocity, stds)
-    inputs = read_inputs(measurements, prior, build_radio(spec.radio), _body(tx, rx))
+    prior = None if start is None else _prior(start, velocity or "0,0,0", stds, heading)
+    options = {"--start": start, "--velocity": velocity, "--heading": heading, "--tx": tx, "--rx": rx}
+    _check_no_second_start(measurements, options)
+    body = _body(tx, rx)
+    inputs = read_inputs(measurements, prior, build_radio(spec.radio), body)
+    if prior is not None:
+        _check_body(measurements, body)
+        inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
     for line in input_warnings(inputs):
         warn(f"{measurements}: {line}")
-    true = None if truth is None else _true_positions(truth, inputs.time + inputs.since)
+    true = None if truth is None else true_positions(truth, inputs.time + inputs.since)
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
     answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed))
-    summary = _summary(inputs, answers, true)
-    _write(_new_folder(folder), inputs, answers)  # another command may have filled it meanwhile
+    summary = summarise_answers(inputs, answers, true)
+    write_all(_new_folder(folder), answer_files(inputs, answers))  # another command may have filled it meanwhile
     for name, value in summary.items():
         typer.echo(f"{name}: {f'{value:.4g}' if isinstance(value, float) else value}")
     typer.echo(f"folder: {folder}")
     write_json(json, summary)
 
 
-def _prior(start: str, velocity: str, stds: tuple[float, float, float]) -> "StartPrior":
-    """Start prior for `rislam-rt slam` from the options `--start` and `--velocity`, along which the heading is."""
+def _check_no_second_start(measurements: Path, options: dict[str, str | None]) -> None:
+    """Check that `rislam-rt slam` is not given by options what a NetCDF file of measurements brings: start, offsets."""
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.storage.netcdf import NETCDF
+
+    given = [option for option, value in options.items() if value is not None]
+    if given and measurements.suffix.lower() in NETCDF:
+        raise ConfigError(f"{', '.join(given)}: {measurements} brings its own start, Tx and Rx; leave it out")
+
+
+def _prior(start: str, velocity: str, stds: tuple[float, float, float], heading: str | None = None) -> "StartPrior":
+    """Start prior for `rislam-rt slam` from the options `--start`, `--velocity` and `--heading`; without a heading, it
+    is along the velocity."""
     import numpy as np
 
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.input_messages import parse_number
     from rislam_rt.slam import StartPrior
 
     first, speed = parse_point("--start", start), parse_point("--velocity", velocity)
     if np.linalg.norm(speed) > MAX_SPEED:
         warn(f"--velocity: {np.linalg.norm(speed):.3g} m/s; give metres a second")
-    heading = float(np.arctan2(speed[1], speed[0])) if np.hypot(speed[0], speed[1]) > 0.0 else 0.0
-    return StartPrior(first, speed, heading, *stds)
+    if heading is None:
+        return StartPrior(first, speed, float(np.arctan2(speed[1] + 0.0, speed[0] + 0.0)), *stds)
+    try:
+        degrees = parse_number(heading)
+    except ValueError:
+        degrees = np.nan
+    if not abs(degrees) <= TURN_DEG:
+        raise ConfigError(f"--heading: '{heading[:60]}' received; give degrees from -{TURN_DEG:g} to {TURN_DEG:g}")
+    return StartPrior(first, speed, float(np.deg2rad(degrees)), *stds)
+
+
+def _with_heading(inputs: "Inputs", heading: str | None, mode: str, measurements: Path) -> "Inputs":
+    """Inputs of `rislam-rt slam` with the start heading of the option `--heading`, which must not contradict a compass;
+    without either, the direction of the velocity and its deviation where the heading is estimated."""
+    import numpy as np
+
+    from rislam_rt.errors import ConfigError
+    from rislam_rt.slam.start_prior import heading_from_velocity
+
+    compass = not np.isnan(inputs.heading).any()
+    if compass and heading is not None:
+        raise ConfigError(
+            f"--heading: {measurements} has a compass (heading_rad), whose first row is the start's; leave one out"
+        )
+    if compass or heading is not None or mode != "estimated":
+        return inputs
+    return inputs._replace(start=heading_from_velocity(inputs.start))
 
 
 def _body(tx: str | None, rx: str | None) -> "Body | None":
@@ -116,30 +180,14 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
     return Body(*ends)
 
 
-def _true_positions(file: Path, cycles: "Floats") -> "Floats":
-    """True positions (K, 3) [m] for `rislam-rt slam` from the TUM or CSV file of `--truth`, one at each of the cycles'
-    times (K,) [s]."""
-    import numpy as np
-
+def _check_body(measurements: Path, body: "Body | None") -> None:
+    """Check that `rislam-rt slam` is given the offsets of Tx and Rx with a table of measurements, which has none: a
+    baseline that is not the agent's own is an error of centimetres that no deviation shows."""
     from rislam_rt.errors import ConfigError
-    from rislam_rt.scene.findings import Fault
-    from rislam_rt.scene.motion.recorded_poses import parse_csv, parse_tum
 
-    try:
-        content = file.read_bytes()
-        time, position = (parse_csv(content, {}) if file.suffix.lower() == ".csv" else parse_tum(content))[:2]
-    except OSError as error:
-        raise ConfigError(f"--truth {file}: cannot be read ({error.strerror}); give a TUM or CSV file") from None
-    except Fault as fault:
-        raise ConfigError(fault.at(f"--truth {file}", "").line) from None
-    if len(position) != len(cycles):
-        raise ConfigError(f"--truth {file}: {len(position)} poses for {len(cycles)} cycles; give one a cycle")
-    apart = np.abs(time - cycles)
-    if len(cycles) > 1 and apart.max() > 0.5 * float(np.median(np.diff(cycles))):
-        pose = int(np.argmax(apart))
-        what = f"pose {pose} is at {time[pose]:.10g} s, its cycle at {cycles[pose]:.10g} s"
-        raise ConfigError(f"--truth {file}: {what}, more than half a cycle apart; give both by one clock")
-    return position
+    if body is None:
+        where = "a CSV file does not say where Tx and Rx sit on the agent"
+        raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
 
 
 def _new_folder(folder: Path) -> Path:
@@ -156,55 +204,3 @@ def _new_folder(folder: Path) -> Path:
         raise ConfigError(f"--out {folder}: exists and is not empty; give a new folder")
     check_writable(folder)
     return folder
-
-
-def _summary(inputs: "Inputs", answers: "Answers", true: "Floats | None") -> dict[str, Any]:
-    import numpy as np
-
-    from rislam_rt.pipeline.scores.loss_causes import LossTally, words_of_loss
-
-    last = answers.estimates[-1]
-    outcomes, tally = [str(info.outcome) for info in answers.infos], LossTally()
-    tally.add(inputs.time, outcomes, [getattr(info, "cause", 0) for info in answers.infos])
-    panels = 1 if inputs.panel is None else len(inputs.panel.panels)
-    found: dict[str, Any] = {
-        "cycles": len(inputs.time),
-        "components": sum(len(m) for m in inputs.measurements),
-        "ended": outcomes[-1],
-        "cycles_diverged": outcomes.count("diverged"),
-        **({"lost_because": words_of_loss(tally.scores(float(inputs.time[0])))} if tally.causes else {}),
-        "last_position_m": [round(float(value), 4) for value in last.position],
-        "deviation_m": float(np.sqrt(np.trace(last.covariance[:2, :2]))),
-        "landmarks": int(np.sum(last.map.parent < 0)),
-        "walls": len(last.map.wall_offset),
-        "panel_found": all(last.map.panel_row(panel) >= 0 for panel in range(panels)),
-        "ms_a_cycle": 1000.0 * answers.seconds,
-    }
-    if true is not None:
-        error = np.array([one.position for one in answers.estimates]) - true
-        found["rmse_m"] = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
-    return found
-
-
-def _write(folder: Path, inputs: "Inputs", answers: "Answers") -> None:
-    """Write the results of `rislam-rt slam`: estimated trajectory as TUM and CSV, and the last map as JSON."""
-    from dataclasses import fields
-
-    import numpy as np
-
-    from rislam_rt.scene.write import tum_bytes
-    from rislam_rt.storage.files import csv_file, json_file, write_all
-    from rislam_rt.sweeps.cell_work import plain_result
-
-    position = np.array([one.position for one in answers.estimates])
-    heading = np.array([one.heading for one in answers.estimates])
-    head = ["time_s", "x_m", "y_m", "z_m", "std_x_m", "std_y_m", "std_z_m", "heading_rad", "components", "outcome"]
-    rows, times = [], inputs.time + inputs.since
-    for time, one, info, heard in zip(times, answers.estimates, answers.infos, inputs.measurements, strict=True):
-        std = np.sqrt(np.maximum(np.diag(one.covariance)[:3], 0.0))
-        numbers = [*one.position, *std, one.heading]
-        rows.append([repr(float(time)), *(f"{value:.9g}" for value in numbers), len(heard), info.outcome])
-    last = answers.estimates[-1].map
-    files = {"estimate.tum": tum_bytes(times, position, heading), "estimate.csv": csv_file(head, rows)}
-    content = plain_result({f.name: value for f in fields(last) if (value := getattr(last, f.name)) is not None})
-    write_all(folder, files | {"map.json": json_file(content)})

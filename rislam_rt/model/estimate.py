@@ -98,6 +98,8 @@ class SlamEstimate:
     suspects: tuple[PanelCandidate, ...] = ()
     """Panel candidates: at most one for each RIS panel that the map holds no landmark for; empty where no code is to be
     designed (see `slam.predict`)."""
+    heading_std: float | None = None
+    """[rad] standard deviation of the heading; None where the filter says none."""
 
     def __post_init__(self) -> None:
         freeze(self, np.float64, position=(3,), velocity=(3,), covariance=(6, 6), samples=(None, 3))

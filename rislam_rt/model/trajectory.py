@@ -15,7 +15,10 @@ def _default_offset() -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
-    """The agent's body: offsets (3,) [m] of Tx and Rx array centre from its position, in the body frame (x forward)."""
+    """The agent's body: offsets (3,) [m] of Tx and Rx array centre from its position, in the body frame (x forward).
+
+    Those of the paper if left out: Rx at (0.0439, 0.0240, 0), Tx opposite; an agent of another make is given its own.
+    """
 
     tx_offset: Floats = field(default_factory=lambda: -_default_offset())
     rx_offset: Floats = field(default_factory=_default_offset)

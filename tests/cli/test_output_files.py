@@ -132,7 +132,7 @@ def refuse(monkeypatch, folder):
         ("run", ROOT / "pipelines/train_classifier.toml", "--out", "shut"),
         ("trace", "empty_box", "--channel", "image_source", "--out", "shut/paths.nc"),
         ("config", "--json", "shut/config.json"),
-        ("slam", "mine.csv", "--start", "0,0,1", "--out", "shut/found"),
+        ("slam", "mine.csv", "--start", "0,0,1", "--tx", "0,0,0", "--rx", "0.1,0,0", "--out", "shut/found"),
     ],
 )
 def test_a_folder_that_refuses_is_known_before_anything_is_worked_out(run, tmp_path, shut, words):
@@ -241,7 +241,10 @@ def test_output_that_finds_no_room_is_one_line(run, monkeypatch):
 
 def test_a_link_that_leads_to_itself_takes_no_room(run, tmp_path):
     (tmp_path / "loop").symlink_to("loop")
-    for words in (("new", "loop"), ("slam", "mine.csv", "--start", "0,0,1", "--out", "loop")):
+    for words in (
+        ("new", "loop"),
+        ("slam", "mine.csv", "--start", "0,0,1", "--tx", "0,0,0", "--rx", "1,0,0", "--out", "loop"),
+    ):
         (tmp_path / "mine.csv").write_text("time_s,heading_rad,delay_s,cos_x,cos_y,amplitude\n0,0,1e-8,0,0,0.01\n")
         code, _, err = run(*words)
         assert code == 4

@@ -39,7 +39,10 @@ FINEST_STD = 1e-15
 """[s] Least standard deviation of a delay accepted, 0.3 um: a smaller number is in another unit."""
 ABOVE_ZERO = float(np.nextafter(0.0, 1.0))
 """Least positive number."""
+NOISY_COSINE = 1.5
+"""Modulus of a direction cosine up to which one above 1 is an estimate beyond the horizon; a larger is no cosine."""
 _COSINE = (-1.0, 1.0, "direction cosines from -1 to 1, not angles")
+BACK_TO_HORIZON = "bring estimates beyond the horizon back to it: divide both cosines by their norm"
 _COSINE_STD = (ABOVE_ZERO, 2.0, "positive deviations of a direction cosine, not degrees")
 _POSITIVE = (ABOVE_ZERO, np.inf, "positive numbers, not decibels")
 _TIME = f"numbers in seconds, {{}}a room's below {LONGEST_DELAY:g} (were these nanoseconds, or metres?)"
@@ -101,7 +104,7 @@ def check_components(columns: Mapping[str, Floats], heard: Booleans, place: str)
         if len(odd):
             raise ConfigError(
                 f"{place}: cos_x, cos_y: squares that sum to {squares[odd[0]]:g} in row {odd[0] + 1} of the data, "
-                "which no direction has; give at most 1 (bring estimates beyond the horizon back to it)"
+                f"which no direction has; give at most 1 ({BACK_TO_HORIZON})"
             )
 
 
@@ -110,7 +113,15 @@ def _check_range(name: str, column: Floats, heard: Booleans, place: str) -> None
     least, most, wanted = RANGES.get(name, (-np.inf, np.inf, ""))
     odd = np.flatnonzero(heard & ((column < least) | (column > most)))
     if len(odd):
+        if name in ("cos_x", "cos_y"):
+            wanted = cosine_wanted(np.abs(column[odd[0]]))
         raise ConfigError(f"{place}: {name}: {column[odd[0]]:g} in row {odd[0] + 1} of the data; give {wanted}")
+
+
+def cosine_wanted(reach: float) -> str:
+    """What to give in the place of a direction cosine of modulus `reach` > 1: its estimate within the horizon, or none
+    of an angle."""
+    return f"direction cosines from -1 to 1{f' ({BACK_TO_HORIZON})' if reach <= NOISY_COSINE else ', not angles'}"
 
 
 def check_heading(columns: Mapping[str, Floats], cycle: Integers, place: str) -> None:

@@ -16,6 +16,7 @@ from rislam_rt.input_messages import parse_number
 from rislam_rt.model import Body, Measurement, RadioConfig
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.measurement_columns import (
+    BACK_TO_HORIZON,
     FINEST_STD,
     LONGEST_DELAY,
     ROUNDING,
@@ -23,6 +24,7 @@ from rislam_rt.pipeline.recordings.measurement_columns import (
     check_components,
     check_heading,
     check_names,
+    cosine_wanted,
 )  # fmt: skip
 from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.run_datasets import dataset_checksum
@@ -32,6 +34,9 @@ from rislam_rt.storage.netcdf import NETCDF, read_dataset
 
 LONGEST_STEP = 10.0
 """[s] Median time between cycles from which on the times are warned of, as milliseconds given as seconds would be."""
+LONGEST_STRIDE = 5.0
+"""[m] Way at the start's speed in a median time above `LONGEST_STEP` from which on the times are refused: an agent that
+goes across a room from one cycle to the next has its times in another unit."""
 SHORTEST_STEP = 1e-3
 """[s] Median time between cycles of one component each below which the times are warned of: each row has its own."""
 
@@ -79,6 +84,8 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
         Prior of the first pose; a NetCDF file has its own, a CSV file needs it.
     radio
         Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
+    body
+        Offsets of Tx and Rx for a CSV file; None as in `inputs_of`.
 
     Raises
     ------
@@ -119,10 +126,21 @@ def inputs_of(
 ) -> Inputs:
     """Inputs of an estimator from a table of measurements, a row a component: a mapping or data frame with `COLUMNS`.
 
+    Parameters
+    ----------
+    start
+        Prior of the first pose; a column `heading_rad` takes the place of its heading.
+    radio
+        Turns SNRs into amplitudes, and gives standard deviations that the table lacks.
+    body
+        Offsets of Tx and Rx; None is the paper's baseline, right for its agent alone: Rx at (0.0439, 0.0240, 0) m in
+        the body frame (x forward, y left, z up), 0.05 m off and 0.5 rad to the left, and Tx opposite.
+
     Raises
     ------
     ConfigError
-        A column is unknown, missing, or has a value of a wrong unit or range.
+        A column is unknown, missing, or has a value of a wrong unit or range; with the start's velocity, the agent
+        would go across a room within a cycle of many seconds.
     """
     columns = {str(name): _numbers(table[name], str(name), place) for name in table}
     check_names(columns, place)
@@ -156,6 +174,7 @@ def inputs_of(
         start = replace(start, heading=float(heading[0]))
     else:
         heading = np.full(len(cycles), np.nan)
+    _check_stride(cycles, start, place)
     nothing = (None,) * len(cycles)
     made = Inputs(
         start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing, float(cycles[0])
@@ -164,17 +183,50 @@ def inputs_of(
 
 
 def input_warnings(inputs: Inputs) -> list[str]:
-    """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, or each
-    component with a time of its own."""
-    step = float(np.median(np.diff(inputs.time))) if len(inputs.time) > 1 else 0.0
-    counts = {len(one) for one in inputs.measurements}
+    """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
+    component with a time of its own, or components that are there twice."""
+    step = _median_step(inputs.time)
+    counts, lines = {len(one) for one in inputs.measurements}, []
     if step > LONGEST_STEP:
-        return [f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds"]
+        lines.append(f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds")
     if counts == {1} and 0.0 < step < SHORTEST_STEP:
-        return [
+        lines.append(
             f"time_s: every cycle holds one component, {step:g} s apart; rows of one time are one cycle: round them"
-        ]
-    return []
+        )
+    return lines + _copies(inputs)
+
+
+def _copies(inputs: Inputs) -> list[str]:
+    """Warning of components that are exact copies of another one in their cycle, none or one: noise never draws two."""
+    total, first, row = 0, "", 0
+    for time, one in zip(inputs.time + inputs.since, inputs.measurements, strict=True):
+        seen: set[bytes] = set()
+        for number, values in enumerate(np.column_stack([getattr(one, name) for name in PARTS])):
+            if values.tobytes() in seen:
+                total += 1
+                first = first or f"row {row + number + 1} of the data, at {time:.10g} s"
+            seen.add(values.tobytes())
+        row += max(len(one), 1)  # a cycle in which nothing was heard is a row, too
+    if not total:
+        return []
+    what = "component is an exact copy" if total == 1 else "components are exact copies"
+    return [f"{total} {what} of another in the same cycle, the first in {first}; leave copies out"]
+
+
+def _median_step(time: Floats) -> float:
+    """Median time [s] between cycles at times (K,) [s]; 0 for one cycle."""
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+
+def _check_stride(time: Floats, start: StartPrior, place: str) -> None:
+    """Raise an error where cycles at times (K,) [s] are so far apart that the agent of a start prior crosses a room
+    from one to the next."""
+    step, speed = _median_step(time), float(np.linalg.norm(start.velocity))
+    if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
+        raise ConfigError(
+            f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
+            f"{step * speed:.3g} m; give seconds (were these milliseconds?), or mend the velocity"
+        )
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:
@@ -190,12 +242,12 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
             raise ConfigError(f"{where}: delay of {one.tau.min():g} s received; give none below 0")
         reach = np.abs(one.cosines).max(initial=0.0)
         if reach > 1.0:
-            raise ConfigError(f"{where}: cosine of {reach:g} received; give direction cosines from -1 to 1, not angles")
+            raise ConfigError(f"{where}: cosine of {reach:g} received; give {cosine_wanted(reach)}")
         squares = np.sum(one.cosines**2, axis=-1).max(initial=0.0)
         if squares > 1.0 + ROUNDING:
             raise ConfigError(
                 f"{where}: cosines whose squares sum to {squares:g} received, which no direction has; give at most 1 "
-                "(bring estimates beyond the horizon back to it)"
+                f"({BACK_TO_HORIZON})"
             )
         for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
             value = getattr(one, name)

@@ -13,7 +13,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio
 from rislam_rt.pipeline.specification.section import Section
-from rislam_rt.shipped import beside_of, shipped_missing, shipped_pipelines
+from rislam_rt.shipped import beside_of, find_pipeline, shipped_missing, shipped_pipelines
 from rislam_rt.toml import MAX_LEVELS, parse_toml, parse_value
 
 MAX_BYTES = 1_000_000
@@ -38,6 +38,9 @@ class Table(NamedTuple):
 
 def load_spec(path: str | Path, overrides: Sequence[str] = ()) -> PipelineSpec:
     """Read a pipeline file as a checked specification, with `key=value` settings (dotted keys) put over it first.
+
+    Where there is no file of that path, it is the pipeline of that name that comes with the package
+    (`load_spec("trace_then_slam")`), as on the command line.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def read_table(path: str | Path, overrides: Sequence[str] = ()) -> Table:
     ConfigError
         The file cannot be read or is not TOML; a setting has no such form.
     """
-    path = Path(path)
+    path = find_pipeline(path)
     content = _read_toml(path)
     changed = tuple(_override(content, setting, path.parent) for setting in overrides)
     table = Table(path, content, changed, content.pop("sweep", None))

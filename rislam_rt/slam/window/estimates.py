@@ -61,6 +61,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.scene.body,
         build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], landmarks, state.shift, mean[:3]),
+        heading_std=float(np.sqrt(covariance[6, 6])) if config.heading == "estimated" else None,
     )
 
 

@@ -10,12 +10,13 @@ import pytest
 
 import rislam_rt
 from rislam_rt.cli.options import parse_point
-from rislam_rt.cli.slam import _body, _new_folder, _prior, _true_positions, command
+from rislam_rt.cli.slam import _body, _new_folder, _prior, command
 from rislam_rt.errors import ConfigError
 from rislam_rt.measurement import ReceiverConfig, build_sensor
 from rislam_rt.model import SensorModel
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.estimators import ESTIMATORS
+from rislam_rt.pipeline.recordings.answer_files import true_positions
 from rislam_rt.pipeline.recordings.own_measurements import input_warnings, inputs_of, localise, read_inputs
 from rislam_rt.pipeline.recordings.replay import replay
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
@@ -28,6 +29,7 @@ from rislam_rt.studies.unseen import Inputs
 CYCLES = 30
 CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_ris']", "slam.use_vt=true",
            "receiver.estimator=bound"]  # fmt: skip
+BODY = {"tx": "0.05,0,0", "rx": "-0.05,0,0"}
 Table = dict[str, list[float]]
 
 
@@ -70,7 +72,7 @@ def test_from_a_file_comes_the_answer_of_the_run(
     std = np.array([[float(row[name]) for name in ("std_x_m", "std_y_m")] for row in rows])
     assert std.min() > 0.01 * (1.0 - 1e-6)
     with pytest.raises(ConfigError, match="not empty; give a new folder"):
-        command(file, pipeline, set_=CHANGES, start=start, out=tmp_path / "out")
+        command(file, pipeline, set_=CHANGES, start=start, **BODY, out=tmp_path / "out")
 
 
 def test_snr_and_angles_say_the_same_as_amplitudes_and_cosines(
@@ -164,7 +166,7 @@ def test_a_folder_that_another_command_filled_meanwhile_is_left_alone(
 
     monkeypatch.setattr("rislam_rt.pipeline.recordings.own_measurements.localise", slow)
     with pytest.raises(ConfigError, match="exists and is not empty"):
-        command(tmp_path / "mine.csv", find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", out=out)
+        command(tmp_path / "mine.csv", find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", **BODY, out=out)
     assert (out / "map.json").read_text() == "theirs"
 
 
@@ -217,7 +219,7 @@ def test_the_estimate_has_the_times_of_the_file(
     """Of a clock that counts from the epoch, as a recording's: other logs are joined by it."""
     rows = {**table, "time_s": [1.7e9 + time for time in table["time_s"]]}
     file = write_csv(tmp_path / "mine.csv", rows, 60)
-    command(file, find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", out=tmp_path / "out")
+    command(file, find_pipeline("trace_then_slam"), set_=CHANGES, start="1,1,1", **BODY, out=tmp_path / "out")
     with (tmp_path / "out" / "estimate.csv").open() as lines:
         times = [float(row["time_s"]) for row in csv.DictReader(lines)]
     assert len(times) > 1
@@ -244,6 +246,42 @@ def test_times_that_are_most_often_a_mistake_are_warned_of(
     assert said in line
 
 
+def test_times_in_which_the_agent_would_cross_rooms_are_refused(table: Table, spec: PipelineSpec) -> None:
+    """Milliseconds for seconds at 0.1 m/s: 10 m a cycle. Who stands still may be sounded at any interval."""
+    radio = build_radio(spec.radio)
+    for factor, speed, refused in ((1e3, 0.1, True), (1e6, 0.1, True), (1e3, 0.0, False), (1.0, 9.0, False)):
+        rows = {**table, "time_s": [factor * time for time in table["time_s"]]}
+        start = StartPrior(np.zeros(3), np.array([0.6 * speed, 0.8 * speed, 0.0]), 0.0)
+        if not refused:
+            inputs_of(rows, start, radio)
+            continue
+        with pytest.raises(
+            ConfigError, match=r"time_s: cycles are 1e?0+5? s apart, in which an agent at 0\.1 m/s goes"
+        ):
+            inputs_of(rows, start, radio)
+
+
+def test_rows_that_are_there_twice_are_warned_of(
+    recorded: tuple[Inputs, np.ndarray], table: Table, spec: PipelineSpec
+) -> None:
+    radio, start = build_radio(spec.radio), recorded[0].start
+    count = len(table["time_s"])
+    late = [*range(count), count - 2, count - 1]  # two of the last cycle
+    doubled = [row for row in range(count) for _ in range(2)]
+    for rows, said in (
+        (doubled, f"{count} components are exact copies of another in the same cycle, the first in row 2 of the data"),
+        (late, f"2 components are exact copies of another in the same cycle, the first in row {count + 1} of the data"),
+    ):
+        given = {name: [column[row] for row in rows] for name, column in table.items()}
+        (line,) = input_warnings(inputs_of(given, start, radio))
+        assert line.startswith(said)
+    silent = {name: [np.nan, *column] for name, column in table.items()}  # a first cycle without a component
+    silent["time_s"][0], silent["heading_rad"][0] = -1.0, 0.0
+    again = {name: [*column[:2], column[1], *column[2:]] for name, column in silent.items()}
+    (line,) = input_warnings(inputs_of(again, start, radio))
+    assert line.startswith("1 component is an exact copy of another in the same cycle, the first in row 3 of the data")
+
+
 def test_a_start_that_is_too_far_is_told_so() -> None:
     """UTM coordinates are three numbers: the line must not say that they are not."""
     with pytest.raises(ConfigError, match=r"--start: '500000,5400000,100' received; give at most 100000"):
@@ -261,9 +299,9 @@ def test_the_pages_example_in_python_runs(capsys: pytest.CaptureFixture[str]) ->
 
 def test_true_poses_may_be_a_csv_file(tmp_path: Path) -> None:
     (tmp_path / "poses.csv").write_text("time,x_mm,y_mm,z_mm\n0,1000,2000,500\n0.1,1010,2000,500\n")
-    assert _true_positions(tmp_path / "poses.csv", np.array([0.0, 0.1])).tolist() == [[1.0, 2.0, 0.5], [1.01, 2.0, 0.5]]
+    assert true_positions(tmp_path / "poses.csv", np.array([0.0, 0.1])).tolist() == [[1.0, 2.0, 0.5], [1.01, 2.0, 0.5]]
     with pytest.raises(ConfigError, match="pose 0 is at 0 s, its cycle at 1000 s, more than half a cycle apart"):
-        _true_positions(tmp_path / "poses.csv", np.array([1000.0, 1000.1]))
+        true_positions(tmp_path / "poses.csv", np.array([1000.0, 1000.1]))
 
 
 def test_a_start_or_a_body_in_millimetres_is_said(capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,9 @@ def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpe
     start, rows = StartPrior(np.zeros(3), np.zeros(3), 0.0), len(table["time_s"])
     level = {"cos_x": rows * [round(np.cos(0.7), 6) + 1e-7], "cos_y": rows * [round(np.sin(0.7), 6) + 1e-7]}
     inputs_of({**table, **level}, start, build_radio(spec.radio))
-    with pytest.raises(ConfigError, match=r"cos_x, cos_y: squares that sum to 1\.13 in row 1 of the data"):
+    with pytest.raises(
+        ConfigError, match=r"squares that sum to 1\.13 in row 1 .* divide both cosines by their norm\)$"
+    ):
         inputs_of({**table, "cos_x": rows * [0.8], "cos_y": rows * [0.7]}, start, build_radio(spec.radio))
 
 
@@ -34,7 +36,8 @@ def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpe
     [
         ("delay_s", 33.0, "delay_s: 33 in row 1 of the data; give numbers in seconds"),
         ("delay_s", -1e-9, "delay_s: -1e-09 in row 1 of the data; give .*none below 0"),
-        ("cos_x", 1.7, "cos_x: 1.7 in row 1 of the data; give direction cosines from -1 to 1"),
+        ("cos_x", 1.7, "cos_x: 1.7 in row 1 of the data; give direction cosines from -1 to 1, not angles$"),
+        ("cos_y", -1.01, "cos_y: -1.01 in row 1 .* from -1 to 1 .bring estimates beyond the horizon back .* norm.$"),
         ("delay_std_s", -1e-10, "delay_std_s: -1e-10 in row 1 of the data"),
         ("delay_std_s", np.inf, "delay_std_s: no finite number in row 1 of the data"),
         ("delay_std_s", 0.01, "delay_std_s: 0.01 in row 1 of the data; give numbers in seconds, at least"),

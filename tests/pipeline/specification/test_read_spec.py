@@ -18,6 +18,7 @@ from rislam_rt.pipeline.specification.pipeline_spec import (
     SlamSection,
     build_settings,
 )
+from rislam_rt.shipped import find_pipeline
 from rislam_rt.slam import NestedConfig, SlamConfig
 
 MINIMAL = 'name = "small"\n'
@@ -140,6 +141,16 @@ def test_a_setting_handed_on_to_other_sections_is_complained_about_once(write, s
         load_spec(write(MINIMAL), [setting])
     assert len(caught.value.lines) == 1
     assert caught.value.lines[0].startswith(f"--set: {setting.partition('=')[0]}")
+
+
+def test_a_built_in_pipeline_is_found_by_name_and_a_file_of_that_name_first(tmp_path, monkeypatch):
+    """It said: no such pipeline file; did you mean 'trace_then_slam'?"""
+    monkeypatch.chdir(tmp_path)
+    assert load_spec("trace_then_slam", ["seed=3"]) == load_spec(find_pipeline("trace_then_slam"), ["seed=3"])
+    with pytest.raises(ConfigError, match=r"no such pipeline file; did you mean 'trace_then_slam'\?"):
+        load_spec("trace_then_slan")
+    (tmp_path / "trace_then_slam").write_text(MINIMAL)
+    assert load_spec("trace_then_slam").name == "small"
 
 
 def test_missing_file_and_folder(tmp_path):
