@@ -60,6 +60,7 @@ def test_the_place_errs_as_much_as_the_heading_at_the_start_says(room):
         spread, off = found.covariance[:2, :2] - 0.01**2 * np.eye(2), (found.position - motion.position[-1])[:2]
         # the told velocity is not the true one; without the start's own place
         assert np.sqrt(across @ spread @ across) == pytest.approx(turn_std * reach, rel=0.25)
+        assert found.heading_std == pytest.approx(turn_std, rel=0.25)
         assert abs(found.heading - 0.32) < 4.0 * turn_std
         square.append((across @ off) ** 2 / (across @ spread @ across))  # the start's place was right
         # hindsight is in the same frame
