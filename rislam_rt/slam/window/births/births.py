@@ -128,7 +128,8 @@ def _enter(
     """Add a new feature with its track's history to the map and solve the window again; if they do not fit, or the
     other tracks speak against the motion that follows, return the state as it was, and False."""
     new = len(context.landmarks.ident)
-    holds = decision.holds._replace(feature=np.full(len(decision.holds.std), new))
+    other = decision.holds.other if context.window.turns else np.full(len(decision.holds.std), -1)
+    holds = decision.holds._replace(feature=np.full(len(decision.holds.std), new), other=other)
     window = window_features.add_feature(context.window, decision.place, holds)
     landmarks = enter(context.landmarks, decision.is_wall, histories.middle, len(at), 5.0, decision.identity)
     forms = np.full((2, 5), UNKNOWN)

@@ -13,14 +13,15 @@ class DirectionPriors(NamedTuple):
     """Priors on N single directions of wall features, each a mixture: the wall is upright, level or at right angles to
     another, or stands anyhow.
 
-    Gravity tells what is upright. What is at right angles only the other wall tells, with which it turns: where the
-    heading is estimated, nothing but the start tells how the room is turned.
+    Gravity tells what is upright. What is at right angles only the other wall tells, with which it turns where the
+    heading is estimated, as nothing but the start tells then how the room is turned. With a compass it is the other
+    wall as it stood at the birth, which the new one then leaves alone.
     """
 
     feature: Integers
     """(N,) index of the feature."""
     other: Integers
-    """(N,) index of the wall to which it is at right angles or parallel, -1 where it is upright or level."""
+    """(N,) index of the wall with which it turns, to which it is at right angles or parallel; -1 for none."""
     axis: Floats
     """(N, 3) unit vectors across which the feature lies from its anchor, if the prior holds; of right angles, at the
     last evaluation."""
