@@ -131,15 +131,11 @@ def _why_unheard(delay: Floats, settings: Settings) -> str:
         return ""
     first, last = settings.sensor.window
     if (delay > last).all():
-        return (
-            f"never heard: its paths come in after {1e9 * delay.min():.3g} ns or more, "
-            f"later than receiver.max_delay, {1e9 * last:.3g} ns"
-        )
+        late, most = f"{1e9 * delay.min():.3g}", f"{1e9 * last:.3g}"
+        return f"never heard: its paths come in later than receiver.max_delay, {most} ns: after {late} ns or more"
     if (delay < first).all():
-        return (
-            f"never heard: its paths come in after {1e9 * delay.max():.3g} ns or less, "
-            f"before receiver.min_delay, {1e9 * first:.3g} ns"
-        )
+        soon, least = f"{1e9 * delay.max():.3g}", f"{1e9 * first:.3g}"
+        return f"never heard: its paths come in before receiver.min_delay, {least} ns: after {soon} ns or less"
     if settings.sensor.in_window(delay).all():
         return "never heard: its paths come from below the array, which hears from above only"
     return "never heard: its paths come from below the array, or beyond the receiver's delays"
@@ -155,7 +151,8 @@ def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
     strongest = snr.max(axis=1)
     below = 10.0 * np.log10(threshold / max(float(strongest.max()), 1e-300))
     if below > 0.0:
-        return f"never heard: its strongest path stays {below:.{0 if below >= 1.0 else 1}f} dB below the threshold"
+        margin = f"{below:.0f}" if below >= 1.0 else f"{below:.1f}"
+        return f"never heard: its strongest path stays {margin} dB below the threshold"
     heard = float(np.mean(strongest > threshold))
     if heard < 0.05:
         return f"heard in {100.0 * heard:.1f} % of the cycles only"
