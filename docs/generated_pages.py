@@ -26,7 +26,7 @@ def cli_page() -> Iterator[str]:
     """Every command with its arguments and options."""
     yield "# Command line\n"
     yield "`rislam-rt COMMAND --help` says the same. Exit codes: 0 done, 1 a failure in the work, 2 bad"
-    yield "input, 3 the machine lacks something, 4 the disk.\n"
+    yield "input, 3 the machine lacks something, 4 the disk, 130 interrupted.\n"
     group: Any = typer.main.get_command(app)
     for name, command in group.commands.items():
         context = command.context_class(command, info_name=f"rislam-rt {name}")

@@ -15,7 +15,8 @@ COMMANDS = (
 
 app = typer.Typer(
     name="rislam-rt",
-    epilog="Exit codes: 0 done, 1 a failure in the work, 2 bad input, 3 the machine lacks something, 4 the disk.",
+    epilog="Exit codes: 0 done, 1 a failure in the work, 2 bad input, 3 the machine lacks something, 4 the disk, "
+    "130 interrupted.",
     add_completion=True, pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
 )  # fmt: skip
 for _name in COMMANDS:

@@ -50,10 +50,10 @@ def command(
     from dataclasses import asdict
 
     from rislam_rt.adviser.cancelled_returns import cancelled_return_warnings
-    from rislam_rt.adviser.late_paths import late_path_warnings
     from rislam_rt.adviser.link_budget import survey
     from rislam_rt.cli.run import names_schemes
     from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.room.late_paths import late_path_warnings
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings
     from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.scene import check_scene
@@ -77,7 +77,7 @@ def command(
         if named or pipeline is not None:
             findings += _run_errors(checked, spec, (str(scene_file(scene)), str(file)), changed, named=named)
         findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
-        findings += late_path_warnings(looked, str(scene_file(scene)))
+        findings += late_path_warnings(looked.paths, looked.settings, str(scene_file(scene)))
         findings += cancelled_return_warnings(looked, str(scene_file(scene)))
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")

@@ -8,7 +8,7 @@ import typer
 
 from rislam_rt.cli.options import parse_point
 
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a folder that exists.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a room that this program made.")]
 _ROOM = "paper_room"
 
 
@@ -86,8 +86,9 @@ def command(
     if source is not None or floorplan is not None:
         from rislam_rt.scene.importing import ImportOptions, import_corners, import_room
         from rislam_rt.scene.importing.materials import parse_choices, parse_material
+        from rislam_rt.scene.importing.mesh_source import ANY_UNIT
 
-        x, y, z = parse_point("--origin", origin).tolist()
+        x, y, z = parse_point("--origin", origin, ANY_UNIT).tolist()
         options = ImportOptions(
             units=units, up=up, origin=(x, y, z), carrier_ghz=carrier_ghz, detail=detail, curved=curved, scan=scan,
             max_walls=max_walls, fill=fill, materials=parse_choices(material or []),
@@ -107,7 +108,8 @@ def command(
         from rislam_rt.scene.random_rooms import draw_room
 
         room = draw_room(seed)
-        write_scene(room.scene, scene, overwrite=overwrite)
+        about = f"Made by `rislam-rt new --seed {seed}`: {room.shape}, {room.motion}."
+        write_scene(room.scene, scene, overwrite=overwrite, about=about)
         _tell_left(scene, before)
         typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
         return

@@ -116,13 +116,13 @@ def check_one_scene(scene: Path | None, changed: Sequence[str] | None) -> None:
         raise ConfigError(f"--set scene: --scene {scene} is given too; leave one of them out")
 
 
-def parse_point(option: str, text: str) -> "Floats":
-    """Point or vector (3,) from the text `x,y,z` of a command line option.
+def parse_point(option: str, text: str, farthest: float = FARTHEST) -> "Floats":
+    """Point or vector (3,) from the text `x,y,z` of a command line option, within `farthest` along each axis.
 
     Raises
     ------
     ConfigError
-        It is not three numbers, or one lies beyond what a scene may hold.
+        It is not three numbers, or one lies beyond that: by default, beyond what a scene may hold.
     """
     import numpy as np
 
@@ -133,9 +133,9 @@ def parse_point(option: str, text: str) -> "Floats":
         values = np.array([parse_number(part) for part in text.split(",")])
     except ValueError:
         values = np.zeros(0)
-    if values.shape == (3,) and (np.abs(values) > FARTHEST).any():
+    if values.shape == (3,) and (np.abs(values) > farthest).any():
         raise ConfigError(
-            f"{option}: '{text[:60]}' received; give at most {FARTHEST:g}, counted from a point in the room or near it"
+            f"{option}: '{text[:60]}' received; give at most {farthest:g}, counted from a point in the room or near it"
         )
     if values.shape != (3,) or not np.isfinite(values).all():
         raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")

@@ -95,6 +95,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> N
     about = find_run(folder, identity)
     if about is not None and about["state"] == DONE:
         show_run(folder, about, given)
+        opened.warn(but=SPREAD)
         return
     prepare_channel(spec.channel)
     opened.warn(but=SPREAD)

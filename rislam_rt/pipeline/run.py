@@ -19,13 +19,14 @@ from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
+from rislam_rt.pipeline.room.late_paths import late_path_warnings
 from rislam_rt.pipeline.room.motion_warnings import motion_warnings
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.room.true_motion import draw_looks, draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_receiver
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_receiver, build_settings
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
@@ -159,7 +160,7 @@ def result_of(
     return SlamResult(
         name=spec.name, scene=setup.scene, paths=replace(setup.paths, ris=None), schemes=schemes,
         config=spec.model_dump(mode="json"), seed=seed, versions=library_versions(), seconds={"trace": setup.seconds},
-        warnings=run_warnings(setup.scene, spec),
+        warnings=(*run_warnings(setup.scene, spec), *late_warnings(setup.scene, setup.paths, spec)),
     )  # fmt: skip
 
 
@@ -222,6 +223,13 @@ def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
     moving = motion_warnings(scene, build_receiver(spec.receiver, panels), f"scene '{scene.name}'")
     return (*(_large_panels(scene, spec) if panels else ()), *(finding.line for finding in moving))
+
+
+def late_warnings(scene: Scene, paths: Paths, spec: PipelineSpec) -> tuple[str, ...]:
+    """Warnings of a run, one line at most: paths that come in later than the receiver hears, as `check` says."""
+    panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
+    found = late_path_warnings(paths, build_settings(spec, panels), f"scene '{scene.name}'")
+    return tuple(finding.line for finding in found)
 
 
 def _large_panels(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:

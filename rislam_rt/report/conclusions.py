@@ -6,14 +6,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
 from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
-from rislam_rt.pipeline.scores.summary import landmark_track
+from rislam_rt.pipeline.scores.summary import panel_track
 from rislam_rt.pipeline.scores.wall_scores import found_of_heard
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings, build_settings
 from rislam_rt.slam.step_info import StepOutcome
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
@@ -74,16 +74,12 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
 
 
 def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
-    """Conclusion when the panel was found: time [s] from which on a scheme's map has it identified to the end; None if
-    not then."""
+    """Conclusion when the panel was found: time [s] from which on, to the end, what a scheme's map holds for it lies by
+    it; None if not then."""
     if panel >= len(result.scene.panels):
         return None
-    column = landmark_track(result.scene, scheme).column[:, len(result.scene.scatterers) + panel]
-    rows = np.arange(len(column))
-    if not len(column) or column[-1] < 0:
-        return None
-    known = (column >= 0) & scheme.named(panel)[rows, column]
-    if not known[-1]:
+    known = panel_track(result.scene, scheme)[:, panel] >= 0
+    if not len(known) or not known[-1]:
         return None
     gaps = np.flatnonzero(~known)
     first = int(gaps[-1]) + 1 if len(gaps) else 0
@@ -114,13 +110,35 @@ def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]
     # what comes from below the array, or outside the receiver's window, is not heard however strong it is
     audible = audible_paths(replace(paths, gain=scheme.gain), settings, use_vt=True)
     valid = paths.valid & (audible | (snr < threshold))
-    snr[~valid] = 0.0
     for number, (name, entry) in enumerate(scores["landmarks"].items()):
         panel = "cycles_identified" in entry
-        if entry["final_m"] is not None or (panel and not scheme.levels):
+        if panel and (not scheme.levels or entry["identified_last"]):
+            continue
+        if entry["final_m"] is not None:
+            if panel:
+                yield f"{name}: a landmark lies there, which the map does not take for the panel"
             continue
         own = (paths.landmark == number) & (paths.kind != PathKind.LOS) & (paths.kind != PathKind.VT)
-        yield f"{name}: {why_not(snr[:, own], valid[:, own], threshold)}"
+        loud = paths.valid[:, own] & (snr[:, own] >= threshold)
+        unheard = "" if audible[:, own].any() else _why_unheard(paths.tau[:, own][loud], settings)
+        yield f"{name}: {unheard or why_not(np.where(valid, snr, 0.0)[:, own], valid[:, own], threshold)}"
+
+
+def _why_unheard(delay: Floats, settings: Settings) -> str:
+    """Conclusion why loud paths of these delays (N,) [s] are not heard, in words: beyond the receiver's window, or from
+    below the array; empty without any."""
+    if not len(delay):
+        return ""
+    first, last = settings.sensor.window
+    if (delay > last).all():
+        late, most = f"{1e9 * delay.min():.3g}", f"{1e9 * last:.3g}"
+        return f"never heard: its paths come in later than receiver.max_delay, {most} ns: after {late} ns or more"
+    if (delay < first).all():
+        soon, least = f"{1e9 * delay.max():.3g}", f"{1e9 * first:.3g}"
+        return f"never heard: its paths come in before receiver.min_delay, {least} ns: after {soon} ns or less"
+    if settings.sensor.in_window(delay).all():
+        return "never heard: its paths come from below the array, which hears from above only"
+    return "never heard: its paths come from below the array, or beyond the receiver's delays"
 
 
 def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
@@ -133,7 +151,8 @@ def why_not(snr: Any, valid: Booleans, threshold: float) -> str:
     strongest = snr.max(axis=1)
     below = 10.0 * np.log10(threshold / max(float(strongest.max()), 1e-300))
     if below > 0.0:
-        return f"never heard: its strongest path stays {below:.0f} dB below the threshold"
+        margin = f"{below:.0f}" if below >= 1.0 else f"{below:.1f}"
+        return f"never heard: its strongest path stays {margin} dB below the threshold"
     heard = float(np.mean(strongest > threshold))
     if heard < 0.05:
         return f"heard in {100.0 * heard:.1f} % of the cycles only"

@@ -19,6 +19,11 @@ from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
 
 ZOOM = 0.25
 """Half the width [m] of the close-up of the trajectory's end, unless the error is larger."""
+INSET, LEAST_ZOOM = 0.36, 2.0
+"""Width of the close-up in the map, as a share of the room's narrower side, and how much a wider one enlarges at
+least: an end further off is seen in the map itself."""
+PANE, CAPTION = 270.0, 72.0
+"""[pt] About the width of a room in the figure, and the least of a close-up with a caption of words below it."""
 
 SHADE = "#d9cdb8"
 """Colour of occluders."""
@@ -30,25 +35,30 @@ WALL_NAME, MOST_NAMES = "#54606e", 40
 def draw_above(result: SlamResult) -> Figure:
     """Draw a run's true and estimated trajectory, landmarks and walls from above, for each scheme side by side.
 
-    Each has a close-up of the trajectory's end.
+    Each has a close-up of the trajectory's end, but for estimates that end too far off for one.
     """
     schemes = list(result.schemes.values())
     low, high = result.scene.bounds
     aspect = (high[1] - low[1]) / (high[0] - low[0])
+    rows = 2 if len(schemes) > 1 else 4  # of the legend, which is wider than one map
     with styled():
-        figure = Figure(figsize=(5.4 * len(schemes), 5.4 * aspect + 1.4))
-        axes = figure.subplots(1, len(schemes), squeeze=False, sharey=True)[0]
+        figure = Figure(figsize=(5.4 * len(schemes), 5.4 * aspect + 1.0 + 0.2 * rows))
+        axes = figure.subplots(1, len(schemes), squeeze=False, sharex=True, sharey=True)[0]
         final = [scheme.position[-1, :2] - result.scene.agent.position[-1, :2] for scheme in schemes]
-        half = max(ZOOM, 2.5 * float(np.linalg.norm(final, axis=1).max()))
-        for axis, scheme in zip(axes, schemes, strict=True):
+        need = 2.5 * np.linalg.norm(final, axis=1)
+        near = need <= max(ZOOM, 0.5 * INSET * float(np.min(high[:2] - low[:2])) / LEAST_ZOOM)
+        half = max(ZOOM, float(need[near].max(initial=0.0)))
+        for axis, scheme, close in zip(axes, schemes, near.tolist(), strict=True):
             draw_plan(axis, result.scene)
             _draw_estimate(axis, result.scene, scheme)
-            _draw_close_up(axis, result.scene, scheme, half)
-            error = np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1)))
-            axis.set_title(f"{scheme.scheme}: agent RMSE {100.0 * error:.1f} cm", weight="bold")
+            if close:
+                _draw_close_up(axis, result.scene, scheme, half)
+            error = float(np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1))))
+            length = f"{100.0 * error:.1f} cm" if error < 1.0 else f"{error:.2f} m"
+            axis.set_title(f"{scheme.scheme}: agent RMSE {length}", weight="bold")
             axis.set_xlabel("x [m]")
         axes[0].set_ylabel("y [m]")
-        figure.legend(handles=_legend(), loc="outside lower center", ncols=4, fontsize=9)
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=8 // rows, fontsize=9)
     return figure
 
 
@@ -146,7 +156,7 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) 
     low, high = scene.bounds[:, :2]
     # The corner of the room that is farthest from everything drawn holds the close-up.
     busy = np.concatenate([scene.agent.position[:, :2], scene.landmark_positions[:, :2]])
-    side = 0.36 * float(np.min(high - low))
+    side = INSET * float(np.min(high - low))
     corners = [np.array([x, y]) for x in (low[0] + 0.03 * side, high[0] - 1.03 * side)
                for y in (low[1] + 0.03 * side, high[1] - 1.03 * side)]  # fmt: skip
     free = [np.min(np.linalg.norm(busy - (corner + 0.5 * side), axis=1)) for corner in corners]
@@ -158,10 +168,14 @@ def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) 
     inset.plot(*estimate, "o", color=colour, ms=5)
     inset.plot(*ellipse(estimate, scheme.covariance[-1, :2, :2]).T, color=colour, lw=1.0)
     close_up(inset, truth, half)
-    inset.text(0.5, 0.03, f"end, {100.0 * 2.0 * half:.0f} cm wide", fontsize=8.5, ha="center",
+    width = f"{200.0 * half:.0f} cm" if half < 0.5 else f"{2.0 * half:.1f} m"
+    words = f"end, {width} wide" if PANE * side / float(high[0] - low[0]) >= CAPTION else width
+    inset.text(0.5, 0.03, words, fontsize=8.5, ha="center",
                transform=inset.transAxes)  # fmt: skip
     for spine in inset.spines.values():
         spine.set_color("#555555")
+    axis.update_datalim([truth - half, truth + half])  # the frame is not cut off at the map's, and would cross it
+    axis.autoscale_view()
     axis.indicate_inset_zoom(inset, edgecolor="#555555")
 
 

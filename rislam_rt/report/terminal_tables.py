@@ -45,6 +45,7 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
             [f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)]
             for name in first["landmarks"]
         ),
+        *_panel_rows(schemes),
         *_wall_rows(schemes),
     ]
     shares = [[share_text(s["association"][name]) for name in ("precision", "recall")] for s in schemes]
@@ -59,6 +60,18 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     if any(s["lost"]["times"] for s in schemes):
         rows.append(["because", *(words_of_loss(s["lost"]) if s["lost"]["times"] else "-" for s in schemes)])
     return rows
+
+
+def _panel_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Rows of a terminal table: whether the last map has each panel; none of a summary that does not say so."""
+    entries = schemes[0]["landmarks"]
+    panels = [name for name, entry in entries.items() if "identified_last" in entry]
+    cells = {None: "-", True: "yes", False: "no"}
+    return [
+        [f"panel {name} found" if len(panels) > 1 else "panel found"]
+        + [cells[s["landmarks"][name]["identified_last"]] for s in schemes]
+        for name in panels
+    ]
 
 
 def _wall_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:

@@ -5,7 +5,7 @@ from textwrap import fill
 from typing import Any
 
 from rislam_rt.scene.meshes import Mesh, ply_bytes
-from rislam_rt.scene.scene_folder import SCENE_FILE, mesh_file
+from rislam_rt.scene.scene_folder import README, SCENE_FILE, mesh_file
 from rislam_rt.toml import toml_bytes
 
 PAPER_MATERIAL = {"reflection": 0.85}
@@ -45,7 +45,10 @@ def panel(
 
 
 def room_files(room: RoomFiles, origin: str) -> dict[str, bytes]:
-    """Files of a new room's scene folder: relative name -> content. `origin` says where the room comes from."""
+    """Files of a new room's scene folder: relative name -> content. `origin` says where the room comes from.
+
+    A file's name in the README that is not text has question marks in place of what is none.
+    """
     files = {mesh_file(name): ply_bytes(*mesh) for name, mesh in room.meshes.items()}
     readme = f"# {room.table['name']}\n\n{fill(room.readme, 110)}\n\n{origin}\n"
-    return files | room.files | {SCENE_FILE: toml_bytes(room.table), "README.md": readme.encode()}
+    return files | room.files | {SCENE_FILE: toml_bytes(room.table), README: readme.encode(errors="replace")}

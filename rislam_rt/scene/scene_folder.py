@@ -13,6 +13,8 @@ from rislam_rt.shipped import find_room
 
 SCENE_FILE = "scene.toml"
 """Name of the scene file in a scene folder."""
+README = "README.md"
+"""Name of the file in a scene folder that says where the room comes from."""
 
 BELOW = "give a relative path below it, with / between folders"
 """How to mend the path of a scene's file; a backslash in quotes is no separator, and often another character."""

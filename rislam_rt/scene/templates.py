@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from rislam_rt.errors import SceneError
-from rislam_rt.scene.scene_folder import SCENE_FILE
+from rislam_rt.scene.scene_folder import README, SCENE_FILE
 from rislam_rt.scene.write import write_files
 from rislam_rt.shipped import shipped_missing, shipped_rooms
 from rislam_rt.toml import parse_toml, toml_bytes
@@ -30,8 +30,8 @@ def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> 
     files = {file.relative_to(room).as_posix(): file.read_bytes() for file in sorted(room.rglob("*")) if file.is_file()}
     name = room_name(Path(folder), template)
     files[SCENE_FILE] = toml_bytes(parse_toml(files[SCENE_FILE].decode()) | {"name": name})
-    _, about, _ = files["README.md"].decode().split("\n\n", 2)
-    files["README.md"] = f"# {name}\n\n{about}\n\nMade by `rislam-rt new --template {template}`.\n".encode()
+    _, about, _ = files[README].decode().split("\n\n", 2)
+    files[README] = f"# {name}\n\n{about}\n\nMade by `rislam-rt new --template {template}`.\n".encode()
     return write_files(files, folder, overwrite=overwrite)
 
 

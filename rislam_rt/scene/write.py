@@ -1,9 +1,10 @@
 """Writing of a `Scene` as a scene folder, whole or not at all."""
 
 import os
+import re
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +14,30 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError, StoreError
 from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.scene_folder import SCENE_FILE, mesh_file
+from rislam_rt.scene.scene_folder import README, SCENE_FILE, mesh_file
 from rislam_rt.scene.shapes import solid_mesh
-from rislam_rt.toml import toml_bytes
+from rislam_rt.toml import parse_toml, toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
 """Name of the agent's path in a scene folder."""
+MADE = re.compile(
+    r"(Made|Written) by `(rislam-rt new |python tools/build_scenes\.py )|`rislam-rt new ROOM --from scene\.xml` brings"
+)
+"""Line in the README of a room that this program wrote, by which its folder is recognised."""
 
 
-def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a scene as the files of a scene folder. Returns the folder.
+def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False, about: str = "") -> Path:
+    """Write a scene as the files of a scene folder, with a README if `about` is given. Returns the folder.
 
     Raises
     ------
     SceneError
-        The folder exists and `overwrite` is False.
+        The folder exists and `overwrite` is False, or it holds a scene that this program did not make (`check_made`).
     StoreError
         The disk refused.
     """
-    return write_files(scene_files(scene), folder, overwrite=overwrite)
+    readme = {README: f"# {scene.name}\n\n{about}\n".encode(errors="replace")} if about else {}
+    return write_files(scene_files(scene) | readme, folder, overwrite=overwrite)
 
 
 def scene_files(scene: Scene) -> dict[str, bytes]:
@@ -52,12 +58,14 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     """Write files (relative name -> content) under a folder, such as a scene's: a new folder appears complete, by one
     rename.
 
-    With `overwrite`, files of an existing folder are replaced one by one and others in it stay.
+    With `overwrite`, files of an existing folder are replaced one by one, if this program made the room there
+    (`check_made`), and others in it stay.
 
     Raises
     ------
     SceneError
-        The folder exists and `overwrite` is False.
+        The folder exists and `overwrite` is False, it holds files of these names that this program did not make, or its
+        place is taken by a file.
     StoreError
         The disk refused.
     """
@@ -68,6 +76,11 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
         raise SceneError(f"{str(folder)[:80]}: cannot be used ({error.strerror}); give another folder") from None
     if there and not overwrite:
         raise SceneError(f"{folder}: exists already; give a folder that does not exist yet")
+    taken = next((place for place in (folder, *folder.parents) if os.path.lexists(place)), folder)
+    if os.path.exists(taken) and not os.path.isdir(taken):
+        raise SceneError(f"{taken}: is not a folder; give another")
+    if there:
+        check_made(folder, files)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
@@ -79,6 +92,46 @@ def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bo
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written ({error.strerror}); check permissions and free space") from None
     return folder
+
+
+def check_made(folder: Path, names: Iterable[str]) -> None:
+    """Check that files of these names (relative to a folder) may be written over: that what is there this program made.
+
+    A room of its making is known by a line of its README, or, without one, by a scene file just as it writes it. An
+    empty file may be replaced.
+
+    Raises
+    ------
+    SceneError
+        One of them is of another's making, or cannot be read.
+    """
+    there = [name for name in names if os.path.lexists(folder / name) and not _is_empty(folder / name)]
+    if not there or MADE.search(_content(folder / README)):
+        return
+    text = _content(folder / SCENE_FILE)
+    try:
+        written = bool(text) and toml_bytes(parse_toml(text)).decode() == text
+    except ValueError:
+        written = False
+    foreign = README if README in there else "" if written else SCENE_FILE if SCENE_FILE in there else there[0]
+    if foreign:
+        raise SceneError(
+            f"{folder}: '{foreign}' there is not of this program's making, and would be replaced; give another folder, "
+            "or move it away"
+        )
+
+
+def _is_empty(path: Path) -> bool:
+    """Whether a file that a written scene would replace holds nothing."""
+    return path.is_file() and path.stat().st_size == 0
+
+
+def _content(path: Path) -> str:
+    """Text of a file in a scene's folder before it is written over; empty where there is none to read."""
+    try:
+        return path.read_bytes().decode(errors="replace")
+    except OSError:
+        return ""
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:

@@ -1,5 +1,6 @@
 """A command replaces the files that the program made, and no others unless it is told to."""
 
+import json
 import os
 from pathlib import Path
 
@@ -148,6 +149,34 @@ def test_a_folder_in_a_files_place_is_known_before_anything_is_worked_out(run, t
     (tmp_path / "mine").mkdir()
     code, out, err = run("trace", "empty_box", "--channel", "image_source", "--out", "mine")
     assert (code, out, err) == (2, "", "error: --out mine: is a folder; give the name of a file\n")
+
+
+def test_a_new_room_takes_no_place_of_what_another_made(run, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    for words in (("new", "file", "--overwrite"), ("new", "file/below")):
+        assert run(*words) == (2, "", "error: file: is not a folder; give another\n")
+    (tmp_path / "project").mkdir()
+    (tmp_path / "project" / "README.md").write_text("mine")
+    code, out, err = run("new", "project", "--overwrite")
+    assert (code, out) == (2, "")
+    assert err.startswith("error: project: 'README.md' there is not of this program's making")
+    assert [path.name for path in (tmp_path / "project").iterdir()] == ["README.md"]
+    for words in (("--seed", 7), ("--seed", 8), ("--floorplan", "0,0 4,0 4,3 0,3")):
+        assert run("new", "mine", *words, "--overwrite")[0] == 0
+        edited = tmp_path / "mine" / "scene.toml"
+        edited.write_text(edited.read_text() + "# a remark\n")
+
+
+def test_an_origin_may_be_one_of_a_map_and_a_name_no_text(run, tmp_path):
+    name = os.fsdecode(b"B\xfcro.geojson")
+    corners = [[500_000 + x, 5_400_000 + y] for x, y in ((0, 0), (5, 0), (5, 4), (0, 4), (0, 0))]
+    (tmp_path / name).write_text(json.dumps({"type": "Polygon", "coordinates": [corners]}))
+    code, _, err = run("new", "mine", "--from", name)
+    assert (code, err.count("--origin ")) == (2, 1)
+    origin = err.split("--origin ")[1].split(", a point")[0]
+    code, out, _ = run("new", "mine", "--from", name, "--origin", origin)
+    assert code == 0
+    assert "mine: made from 'B\\udcfcro.geojson'" in out
 
 
 def test_a_new_room_over_another_tells_which_files_remain(run, tmp_path):

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.pipeline.scores.summary import summarise
+from rislam_rt.pipeline.scores.summary import landmark_scores, summarise
 from rislam_rt.report.conclusions import judge_run, panel_found_at, why_not
 from rislam_rt.report.page import build_page
+from rislam_rt.report.terminal_tables import summary_rows
 
 
 def test_the_page_begins_with_the_error_of_every_scheme(result):
@@ -58,6 +59,54 @@ def test_the_panel_is_found_from_when_it_stays(result):
     assert panel_found_at(result, known(np.full((6, 1), 0.9))) == pytest.approx(0.3)
     assert panel_found_at(result, known(np.array([[0.9], [0.9], [0.9], [0.9], [0.1], [0.9]]))) == pytest.approx(0.5)
     assert panel_found_at(result, known(np.full((6, 1), 0.1))) is None
+
+
+def test_the_panel_is_found_though_a_ghost_lies_nearer_to_it(result):
+    """As in a stranger's lift: column 0 is a ghost at the very place, column 1 the landmark held for the panel."""
+    scheme, centre = result.schemes["random"], result.scene.ris.center
+    place = np.tile(centre + np.array([[0.0, 0.0, 0.0], [0.016, 0.0, 0.0]]), (6, 1, 1))
+    probability = np.tile([1e-9, 1.0], (6, 1))
+    both = {"ident": [3, 5], "parent": [-1, -1], "held": np.ones((6, 2), dtype=bool)}
+    there = replace(scheme, **both, landmark_position=place, ris_probability=probability)
+    assert panel_found_at(result, there) == 0.0
+    entry = landmark_scores(result.scene, there)["ris"]
+    assert entry["final_m"] == pytest.approx(0.016)
+    assert (entry["cycles_identified"], entry["identified_last"]) == (6, True)
+    away = replace(there, landmark_position=place + np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    assert panel_found_at(result, away) is None
+    off = {**result.schemes, "random": replace(away, outcome=scheme.outcome)}
+    summary = summarise(replace(result, schemes=off))
+    assert summary["schemes"]["random"]["landmarks"]["ris"]["identified_last"] is False
+    said = judge_run(replace(result, schemes=off), summary)
+    assert "panel not found" in said.schemes["random"]
+    assert "ris: a landmark lies there, which the map does not take for the panel" in said.missing["random"]
+    assert ["panel found", "no", "-"] in summary_rows(summary)
+
+
+def test_the_panel_is_judged_in_the_frame_that_the_filter_was_given(result):
+    """`score_run` takes the start's error out of the map before it asks for 1 m: so does the run."""
+    scheme, scene = result.schemes["random"], result.scene
+    one = {"ident": [5], "parent": [-1], "held": np.ones((6, 1), dtype=bool), "ris_probability": np.ones((6, 1))}
+    off = np.array([0.6, 0.0, 0.0])
+    there = replace(scheme, **one, landmark_position=np.tile(scene.ris.center + 2.0 * off, (6, 1, 1)))
+    start = scene.agent.position[0]
+    assert panel_found_at(result, replace(there, start_position=start)) is None
+    assert panel_found_at(result, replace(there, start_position=start + off)) == 0.0
+
+
+def test_paths_that_come_in_too_late_are_called_late(result):
+    """Loud in all cycles, and one of them weak in the first, which is not the reason."""
+    summary = summarise(result)
+    scheme = result.schemes["random"]
+    summary["schemes"]["random"]["landmarks"]["sphere"]["final_m"] = None
+    tau, gain = result.paths.tau + 200e-9, scheme.gain.copy()
+    gain[0] *= 1e-3
+    late = replace(
+        result, paths=replace(result.paths, tau=tau), schemes={**result.schemes, "random": replace(scheme, gain=gain)}
+    )
+    (said,) = (line for line in judge_run(late, summary).missing["random"] if line.startswith("sphere"))
+    assert "later than receiver.max_delay, 80 ns" in said
+    assert "below the threshold" not in said
 
 
 @pytest.mark.parametrize(

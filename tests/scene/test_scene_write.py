@@ -1,5 +1,6 @@
 """Written scenes read back equal, appear whole or not at all, and overwrite nothing unasked."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -79,8 +80,34 @@ def test_a_failed_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_a_file_in_the_way_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
-    with pytest.raises(StoreError):
-        write_files({"a": b""}, tmp_path / "file" / "below")
+    for folder, overwrite in (("file/below", False), ("file", True)):
+        with pytest.raises(SceneError, match="file: is not a folder"):
+            write_files({"a": b""}, tmp_path / folder, overwrite=overwrite)
+
+
+@pytest.mark.parametrize("foreign", ["README.md", "scene.toml", "meshes/floor.ply"])
+def test_what_another_made_is_never_replaced(tmp_path: Path, foreign: str) -> None:
+    """Not even with `overwrite`, which is for rooms of this program's making: as written, or as its README says."""
+    theirs = tmp_path / "project" / foreign
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text("# notes = 'my own'")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(SceneError, match=f"'{re.escape(foreign)}' there is not of this program's making"):
+        new_scene("paper_room", tmp_path / "project", overwrite=True)
+    assert sorted(tmp_path.rglob("*")) == before
+    assert theirs.read_text() == "# notes = 'my own'"
+
+
+def test_a_room_of_ours_is_replaced_when_told_so_though_it_was_edited(tmp_path: Path) -> None:
+    room = new_scene("paper_room", tmp_path / "mine")
+    (room / "scene.toml").write_text((room / "scene.toml").read_text() + "# a remark\n")
+    new_scene("l_room", room, overwrite=True)
+    scene = load_scene(SCENES / "paper_room")
+    written = write_scene(scene, tmp_path / "bare")  # without a README, and as it was written
+    assert_equal(scene, load_scene(write_scene(scene, written, overwrite=True)))
+    (written / "scene.toml").write_text("# mine now\n" + (written / "scene.toml").read_text())
+    with pytest.raises(SceneError, match=r"'scene\.toml' there is not"):
+        write_scene(scene, written, overwrite=True)
 
 
 def test_new_scene_from_a_template(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from rislam_rt.model import Scene, SlamResult
 from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.own_methods import is_own
-from rislam_rt.pipeline.run import library_versions, run_warnings, set_scene
+from rislam_rt.pipeline.run import late_warnings, library_versions, run_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise, summary_table
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
@@ -89,7 +89,8 @@ def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> L
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // slices.SHOWN)
-    lines = (*about["warnings"], f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
+    late = late_warnings(scene, paths, PipelineSpec.model_validate(dict(about["config"])))
+    lines = (*about["warnings"], *late, f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
     names = ("name", "seed", "config", "versions", "seconds")
     shown = SlamResult(
         scene=replace(scene, agent=motion), paths=paths, schemes=schemes, warnings=lines,

@@ -21,6 +21,7 @@ from rislam_rt.pipeline.scores.summary import (
     map_score,
     nees_per_dof,
     over_budget,
+    panel_track,
     relative_errors,
 )
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, wall_scores
@@ -45,7 +46,7 @@ class Tally:
         self.seconds = np.zeros(len(STEPS))
         count = len(scene.landmarks)
         self.landmark_square, self.held, self.identified = np.zeros(count), np.zeros(count, int), np.zeros(count, int)
-        self.landmark_final = np.full(count, np.nan)
+        self.landmark_final, self.identified_last = np.full(count, np.nan), np.zeros(count, bool)
         self.overlap = _Overlap()
         self.map: Any = None
         self.panel = False
@@ -113,15 +114,15 @@ class Tally:
 
     def _count_landmarks(self, part: SlicePart) -> None:
         """Tally a slice's squared errors of each landmark, and the cycles in which it is held and identified."""
-        track = landmark_track(self.scene, part.scheme)
+        track = landmark_track(self.scene, part.scheme, self.begin)
+        panels = panel_track(self.scene, part.scheme, self.begin)
         self.landmark_square += np.nansum(track.error**2, axis=0)
         self.held += (track.column >= 0).sum(axis=0)
         self.landmark_final = track.error[-1]
         for panel in range(len(self.scene.panels)):
             number = len(self.scene.scatterers) + panel
-            column = track.column[:, number]
-            rows = np.flatnonzero(column >= 0)
-            self.identified[number] += int(np.sum(part.scheme.named(panel)[rows, column[rows]]))
+            self.identified[number] += int(np.sum(panels[:, panel] >= 0))
+            self.identified_last[number] = panels[-1, panel] >= 0
 
     def _landmarks(self) -> dict[str, dict[str, Any]]:
         """Scores of each true landmark from the tally of a long run, by name."""
@@ -136,6 +137,7 @@ class Tally:
             }
             if self.scene.panel_number(number) >= 0:
                 found[name]["cycles_identified"] = int(self.identified[number])
+                found[name]["identified_last"] = bool(self.identified_last[number]) if self.panel else None
         return found
 
     def _count_components(self, part: SlicePart) -> None:

@@ -131,20 +131,44 @@ def over_budget(seconds: Mapping[str, float], budget: Mapping[str, float]) -> li
     return [step for step in STEPS if seconds[step] > budget[f"{step}_s"]]
 
 
-def landmark_track(scene: Scene, scheme: SchemeResult) -> LandmarkTrack:
+def panel_track(scene: Scene, scheme: SchemeResult, begin: Floats | None = None) -> Integers:
+    """Score of the panels: column (K, R) of the landmark that the map holds for each panel, if it lies by it; else -1.
+
+    It is the likeliest, above one half, within `NEAR_LANDMARK` of the panel; the map is shifted by the error of the
+    position that the estimator was told at the true start `begin` (3,) [m], the first of the scene's motion by default.
+    """
+    first = scene.agent.position[0] if begin is None else begin
+    shift = np.zeros(3) if scheme.start_position is None else scheme.start_position - first
+    column = np.full((len(scheme.position), len(scene.panels)), -1)
+    if not scheme.levels or not len(scheme.ident):
+        return column
+    rows = np.arange(len(column))
+    for number, panel in enumerate(scene.panels):
+        named = scheme.held & scheme.named(number)
+        best = np.argmax(np.where(named, scheme.ris_probability, 0.0), axis=1)
+        off = evaluate.position_errors(scheme.landmark_position[rows, best] - shift, panel.center)
+        column[:, number] = np.where(named[rows, best] & (off <= NEAR_LANDMARK), best, -1)
+    return column
+
+
+def landmark_track(scene: Scene, scheme: SchemeResult, begin: Floats | None = None) -> LandmarkTrack:
     """Match the map's points (no mirror images) one to one with the true landmarks in every cycle, for their scores.
 
-    Panels are matched with nothing in a scheme that has a plain wall in their place.
+    A panel is matched with the landmark that the map holds for it where that lies by it (`panel_track`, with `begin`),
+    though another may be nearer. Panels are matched with nothing in a scheme that has a plain wall in their place.
     """
     truth = scene.landmark_positions if scheme.levels else scene.landmark_positions[: len(scene.scatterers)]
     error = np.full((len(scheme.position), len(scene.landmarks)), np.nan)
     column = np.full(error.shape, -1)
     points = scheme.held & (scheme.parent < 0)
+    if scheme.levels:
+        column[:, len(scene.scatterers) :] = panel_track(scene, scheme, begin)
     for cycle in range(len(error)):
-        candidates = np.flatnonzero(points[cycle])
-        match = evaluate.match_points(scheme.landmark_position[cycle, candidates], truth, cutoff=NEAR_LANDMARK)
-        found = np.flatnonzero(match >= 0)
-        column[cycle, found] = candidates[match[found]]
+        candidates = np.setdiff1d(np.flatnonzero(points[cycle]), column[cycle])
+        free = np.flatnonzero(column[cycle, : len(truth)] < 0)
+        match = evaluate.match_points(scheme.landmark_position[cycle, candidates], truth[free], cutoff=NEAR_LANDMARK)
+        column[cycle, free[match >= 0]] = candidates[match[match >= 0]]
+        found = np.flatnonzero(column[cycle] >= 0)
         where = scheme.landmark_position[cycle, column[cycle, found]]
         error[cycle, found] = evaluate.position_errors(where, truth[found])
     return LandmarkTrack(error, column)
@@ -155,7 +179,7 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
 
     Null where it was never mapped; the bound is null where no path from it was detectable.
     """
-    track = landmark_track(scene, scheme)
+    track, panels = landmark_track(scene, scheme), panel_track(scene, scheme)
     scores: dict[str, dict[str, Any]] = {}
     for number, name in enumerate(scene.landmarks):
         error, column = track.error[:, number], track.column[:, number]
@@ -167,6 +191,7 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
             "cycles_held": len(cycles),
         }
         if (panel := scene.panel_number(number)) >= 0:
-            entry["cycles_identified"] = int(np.sum(scheme.named(panel)[cycles, column[cycles]]))
+            entry["cycles_identified"] = int(np.sum(panels[:, panel] >= 0))
+            entry["identified_last"] = bool(panels[-1, panel] >= 0) if scheme.levels else None
         scores[name] = entry
     return scores

@@ -75,7 +75,11 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
     Fault
         There is none, it is too large, or the system refuses.
     """
+    if path.is_dir():
+        raise Fault("is a folder", "give a file in it")
     if not path.is_file():
+        if path.exists():
+            raise Fault("is a pipe or a device, not a file", "copy what it gives into a file")
         raise Fault("no such file", "mend the path")
     try:
         with path.open("rb") as file:

@@ -14,7 +14,7 @@ from rislam_rt.scene.importing.floor_plans.svg_drawing import parse_svg
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.mesh_room import import_mesh
 from rislam_rt.scene.importing.mesh_source import read_content
-from rislam_rt.scene.importing.placement import check_size
+from rislam_rt.scene.importing.placement import check_near, check_size
 from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
 from rislam_rt.scene.load import check_scene
 from rislam_rt.scene.mesh_placement import UNITS
@@ -77,11 +77,11 @@ def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:
     """Import a floor plan (SVG or GeoJSON) as the draft of a room of a given height [m]."""
     content = read_content(file, MAX_PLAN_BYTES)
     shapes = parse_svg(content) if file.suffix.lower() == ".svg" else parse_geojson(content)
+    origin, unit = np.array(options.origin[:2]), UNITS[options.units or "m"]
     points = np.concatenate([shape.points for shape in shapes] or [np.zeros((1, 2))])
     if (np.abs(points) < IMMEASURABLE).all():  # what is beyond is refused with its shape's name
         check_size(float(np.linalg.norm(np.ptp(points, axis=0))), options.units)
-    origin = np.array(options.origin[:2])
-    unit = UNITS[options.units or "m"]
+        check_near(points * unit - origin, origin)
     shapes = [shape._replace(points=shape.points - origin / unit) for shape in shapes]
     return extrude(build_plan(shapes, unit, height), height, options)
 
@@ -106,7 +106,8 @@ def write_room(
     if errors:
         by_hand = "give another with --material NAME=... or --rest, or --carrier-ghz in that range"
         mend = by_hand if ".material." in errors[0].field else errors[0].mend
-        raise Fault(f"the room would not pass its check: {errors[0].field}: {errors[0].message}", mend)
+        place = f"{errors[0].field}: " if errors[0].field else ""
+        raise Fault(f"the room would not pass its check: {place}{errors[0].message}", mend)
     write_files(files, folder, overwrite=overwrite)
     return remarks + [
         f"{f.field}: {f.message}; {f.mend} (--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"

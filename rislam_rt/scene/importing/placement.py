@@ -8,6 +8,7 @@ from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.mesh_source import MeshPart
 from rislam_rt.scene.mesh_placement import UNITS, place_points
+from rislam_rt.scene.meshes import MAX_COORDINATE
 
 SMALLEST_ROOM, LARGEST_ROOM = 1.0, 200.0
 """Diagonals [m] outside of which an imported room is taken to be in a wrong unit, unless the user gave one."""
@@ -21,7 +22,7 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
     Raises
     ------
     Fault
-        The result has no room's size and the user gave no units.
+        The result has no room's size and the user gave no units, or lies too far from the room's zero.
     """
     units = options.units or "m"
     up = options.up or ("y" if suffix in (".glb", ".gltf") else "z")
@@ -30,12 +31,31 @@ def place_parts(parts: list[MeshPart], suffix: str, options: ImportOptions) -> t
     corners = np.concatenate([t.reshape(-1, 3) for t in placed])
     size = np.ptp(corners, axis=0)
     check_size(float(np.linalg.norm(size)), options.units)
+    check_near(corners, origin)
     remarks = [f"{size[0]:.3g} x {size[1]:.3g} x {size[2]:.3g} m, with units = {units}, up = {up}"]
     facing = np.abs(triangle_cross(np.concatenate(placed))).sum(axis=0)  # twice the area seen along each axis
     other = "y" if up == "z" else "z"
     if options.up is None and facing[1] > 1.2 * facing[2] and size[1] < size[2]:
         remarks.append(f"its largest surfaces look sideways: if it lies on its side, give --up {other}")
     return placed, remarks
+
+
+def check_near(points: Floats, origin: Floats) -> None:
+    """Refuse an imported room whose points (N, D) [m] lie too far from its zero, as in a map's coordinates, and say
+    which `--origin` brings it near; `origin` (D,) [m] is the one that it was placed by, D = 2 of a floor plan.
+
+    Raises
+    ------
+    Fault
+        A coordinate exceeds `MAX_COORDINATE`.
+    """
+    far = float(np.abs(points).max())
+    if far > MAX_COORDINATE:
+        low = [f"{value:.0f}" for value in np.floor(points.min(axis=0) + origin) + 0.0] + ["0"] * (3 - points.shape[1])
+        raise Fault(
+            f"it lies {far:.7g} m from the zero of its coordinates, and {MAX_COORDINATE:.0f} m are the most",
+            f"give --origin {','.join(low)}, a point beside it that becomes the room's zero",
+        )
 
 
 def check_size(diagonal: float, units: str | None) -> None:

@@ -58,6 +58,9 @@ def find_xml(source: str) -> Path:
     """
     if not source.startswith(SIONNA):
         path = Path(source)
+        if path.exists() and not path.is_file():
+            what = "is a folder" if path.is_dir() else "is a pipe or a device"
+            raise SceneError(f"{source[:120]}: {what}; give an XML scene, the file itself")
         if not path.is_file():
             raise SceneError(f"{source[:120]}: no such file; give an XML scene, or {SIONNA}NAME for one of Sionna's")
         return path

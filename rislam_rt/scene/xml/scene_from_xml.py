@@ -48,7 +48,9 @@ def new_from_xml(
     path = find_xml(source)
     scene, notes = scene_of_xml(path, room_name(Path(folder), path.stem), within)
     raise_errors(list(find_errors(scene, str(path))))
-    write_scene(scene, folder, overwrite=overwrite)
+    origin = f"Made by `rislam-rt new --from {path.name}`."
+    about = "\n".join([origin, "", *(f"- {note}" for note in notes)] if notes else [origin])
+    write_scene(scene, folder, overwrite=overwrite, about=about)
     return notes
 
 

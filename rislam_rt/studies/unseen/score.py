@@ -11,13 +11,14 @@ from rislam_rt.model import NOTHING, MapEstimate, PathKind
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
 from rislam_rt.pipeline.scores.audible_paths import heard_long
+from rislam_rt.pipeline.scores.summary import NEAR_LANDMARK
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0
 """[s] Time after which the RMSE is computed once more, when landmarks have been born."""
 LOST, FAR_OVER, LASTING = 0.1, 5.0, 1.0
 """A run is lost once its relative error exceeds `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] on end."""
-NEAR_POINT = 1.0
+NEAR_POINT = NEAR_LANDMARK
 """Largest distance [m] of an estimated point from the true landmark that it is matched with.
 
 For landmarks and walls the truth is first shifted to the map's frame, by the error of the start prior."""

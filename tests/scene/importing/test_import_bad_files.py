@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -185,10 +186,39 @@ def test_bad_file(case: str, tmp_path: Path, refuses: Callable[[Path, str], None
 def test_no_file_a_folder_and_too_large_a_one(tmp_path: Path, refuses: Callable[[Path, str], None]) -> None:
     refuses(tmp_path / "missing.glb", "no such file")
     (tmp_path / "folder.glb").mkdir()
-    refuses(tmp_path / "folder.glb", "no such file")
+    refuses(tmp_path / "folder.glb", "is a folder")
+    os.mkfifo(tmp_path / "pipe.obj")
+    refuses(tmp_path / "pipe.obj", "is a pipe or a device")
     with (tmp_path / "large.stl").open("wb") as file:
         file.truncate(200_000_001)
     refuses(tmp_path / "large.stl", "larger than")
+
+
+def test_what_lies_on_a_map_is_brought_near_as_the_line_says(
+    tmp_path: Path, refuses: Callable[[Path, str], None]
+) -> None:
+    """Coordinates of UTM, of a mesh and of a floor plan: an origin is proposed, and with it the room is made."""
+    place = np.array([500_000.0, 5_400_000.0, 120.0])
+    (tmp_path / "far.obj").write_text(
+        "".join("v {:.3f} {:.3f} {:.3f}\n".format(*point) for point in BOX.vertices + place)
+        + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in BOX.faces)
+    )
+    corners = [[500_000 + x, 5_400_000 + y] for x, y in ((0, 0), (4, 0), (4, 3), (0, 3), (0, 0))]
+    (tmp_path / "far.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": [corners]}))
+    for name, origin in (("far.obj", (500_000.0, 5_400_000.0, 120.0)), ("far.geojson", (500_000.0, 5_400_000.0, 0.0))):
+        said = ",".join(f"{value:.0f}" for value in origin)
+        refuses(tmp_path / name, f"from the zero of its coordinates, and 100000 m are the most; give --origin {said}, ")
+        folder = tmp_path / f"room-{name}"
+        import_room(tmp_path / name, folder, ImportOptions(origin=origin))
+        low, high = load_scene(folder).bounds
+        assert np.abs(np.stack([low, high])).max() < 10.0
+
+
+def test_a_name_that_is_no_text_is_written_as_well_as_it_goes(tmp_path: Path) -> None:
+    file = tmp_path / os.fsdecode(b"B\xfcro.obj")
+    file.write_text(OBJ)
+    import_room(file, tmp_path / "made", ImportOptions())
+    assert "Made from `B?ro.obj`" in (tmp_path / "made" / "README.md").read_text()
 
 
 def test_the_same_box_sound_is_a_room(tmp_path: Path) -> None:

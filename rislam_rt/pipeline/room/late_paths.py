@@ -1,6 +1,6 @@
 """Late paths of a room: heard paths that come in beyond the receiver's window of delays, and the setting that mends it.
 
-Nothing in a run tells of them: what the window cuts off is not reported, and what is later than the period of the
+No measurement tells of them: what the window cuts off is not reported, and what is later than the period of the
 sounding is reported as if it were shorter.
 """
 
@@ -10,28 +10,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.adviser.link_budget import Survey
-from rislam_rt.adviser.remedies import SELDOM
 from rislam_rt.arrays import Booleans
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.input_messages import share_text
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.measurement.config import MOST_TONES
 from rislam_rt.measurement.received_signal import SPARE, num_tones
-from rislam_rt.model import PathKind, RadioConfig
+from rislam_rt.model import PathKind, Paths, RadioConfig
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
+from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.scene.findings import Finding, warning_at
 
 STEP = 1e-8
 """[s] To a multiple of which the proposed delay is rounded up: 3 m of path, more than a way goes between two places."""
+SELDOM = 0.05
+"""Largest share of the loud paths that may be late without a warning."""
 MOST_NAMES = 4
 """Largest number of walls that a warning names."""
 
 
-def late_path_warnings(looked: Survey, file: str) -> Iterator[Finding]:
+def late_path_warnings(paths: Paths, settings: Settings, file: str) -> Iterator[Finding]:
     """Warning, one for a room, of late paths: more than `SELDOM` of those loud enough to be heard along the way come in
     after `receiver.max_delay`; `file` is what it names as its place."""
-    paths, settings = looked.paths, looked.settings
     sensor = replace(settings.sensor, window=(settings.sensor.window[0], np.inf))
     loud = audible_paths(paths, settings._replace(sensor=sensor), use_vt=settings.slam.use_vt)
     late = loud & (paths.tau > settings.receiver.max_delay)
@@ -44,20 +44,20 @@ def late_path_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     )
     if settings.receiver.estimator == "waveform" and latest > sensor.period:
         message += f", or, after {1e9 * sensor.period:.0f} ns, as if they were shorter"
-    walls = _walls(looked, late)
+    walls = _walls(paths, late)
     if walls:
         message += f"; returns of {', '.join(walls[:MOST_NAMES])}{' and more' if len(walls) > MOST_NAMES else ''} are "
         message += "among them"
     yield warning_at(file, "receiver.max_delay", message, _mend(settings.radio, settings.receiver, latest))
 
 
-def _walls(looked: Survey, late: Booleans) -> list[str]:
+def _walls(paths: Paths, late: Booleans) -> list[str]:
     """Walls whose own returns, over no other wall, are late paths, those first for which that is so at most places."""
     places: Counter[str] = Counter()
     for path in np.flatnonzero(late.any(axis=0)):
-        kind, _, tx, rx = looked.paths.identity(int(path))
+        kind, _, tx, rx = paths.identity(int(path))
         if kind == PathKind.VT and len(tx) + len(rx) == 1:
-            places[f"'{looked.paths.walls[(*tx, *rx)[0]]}'"] += int(late[:, path].sum())
+            places[f"'{paths.walls[(*tx, *rx)[0]]}'"] += int(late[:, path].sum())
     return [wall for wall, _ in places.most_common()]
 
 

@@ -2,23 +2,26 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rislam_rt.adviser.late_paths import late_path_warnings
 from rislam_rt.adviser.link_budget import survey
 from rislam_rt.cli.app import app
-from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline import load_spec, run_slam
+from rislam_rt.pipeline.room.late_paths import late_path_warnings
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.scene import load_scene
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 HALL, PAPER = (ROOT / "scenes" / name for name in ("large_hall", "paper_room"))
+SHORT = ["channel=image_source", "cycles=3", "depth=1", 'schemes=["no_ris"]']
 
 
 def lines(room: Path, *changed: str) -> list[str]:
     settings = build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
-    return [finding.line for finding in late_path_warnings(survey(load_scene(room), settings), "scene.toml")]
+    looked = survey(load_scene(room), settings)
+    return [finding.line for finding in late_path_warnings(looked.paths, looked.settings, "scene.toml")]
 
 
 def advised(line: str) -> list[str]:
@@ -59,6 +62,18 @@ def test_a_small_room_has_none_and_a_short_window_makes_some() -> None:
     assert lines(PAPER) == []
     (line,) = lines(PAPER, "receiver.max_delay=20e-9")
     assert advised(line) != ["receiver.max_delay=2e-08"]
+
+
+def test_a_run_says_what_check_said_of_late_paths() -> None:
+    """The run hears the true motion over three cycles, so that its figures differ, not the setting that mends it."""
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", [*SHORT, "receiver.max_delay=20e-9"])
+    result = run_slam(load_scene(PAPER), spec, rng=np.random.default_rng(7))
+    (line,) = result.warnings
+    assert line.startswith("scene 'paper_room': receiver.max_delay: ")
+    assert "after 20 ns" in line
+    (mended,) = (setting for setting in advised(line) if "max_delay" in setting)
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", [*SHORT, mended])
+    assert run_slam(load_scene(PAPER), spec, rng=np.random.default_rng(7)).warnings == ()
 
 
 def test_check_warns_of_them_and_counts_the_warning() -> None:
