@@ -39,7 +39,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     """Pose estimate (mean, covariance, equally likely samples; `ahead` [s] at constant velocity) and map estimate of
     the window filter."""
     mean, covariance, excess = window_gaussian.now_with_excess(state.window)
-    by, further = np.eye(6, len(mean)), state.heave_uncertainty
+    by, further = np.eye(len(mean)), state.heave_uncertainty
     if ahead and state.heaves:  # the next step's heave is another one
         mean[2] -= state.window.heave[-1]
         further = state.heave_variance or further
@@ -47,8 +47,12 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         slope, own = heave_now(state)
         by[2] -= slope
         further = own if state.window.heave_variance[-1] else own + further  # where it has ended, there may be one
+    places, walls = mean[HEAD:].reshape(-1, 3), state.landmarks.walls
+    leans = wall_planes(places, covariance[HEAD:, HEAD:], state.landmarks.anchor, walls)[2][:, 0]
+    covariance = by @ covariance @ by.T
+    covariance[:6, :6] += by[:6, :6] @ excess @ by[:6, :6].T
     mean, covariance, landmarks = _present(state, mean, covariance)
-    spread = by @ covariance @ by.T + by[:, :6] @ excess @ by[:, :6].T
+    spread = covariance[:6, :6].copy()
     spread[:3, :3] += np.diag(state.shift**2)
     spread[2, 2] += further
     position = mean[:3] + ahead * mean[3:6]
@@ -60,7 +64,7 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
         spread,
         position + even_draws(config.num_samples, root.shape[1]) @ root.T,
         state.scene.body,
-        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], landmarks, state.shift, mean[:3]),
+        build_map(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], landmarks, state.shift, mean[:3], leans),
         heading_std=float(np.sqrt(covariance[6, 6])) if config.heading == "estimated" else None,
     )
 
@@ -95,7 +99,9 @@ def revisit(
     """
     scene = state.scene
     fresh = init(replace(start, heading_std=0.0), scene.body, scene.ris, scene.sensor, config, rng=rng)
-    mean, covariance, earlier = _present(state, *window_gaussian.now(state.window))
+    mean, covariance, earlier = present_in_room(
+        state.frame, state.window, state.landmarks, *window_gaussian.now(state.window), images=True
+    )
     features = mean[HEAD:].reshape(-1, 3)
     spread = covariance[HEAD:, HEAD:] + shift_covariance(features, earlier, state.shift)
     std = np.concatenate([np.maximum(fresh.shift, 1e-5), np.sqrt(np.diag(fresh.window.covariance))[3:HEAD]])
@@ -109,12 +115,13 @@ def revisit(
 
 
 def build_map(
-    features: Floats, covariance: Floats, landmarks: WindowTable, shift: Floats, middle: Floats
+    features: Floats, covariance: Floats, landmarks: WindowTable, shift: Floats, middle: Floats, leans: Floats
 ) -> MapEstimate:  # fmt: skip
     """Map estimate of points, their mirror images in each wall, and walls; covariances include the start's error, which
     moves all together.
 
-    Of planes that are one wall, seen from `middle` (3,) [m], one is shown.
+    Of planes that are one wall, seen from `middle` (3,) [m], one is shown; none whose direction is hardly known, by its
+    deviation `leans` (W,) [rad], but for what all are turned by together.
     """
     if not len(landmarks.ident):
         return empty_map()
@@ -124,7 +131,7 @@ def build_map(
     place, spread = images_in(features, wide, landmarks.anchor, parent, wall)
     columns = 3 * points[:, None] + np.arange(3)
     normal, offset, std = wall_planes(features, wide, landmarks.anchor, walls)
-    known = (np.sqrt(2.0) * std[:, 0] < MAX_LEAN).nonzero()[0]
+    known = (np.sqrt(2.0) * leans < MAX_LEAN).nonzero()[0]
     known = known[~second_planes(features, covariance, landmarks, walls[known], middle)]
     strength, ratio = np.exp(landmarks.log_strength[0][points]), np.exp(landmarks.ratio[wall])
     probability = np.concatenate(

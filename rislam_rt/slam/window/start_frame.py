@@ -31,12 +31,14 @@ class StartFrame(NamedTuple):
     turn: float
     """[rad] the turn, were the first velocity as it was told."""
     variance: float
-    """[rad^2] of the turn, given the first velocity."""
+    """[rad^2] of the turn, given the first velocity..."""
+    prior: float
+    """[rad^2] ...and beforehand."""
 
 
 def no_frame(start: StartPrior) -> StartFrame:
     """Start frame that is the room's."""
-    return StartFrame(start.position, start.velocity[:2], np.zeros(2), 0.0, 0.0)
+    return StartFrame(start.position, start.velocity[:2], np.zeros(2), 0.0, 0.0, 0.0)
 
 
 def turned_with(start: StartPrior) -> StartFrame:
@@ -45,7 +47,7 @@ def turned_with(start: StartPrior) -> StartFrame:
     across = np.array([-velocity[1], velocity[0]])
     known = max(start.velocity_std, 1e-6) ** 2
     share = variance / (known + variance * float(across @ across))
-    return StartFrame(start.position, velocity, -share * across, 0.0, share * known)
+    return StartFrame(start.position, velocity, -share * across, 0.0, share * known, variance)
 
 
 def with_velocity_turned(window: Window, start: StartPrior) -> Window:
@@ -60,10 +62,7 @@ def with_velocity_turned(window: Window, start: StartPrior) -> Window:
 
 def without_velocity(frame: StartFrame) -> StartFrame:
     """Start frame of which the told velocity tells nothing, as that was wrong."""
-    # what is left of the prior's variance by Sherman and Morrison
-    square = float(frame.velocity @ frame.velocity)
-    share = float(np.hypot(*frame.gain)) * np.sqrt(square)
-    return frame._replace(gain=np.zeros(2), turn=0.0, variance=frame.variance / max(1.0 - share, 1e-9))
+    return frame._replace(gain=np.zeros(2), turn=0.0, variance=frame.prior)
 
 
 def with_turn_fixed(frame: StartFrame, window: Window) -> StartFrame:
@@ -88,10 +87,14 @@ def in_room(frame: StartFrame, window: Window, places: Floats) -> Floats:
 
 
 def present_in_room(
-    frame: StartFrame, window: Window, landmarks: WindowTable, mean: Floats, covariance: Floats
+    frame: StartFrame, window: Window, landmarks: WindowTable, mean: Floats, covariance: Floats, *, images: bool = False
 ) -> tuple[Floats, Floats, WindowTable]:  # fmt: skip
     """Mean (7 + 3F,) and covariance of the present (see `window_gaussian.now`) in the room, turned from the start
-    frame, with the landmark table whose anchors are turned likewise."""
+    frame, with the landmark table whose anchors are turned likewise.
+
+    The second order of walls' `images` counts where they stand in a Gaussian again; the walls themselves, directions
+    and offsets, have none.
+    """
     if not frame.variance:
         return mean, covariance, landmarks
     angle, variance = turn_now(frame, window)
@@ -114,10 +117,8 @@ def present_in_room(
         (moved - np.where(landmarks.is_wall[:, None], held, 0.0)).ravel(),
     ])  # fmt: skip
     # to second order an arm is the shorter, the more it is turned, either way: by 1 - cos, of mean square 3/4 std^4
-    point = ~landmarks.is_wall[:, None]
-    bow = np.concatenate(
-        [spots[0] - frame.pivot, velocity, [0.0], np.where(point, spots[1:] - frame.pivot, 0.0).ravel()]
-    )
+    arms = np.where(landmarks.is_wall[:, None], images * (spots[1:] - anchor), spots[1:] - frame.pivot)
+    bow = np.concatenate([spots[0] - frame.pivot, velocity, [0.0], arms.ravel()])
     bow[[2, 5]], bow[HEAD + 2 :: 3] = 0.0, 0.0
     mean[:3], mean[3:6], mean[6], mean[HEAD:] = spots[0], velocity, mean[6] + angle, spots[1:].ravel()
     wide = by @ covariance @ by.T + variance * np.outer(slope, slope) + 0.75 * variance**2 * np.outer(bow, bow)

@@ -16,6 +16,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.map_geometry import wall_planes
 from rislam_rt.slam.window import estimates, start_frame
+from rislam_rt.slam.window.divergence.divergence_monitor import with_velocity
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.smoother import direction_priors, window_features, window_gaussian
@@ -154,6 +155,28 @@ def test_right_angles_turn_with_the_other_wall():
     assert len(window_features.drop_features(window, np.array([False, True])).holds.std) == 0
     kept = window_features.drop_features(window, np.array([True, True])).holds
     assert (kept.feature.tolist(), kept.other.tolist()) == ([1], [0])
+
+
+@pytest.mark.parametrize(("speed_std", "heading_std"), [(0.0, 0.35), (0.01, 0.05), (0.3, 0.1)])
+def test_a_velocity_that_was_wrong_leaves_a_prior_that_is_one(speed_std, heading_std):
+    """As unknown as what replaces it, and the heading as unknown as it was told."""
+    start = StartPrior(np.zeros(3), np.array([0.9, 1.2, 0.0]), 0.0, 0.01, speed_std, heading_std)
+    std = np.array([1e-5] * 3 + [speed_std, speed_std, 1e-6, 0.0])
+    window = start_frame.with_velocity_turned(window_gaussian.begin(start.position, start.velocity, std), start)
+    wrong = with_velocity(window, np.array([0.3, 0.1, 0.0]), 0.03)
+    assert np.linalg.eigvalsh(wrong.prior.hessian)[0] > 0.0
+    inside = np.linalg.inv(wrong.prior.hessian[3:5, 3:5])
+    assert np.linalg.eigvalsh(inside)[0] > 0.999 * max(0.03, speed_std) ** 2
+    frame = start_frame.without_velocity(start_frame.turned_with(start))
+    assert start_frame.turn_now(frame, wrong) == (0.0, heading_std**2)
+
+
+def test_walls_are_shown_however_the_room_is_turned(room):
+    """What all walls are turned by says nothing of how well each is known."""
+    state, _ = led(room, 1)
+    found = slam.estimate(state, CONFIG).map
+    assert (np.abs(found.wall_normal[:, 2]) < 0.5).sum() >= 2
+    assert (found.wall_std[:, 0] > np.radians(1.0)).any()
 
 
 def test_a_landmark_table_is_turned_in_its_anchors_alone():

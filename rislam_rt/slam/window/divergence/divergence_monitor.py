@@ -139,7 +139,8 @@ def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
     deviation, whichever is larger."""
     head, hessian = window.head.copy(), window.prior.hessian.copy()
     # the tracks will be asked again, as features: their word is not to count twice
-    head[3:5], hessian[[3, 4], [3, 4]] = velocity[:2], np.minimum(hessian[[3, 4], [3, 4]], std**-2.0)
+    information, axes = np.linalg.eigh(hessian[3:5, 3:5])
+    head[3:5], hessian[3:5, 3:5] = velocity[:2], (axes * np.minimum(information, std**-2.0)) @ axes.T
     return _begun(window, head, hessian)
 
 

@@ -61,7 +61,7 @@ def learn_motion(state: WindowState, lively: tuple[float, float] = (0.0, 0.0)) -
     level[0] = livelier_by(level[0], joint[-1:])
     before = window.precision.copy()
     before[:, 2] = window.uneven
-    # all steps at once, each as if the others were with_turn_fixed: damped, or they would take turns
+    # all steps at once, each as if the others were settled: damped, or they would take turns
     precision = np.exp((1.0 - DAMPING) * np.log(before) + DAMPING * np.log(precisions(posterior)))
     uneven = precision[:, 2].copy()
     if still > 0.5:

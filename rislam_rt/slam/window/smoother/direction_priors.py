@@ -54,7 +54,7 @@ class DirectionPriors(NamedTuple):
         facing, out = flat @ [1.0, 1j], span[:, :2] @ [1.0, 1j]
         tied, reach = self.other >= 0, np.maximum(np.abs(facing), 1e-6)
         # the nearest of the four directions in which it may lie
-        facing = facing / reach * 1j ** np.round(np.angle(out / np.where(tied, facing, 1.0)) / (0.5 * np.pi))
+        facing = facing / reach * 1j ** np.round(np.angle(out * np.conj(facing)) / (0.5 * np.pi))
         across = np.stack([-facing.imag, facing.real, np.zeros(len(facing))], axis=1)
         axis = np.where(tied[:, None], across, self.axis)
         turn = np.stack([-flat[:, 1], flat[:, 0], np.zeros(len(flat))], axis=1) / reach[:, None] ** 2

@@ -60,7 +60,7 @@ def test_what_is_known_badly_may_be_either():
 def test_the_map_shows_one_plane_of_a_wall_the_one_that_stands_upright():
     places, covariance = _walls(0.003, 0.02)
     assert second_planes(places, covariance, _table(), np.arange(2), MIDDLE).tolist() == [False, True]
-    found = build_map(places, covariance, _table(), np.zeros(3), MIDDLE)
+    found = build_map(places, covariance, _table(), np.zeros(3), MIDDLE, np.zeros(2))
     np.testing.assert_allclose(found.wall_normal, [[1.0, 0.0, 0.0]], atol=1e-12)
     swapped = np.kron([[0, 1], [1, 0]], np.eye(3))
     turned = second_planes(places[::-1], swapped @ covariance @ swapped, _table(), np.arange(2), MIDDLE)
@@ -69,7 +69,7 @@ def test_the_map_shows_one_plane_of_a_wall_the_one_that_stands_upright():
 
 def test_the_map_shows_a_cabinet_and_the_wall_behind_it():
     places, covariance = _walls(-0.3, 0.0)
-    found = build_map(places, covariance, _table(), np.zeros(3), MIDDLE)
+    found = build_map(places, covariance, _table(), np.zeros(3), MIDDLE, np.zeros(2))
     np.testing.assert_allclose(np.diff(found.wall_offset), [-0.3], atol=1e-12)
 
 
