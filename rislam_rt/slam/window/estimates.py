@@ -39,18 +39,18 @@ def estimate(state: WindowState, config: SlamConfig, ahead: float = 0.0) -> Slam
     """Pose estimate (mean, covariance, equally likely samples; `ahead` [s] at constant velocity) and map estimate of
     the window filter."""
     mean, covariance, excess = window_gaussian.now_with_excess(state.window)
-    by, further = np.eye(len(mean)), state.heave_uncertainty
+    further, covariance[:6, :6] = state.heave_uncertainty, covariance[:6, :6] + excess
     if ahead and state.heaves:  # the next step's heave is another one
         mean[2] -= state.window.heave[-1]
         further = state.heave_variance or further
     elif state.heaves:  # what was heard tells of floor and heave together
         slope, own = heave_now(state)
+        by = np.eye(len(mean))
         by[2] -= slope
+        covariance = by @ covariance @ by.T
         further = own if state.window.heave_variance[-1] else own + further  # where it has ended, there may be one
     places, walls = mean[HEAD:].reshape(-1, 3), state.landmarks.walls
     leans = wall_planes(places, covariance[HEAD:, HEAD:], state.landmarks.anchor, walls)[2][:, 0]
-    covariance = by @ covariance @ by.T
-    covariance[:6, :6] += by[:6, :6] @ excess @ by[:6, :6].T
     mean, covariance, landmarks = _present(state, mean, covariance)
     spread = covariance[:6, :6].copy()
     spread[:3, :3] += np.diag(state.shift**2)
