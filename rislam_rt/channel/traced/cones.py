@@ -77,9 +77,7 @@ class Cones(NamedTuple):
 def build_cones(tracer_scene: "TracerScene", device: Floats, far: Floats) -> Cones:
     """Group devices (N, 3) [m] and far ends (N, 3), or the single one (1, 3), into the balls that cones start from."""
     device, far = device - tracer_scene.origin, far - tracer_scene.origin
-    cell = (
-        NEAR * 2.0 * (tracer_scene.wall_boxes.margin * 1e3 - 1.0)
-    )  # the margin is a thousandth of 1 m + half the longest side
+    cell = NEAR * 2.0 * tracer_scene.wall_boxes.extent
     _, group = np.unique(np.floor(device / cell), axis=0, return_inverse=True)
     group = group.ravel()
     members = [np.flatnonzero(group == g) for g in range(group.max(initial=-1) + 1)]

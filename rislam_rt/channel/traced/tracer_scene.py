@@ -37,8 +37,11 @@ class WallBoxes(NamedTuple):
     """(W,) [m] middle of each wall's bounds."""
     half: mi.Vector3f
     """(W,) [m] half the size of each wall's bounds."""
-    margin: float
-    """[m] A thousandth of the room, hundreds of times what float32 leaves uncertain."""
+    extent: float
+    """[m] Half the longest side of the room."""
+    margin: mi.Float
+    """[m] A thousandth of the room, hundreds of times what float32 leaves uncertain; no constant of a kernel, which
+    every room would compile anew."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,11 +183,11 @@ def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:
     low, high = np.full((len(walls), 3), np.inf), np.full((len(walls), 3), -np.inf)
     np.minimum.at(low, walls.wall_of_triangle, walls.triangles.min(axis=1) - origin)
     np.maximum.at(high, walls.wall_of_triangle, walls.triangles.max(axis=1) - origin)
-    margin = 1e-3 * (1.0 + np.abs([low, high]).max(initial=0.0))
+    extent = float(np.abs([low, high]).max(initial=0.0))
     offset = as_floats(walls.offset - walls.normal @ origin)
     return WallBoxes(
         mi.Vector3f(as_points(walls.normal)), offset, as_points(0.5 * (low + high)),
-        mi.Vector3f(as_points(0.5 * (high - low))), margin,
+        mi.Vector3f(as_points(0.5 * (high - low))), extent, dr.opaque(mi.Float, 1e-3 * (1.0 + extent)),
     )  # fmt: skip
 
 
