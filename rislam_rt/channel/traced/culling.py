@@ -64,7 +64,7 @@ def _near_walls(tracer_scene: TracerScene, walls: list[mi.UInt], device: mi.Poin
         fraction = dr.clip(dr.select(a != b, a / (a - b), 0.5), 0.0, 1.0)
         hit = point + fraction * (image - point)
         away = dr.abs(hit - dr.gather(mi.Point3f, wall_boxes.center, wall, here))
-        inside = dr.all(away <= dr.gather(mi.Vector3f, wall_boxes.half, wall, here) + margin)
+        inside = dr.all(away <= dr.gather(mi.Vector3f, wall_boxes.half, wall, here) + mi.Vector3f(margin))
         along = dr.maximum(dr.abs(a), dr.abs(b)) < margin
         crosses = (a * b < 0.0) | (dr.minimum(dr.abs(a), dr.abs(b)) < margin)
         keep &= ~here | (crosses & inside) | along

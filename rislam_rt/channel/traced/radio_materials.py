@@ -41,7 +41,7 @@ class ConstantReflection(RadioMaterialBase):  # type: ignore[misc]
         props = mi.Properties("rislam-constant-reflection")
         props.set_id(name)
         super().__init__(props)
-        self._reflection = dr.opaque(mi.Float, reflection)  # a constant would be compiled anew for every R
+        self._reflection = mi.Float(reflection)
 
     def sample(
         self, ctx: mi.BSDFContext, si: mi.SurfaceInteraction3f, sample1: mi.Float, sample2: mi.Point2f,
