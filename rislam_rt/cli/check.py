@@ -76,7 +76,7 @@ def command(
         named = names_schemes(spec, file, changed)
         if named or pipeline is not None:
             findings += _run_errors(checked, spec, (str(scene_file(scene)), str(file)), changed, named=named)
-        findings += motion_warnings(checked, settings.receiver, str(scene_file(scene)))
+        findings += motion_warnings(checked, settings.radio, settings.receiver, str(scene_file(scene)))
         findings += late_path_warnings(looked.paths, looked.settings, str(scene_file(scene)))
         findings += cancelled_return_warnings(looked, str(scene_file(scene)))
     for finding in findings:

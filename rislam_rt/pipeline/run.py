@@ -26,7 +26,7 @@ from rislam_rt.pipeline.room.true_motion import draw_looks, draw_motion
 from rislam_rt.pipeline.scheme_simulation import SchemeSimulation
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_receiver, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
@@ -215,13 +215,15 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
 
 def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     """Warnings of a run, one line each: a RIS panel so large that the band resolves its elements' delays, an agent
-    faster than the receiver reckons with as it tells the panel's paths from others, or manoeuvring as on no floor.
+    faster than the receiver reckons with as it tells the panel's paths from others, or than its slot allows, or
+    manoeuvring as on no floor.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.
     """
     panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
-    moving = motion_warnings(scene, build_receiver(spec.receiver, panels), f"scene '{scene.name}'")
+    settings = build_settings(spec, panels)
+    moving = motion_warnings(scene, settings.radio, settings.receiver, f"scene '{scene.name}'")
     return (*(_large_panels(scene, spec) if panels else ()), *(finding.line for finding in moving))
 
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from rislam_rt.constants import MAX_SPEED
 from rislam_rt.measurement import ReceiverConfig
-from rislam_rt.model import Scene
+from rislam_rt.measurement.slot_motion import slot_weights
+from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.findings import Finding, warning_at
 from rislam_rt.slam.model_constants import CONSTANTS
 
@@ -20,12 +21,39 @@ FEWEST_DIGITS, MOST_DIGITS = 3, 17
 """Significant digits of a speed in a message, and how many tell any two numbers of float64 apart."""
 
 
-def motion_warnings(scene: Scene, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
-    """Warnings of an agent that is faster than its receiver assumes, but for rounding, or that speeds up as nothing on
-    a floor does; `file` is what they name as their place."""
+HALF_POWER = 0.443
+"""Turns within the slot that leave half of a path's power in its mean: sinc(0.443)^2 = 0.5."""
+
+
+def motion_warnings(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
+    """Warnings of an agent that is faster than its receiver assumes, but for rounding, so fast that returns average out
+    within a measurement slot, or that speeds up as nothing on a floor does; `file` is what they name as their place."""
     if receiver.alternation and scene.ris is not None:
         yield from _fast_agent(scene, receiver.top_speed, file)
+    yield from _averaged_returns(scene, radio, receiver, file)
     yield from _manoeuvring_agent(scene, file)
+
+
+def _averaged_returns(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
+    """Motion warning of a slot in which a wall's return from ahead loses more than half of its power, as its phase
+    turns by its Doppler shift (`measurement.slot_motion`)."""
+    speed = np.linalg.norm(scene.agent.velocity, axis=1)
+    cycle = int(np.argmax(speed))
+    shift = 2.0 * float(speed[cycle]) / radio.wavelength
+    turns = shift * receiver.slot
+    if turns <= HALF_POWER:
+        return
+    kept = float(np.abs(slot_weights(np.array([shift]), receiver)[0][0]))
+    lost = f"loses {-20.0 * np.log10(kept):.2g} dB of its SNR" if kept > 0.01 else "is not heard"
+    shorter = HALF_POWER / shift
+    digit = 10.0 ** np.floor(np.log10(shorter))
+    message = (
+        f"{receiver.slot:g} s, and at {speed[cycle]:.3g} m/s (cycle {cycle}) a wall's return from ahead turns by "
+        f"{turns:.2g} wavelengths within them: it {lost}, so that what moves is heard worst"
+    )
+    yield warning_at(
+        file, "budget.measure_s", message, f"give budget.measure_s = {np.floor(shorter / digit) * digit:.1g}"
+    )
 
 
 def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:

@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.measurement import ReceiverConfig
+from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.room.motion_warnings import motion_warnings
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import find_room, shipped_rooms
 
 
-def said(scene, **receiver):
-    return [finding.line for finding in motion_warnings(scene, ReceiverConfig(**receiver), "scene.toml")]
+def said(scene, carrier=10e9, slot=1e-3, **receiver):
+    """Lines of the warnings, by default with a slot that is short enough for any of these agents."""
+    receiver = ReceiverConfig(slot=slot, **receiver)
+    return [finding.line for finding in motion_warnings(scene, RadioConfig(carrier), receiver, "scene.toml")]
 
 
 def faster(room, cycle, velocity):
@@ -66,3 +69,22 @@ def test_an_acceleration_that_no_floor_gives_is_said_with_the_filters_liveliest(
 
 def test_the_rooms_that_come_with_the_package_move_as_is_reckoned_with():
     assert not [line for name in shipped_rooms() for line in said(load_scene(find_room(name)))]
+
+
+def test_a_slot_in_which_returns_turn_too_far_is_said_with_one_that_is_short_enough(room):
+    """At half a metre per second and 60 GHz a return from ahead turns twice within 10 ms, and averages to nothing."""
+    moving = faster(room, 7, [0.0, 0.5, 0.0])
+    (line,) = said(moving, carrier=60e9, slot=0.01)
+    assert line.startswith("scene.toml: budget.measure_s: 0.01 s, and at 0.5 m/s (cycle 7) a wall's return from ahead")
+    assert "turns by 2 wavelengths within them: it is not heard" in line
+    assert line.endswith("give budget.measure_s = 0.002")
+    assert not said(moving, carrier=60e9, slot=0.002)
+    assert not said(moving, slot=0.01)
+    # 2 * 0.7 m/s over 0.03 m for 10 ms, by hand: sinc(0.467)^2 = 0.46
+    (line,) = said(faster(room, 7, [0.7, 0.0, 0.0]), top_speed=0.7, slot=0.01)
+    assert "turns by 0.47 wavelengths within them: it loses 3.4 dB of its SNR" in line
+
+
+def test_without_alternation_a_slot_averages_as_much(room):
+    (line,) = said(faster(room, 7, [0.0, 0.5, 0.0]), carrier=30e9, slot=0.01, alternation=False)
+    assert "is not heard" in line

@@ -152,13 +152,16 @@ def lengths(heard: Heard) -> Lengths:
     weight, length, since = 1.0 / log.std[rows, 0] ** 2, log.seen[rows, 0], log.cycle[rows] - first
     angle = heading[since]
     cos, sin = np.cos(angle), np.sin(angle)
-    toward = np.stack([total(cos * flat[:, 0] - sin * flat[:, 1]), total(sin * flat[:, 0] + cos * flat[:, 1])], axis=1)
-    toward /= count[:, None]
+    sure = 1.0 / (spread_of**2).mean(axis=1)
+    seen = np.stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1]], axis=1)
+    toward = np.stack([total(sure * seen[:, 0]), total(sure * seen[:, 1])], axis=1) / total(sure)[:, None]
+    # directions that scatter by more than they deviate by are as much less sure of their mean (Birge's ratio)
+    scatter = 0.5 * total(sure * ((seen - toward[which]) ** 2).sum(axis=1)) / np.maximum(count - 1, 1)
+    doubt = np.maximum(scatter, 1.0) / total(sure)
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
     toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
-    doubt = total((spread_of**2).mean(axis=1)) / count**2
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
         length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
