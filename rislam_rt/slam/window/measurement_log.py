@@ -126,7 +126,7 @@ class Log(NamedTuple):
         end = np.where(both, np.minimum(cosines + period * (cosines < 0.0), rim), cosines)
         other = np.where(both, np.maximum(end - period, -rim), cosines)
         std = np.where(both, np.minimum(std, std[:, ::-1]), std)
-        twice, owner = twofold.any(axis=1)[which], np.flatnonzero(twofold.any(axis=1))
+        twice, owner = twofold[which].any(axis=1), np.flatnonzero(twofold.any(axis=1))
         again = count + np.searchsorted(owner, which[twice])
         return ArrayEnds(
             np.append(rows, rows[twice]), np.append(which, again), np.concatenate([end, other[twice]]),

@@ -77,7 +77,7 @@ def test_a_slot_in_which_returns_turn_too_far_is_said_with_one_that_is_short_eno
     (line,) = said(moving, carrier=60e9, slot=0.01)
     assert line.startswith("scene.toml: budget.measure_s: 0.01 s, and at 0.5 m/s (cycle 7) a wall's return from ahead")
     assert "turns by 2 wavelengths within them: it is not heard" in line
-    assert line.endswith("give budget.measure_s = 0.002")
+    assert line.endswith("give budget.measure_s = 0.002, and 0.008 s to another step of the cycle")
     assert not said(moving, carrier=60e9, slot=0.002)
     assert not said(moving, slot=0.01)
     # 2 * 0.7 m/s over 0.03 m for 10 ms, by hand: sinc(0.467)^2 = 0.46
