@@ -51,9 +51,9 @@ def _averaged_returns(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig
         f"{receiver.slot:g} s, and at {speed[cycle]:.3g} m/s (cycle {cycle}) a wall's return from ahead turns by "
         f"{turns:.2g} wavelengths within them: it {lost}, so that what moves is heard worst"
     )
-    yield warning_at(
-        file, "budget.measure_s", message, f"give budget.measure_s = {np.floor(shorter / digit) * digit:.1g}"
-    )
+    slot = float(np.floor(shorter / digit) * digit)
+    mend = f"give budget.measure_s = {slot:.1g}, and {receiver.slot - slot:.6g} s to another step of the cycle"
+    yield warning_at(file, "budget.measure_s", message, mend)
 
 
 def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:
