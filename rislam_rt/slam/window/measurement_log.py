@@ -94,15 +94,9 @@ class Log(NamedTuple):
         Near the array's own line the receiver takes now the one and now the other, and counts the period into the
         variance by the other's probability. The other has to lie in the sky, within what the other axis deviates by.
         """
-        std = self.std[rows, 1:]
-        return self._has_other_end(rows, spacing) & (std**2 > (1.0 - CONSTANTS.born) / spacing**2)
-
-    def _has_other_end(self, rows: Integers, spacing: float) -> Booleans:
-        """Whether the cosines (A, 2) of the components `rows` (A,) one period off lie in the sky, within what the other
-        axis deviates by."""
         cosine, std = np.abs(self.seen[rows, 1:]), self.std[rows, 1:]
-        other = np.hypot(1.0 / spacing - cosine, cosine[:, ::-1])
-        return np.asarray(other < 1.0 + CONSTANTS.fit * std[:, ::-1])
+        inside = np.hypot(1.0 / spacing - cosine, cosine[:, ::-1]) < 1.0 + CONSTANTS.fit * std[:, ::-1]
+        return np.asarray(inside & (std**2 > (1.0 - CONSTANTS.born) / spacing**2))
 
     def mostly_mirrored(self, rows: Integers, which: Integers, count: int, spacing: float) -> Booleans:
         """Whether most of the components `rows` (A,) of each of T = `count` tracks or paths `which` (A,) are `mirrored`
@@ -113,20 +107,20 @@ class Log(NamedTuple):
 
     def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "ArrayEnds":
         """Components `rows` (A,) of tracks or paths `which` (A,), with those of which most are `mirrored` once for
-        either end, behind all others. What was heard under another heading may have one end only, which stays.
+        either end, behind all others.
 
         The cosine along the other axis tells by how much one at the array's end errs, of whose sign nothing is known.
         """
         cosines, std, count = self.seen[rows, 1:], self.std[rows, 1:], int(which.max(initial=-1)) + 1
         twofold = self.mostly_mirrored(rows, which, count, spacing)
-        both = twofold[which] & self._has_other_end(rows, spacing)
+        both = twofold[which]
         if not both.any():
             return ArrayEnds(rows, which, cosines, std, np.arange(count))
         rim, period = np.sqrt(np.maximum(1.0 - cosines[:, ::-1] ** 2, 0.0)), 1.0 / spacing
         end = np.where(both, np.minimum(cosines + period * (cosines < 0.0), rim), cosines)
         other = np.where(both, np.maximum(end - period, -rim), cosines)
         std = np.where(both, np.minimum(std, std[:, ::-1]), std)
-        twice, owner = twofold[which].any(axis=1), np.flatnonzero(twofold.any(axis=1))
+        twice, owner = both.any(axis=1), np.flatnonzero(twofold.any(axis=1))
         again = count + np.searchsorted(owner, which[twice])
         return ArrayEnds(
             np.append(rows, rows[twice]), np.append(which, again), np.concatenate([end, other[twice]]),

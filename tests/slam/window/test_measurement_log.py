@@ -123,14 +123,3 @@ def test_only_tracks_at_the_end_of_an_axis_have_two_directions():
     found = log.both_ends(np.arange(4), np.array([0, 1, 0, 1]), 0.5)
     assert found.owner.tolist() == [0, 1, 0]
     assert found.row.tolist() == [0, 1, 2, 3, 0, 2]
-
-
-def test_what_was_heard_under_another_heading_tells_the_end_and_stays_as_it_is():
-    """Three of four from either end of the axis; the one from before the agent turned has one direction only."""
-    log = _at_the_end(np.array([0.9998, -0.9998, 0.9998, -0.6]), 0.9)
-    log.seen[3, 1], log.std[3, 1:] = 0.8, 0.003
-    found = log.both_ends(np.arange(4), np.zeros(4, dtype=np.int64), 0.5)
-    assert found.row.tolist() == [0, 1, 2, 3] * 2
-    np.testing.assert_array_equal(found.cosines[[3, 7]], [[0.8, -0.6]] * 2)
-    np.testing.assert_array_equal(found.std[[3, 7]], 0.003)
-    np.testing.assert_array_equal(np.sign(found.cosines[:, 1]), [1, 1, 1, -1, -1, -1, -1, -1])
