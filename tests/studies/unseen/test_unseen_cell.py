@@ -19,7 +19,7 @@ from rislam_rt.studies.unseen.spec import WALL_TOP_SPEED
 from rislam_rt.sweeps import build_cells
 
 RUN = {
-    "channel": "image_source", "depth": 1, "cycles": 18, "schemes": ["random"], "slam": {"use_vt": True},
+    "channel": "image_source", "depth": 1, "cycles": 12, "schemes": ["random"], "slam": {"use_vt": True},
     "motion": {"sigma_a_m_s2": 0.01}, "radio": {"reference_snr_db": 13.0}, "receiver": {"estimator": "bound"},
 }  # fmt: skip
 WITH_PANEL, WITHOUT = 22, 3
