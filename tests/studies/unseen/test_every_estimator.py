@@ -106,7 +106,7 @@ def test_most_births_are_of_the_right_kind(case: Case) -> None:
 
 @pytest.mark.parametrize("case", often(CASES[1:3]), ids=lambda case: f"{case.name}-{case.room}")
 def test_the_map_holds_most_of_what_is_heard_and_no_crowd(case: Case) -> None:
-    """Walls and points at their places after 4 s: 9 of 14 heard, in the other room 8 of 11 and one that is not there."""
+    """Walls and points at their places after 4 s: 9 of 14, in the other room 8 of 11 and one that is not there."""
     names = ("walls_found", "points_found", "walls_heard", "points_heard", "ghost_walls", "ghost_points")
     scores = run(case, None)
     found, heard, ghosts = (scores[names[n]] + scores[names[n + 1]] for n in (0, 2, 4))

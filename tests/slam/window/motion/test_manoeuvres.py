@@ -89,7 +89,9 @@ def test_who_sets_off_at_once_is_followed_before_anything_is_born(push, seed):
     assert square[4:].max() < 9.2  # chi^2, 2 dof: 0.99
 
 
-@pytest.mark.parametrize(("dark", "first", "since"), [((4,), 0.0, 6), pytest.param((2,), 0.0, 5, marks=pytest.mark.slow), ((), 0.1, 4)])
+@pytest.mark.parametrize(
+    ("dark", "first", "since"), [((4,), 0.0, 6), pytest.param((2,), 0.0, 5, marks=pytest.mark.slow), ((), 0.1, 4)]
+)
 def test_who_sets_off_at_once_is_followed_whatever_is_not_heard(dark, first, since):
     """A cycle without components delays by a cycle or two; so long as there are no longer tracks, four lengths do."""
     time, way = 0.1 * np.arange(9)[:, None], np.array([np.cos(0.4), np.sin(0.4), 0.0])
