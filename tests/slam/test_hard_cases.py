@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-SAMPLE, QUICK = 40, 15
+SAMPLE, QUICK = 40, 10
 SELDOM = (0, 8, 9)
 """Quick ones that are slow proofs all the same: with nothing wrong, which another test looks at as well, and the two
 that take longest."""
