@@ -27,6 +27,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """What is loaded by now stays to the end: the collector of garbage is not to go through it again and again."""
+    """What is loaded by now stays to the end: the collector of garbage is not to go through it again and again, and
+    seldom through what is new."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(100_000, 50, 50)

@@ -95,6 +95,7 @@ def test_turning_moves_the_ends_against_each_other():
     assert turn_rate(one).tolist() == [0.0]
 
 
+@pytest.mark.slow
 def test_sionnas_own_doppler(rooms):
     """LOS, wall returns and scatterer paths of `PathSolver` and `RCSSolver`, matched by delay."""
     from rislam_rt.channel.traced import TracedChannel

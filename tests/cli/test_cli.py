@@ -6,10 +6,13 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from rislam_rt.adviser import link_budget
 
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
@@ -111,12 +114,12 @@ def test_a_room_without_a_panel_runs_without_the_default_schemes_that_need_one(r
 
 def test_a_panels_delay_spread_is_warned_of_once(run):
     """By the run, of the motion that it drew; not by the check of the scene as well. Without a panel by nobody."""
-    wide = ("--set", "radio.bandwidth_ghz=5", "--set", 'schemes=["random", "no_ris"]', "--no-report")
+    wide = ("--set", "radio.bandwidth_ghz=5", "--set", 'schemes=["random", "no_ris"]', "--no-report", "--jobs", 1)
     words = "delays over the panel spread by up to"
-    code, _, err = run("run", PIPELINE, *SHORT, *wide)
+    code, _, err = run("run", PIPELINE, *SHORT, *wide, "--set", "cycles=2")
     assert code == 0
     assert err.count(words) == 1
-    assert words not in run("run", PIPELINE, *SHORT, *wide, "--set", 'schemes=["no_ris"]')[2]
+    assert words not in run("run", PIPELINE, *SHORT, *wide, "--set", "cycles=2", "--set", 'schemes=["no_ris"]')[2]
 
 
 def test_run_report_and_json(run, tmp_path, monkeypatch):
@@ -253,7 +256,7 @@ def test_an_interrupt_that_an_import_took_for_a_fault_is_one_line(run, monkeypat
     assert (code, out, err) == (130, "", "interrupted\n")
 
 
-@pytest.mark.parametrize("blow", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("blow", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_interrupted_run_goes_on(run, tmp_path, monkeypatch, blow):
     import rislam_rt.pipeline.run as module
 
@@ -341,7 +344,8 @@ def test_design_does_not_take_a_walled_path_for_the_direct_one(run, tmp_path):
         assert ("is hidden" in out) != direct
 
 
-def test_a_material_not_specified_at_the_carrier_names_the_file(run, tmp_path):
+def test_a_material_not_specified_at_the_carrier_names_the_file(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(link_budget, "survey", partial(link_budget.survey, places=1))
     room = ROOT / "scenes" / "itu_room"
     code, out, _ = run("check", room, "--carrier-ghz", "0.3")
     assert code == 2

@@ -19,8 +19,8 @@ VIEW = ("show", "empty_box", "-q", "--depth", 0)
         (("config", "--explain", "slam.sigma_a"), "--json found.json"),
         (VIEW, "--html room.html"),
         (VIEW, "--out room.png"),
-        (VIEW, "--out room.svg"),
-        (VIEW, "--out room.pdf"),
+        pytest.param(VIEW, "--out room.svg", marks=pytest.mark.slow),
+        pytest.param(VIEW, "--out room.pdf", marks=pytest.mark.slow),
         (("trace", "empty_box", "--channel", "image_source", "--cycles", 1), "--out paths.nc"),
     ],
 )

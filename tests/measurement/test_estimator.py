@@ -141,7 +141,7 @@ def test_path_60_db_below_the_walls_is_found(make_paths, make_gain):
     assert found >= 8
 
 
-@pytest.mark.parametrize("alternation", [False, True])
+@pytest.mark.parametrize("alternation", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_false_alarms_keep_to_the_rate(make_paths, alternation):
     config = ReceiverConfig(estimator="waveform", false_alarm_rate=0.5, alternation=alternation)
     times = 300

@@ -39,13 +39,13 @@ def test_a_scheme_does_not_depend_on_the_others(short_result, run_short):
 def test_what_schemes_hear_under_the_same_codes_is_found_once(run_short, monkeypatch):
     calls, measure = [], cycle.measure
     monkeypatch.setattr(cycle, "measure", lambda *given, **more: calls.append(1) or measure(*given, **more))
-    alone = run_short('schemes=["channel_slam"]').schemes["channel_slam"]
+    alone = run_short('schemes=["channel_slam"]', "cycles=4").schemes["channel_slam"]
     count = len(calls)
-    both = run_short('schemes=["random", "channel_slam"]').schemes
+    both = run_short('schemes=["random", "channel_slam"]', "cycles=4").schemes
     assert len(calls) == 2 * count
     np.testing.assert_array_equal(both["channel_slam"].position, alone.position)
     np.testing.assert_array_equal(both["channel_slam"].component_path, both["random"].component_path)
-    run_short('schemes=["random", "no_ris", "exact"]', "design.method=exact")
+    run_short('schemes=["random", "no_ris", "exact"]', "design.method=exact", "cycles=4")
     assert len(calls) == 5 * count
 
 

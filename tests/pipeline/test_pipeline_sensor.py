@@ -95,7 +95,7 @@ def test_what_is_told_wrong_is_believed() -> None:
     assert settings.sensor.threshold == pytest.approx(10.0)
 
 
-@pytest.mark.parametrize("rate", [0.5, 5.0])
+@pytest.mark.parametrize("rate", [0.5, pytest.param(5.0, marks=pytest.mark.slow)])
 def test_filter_and_rival_expect_the_false_components_that_the_receiver_makes(rate: float) -> None:
     """Density of strangers without new paths, over the volume in which components lie, against a count."""
     config, radio = ReceiverConfig(estimator="bound", clutter_rate=rate), RadioConfig()

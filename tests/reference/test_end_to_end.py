@@ -1,4 +1,4 @@
-"""The whole chain on a stretch of the paper's room, traced: what `make demo` does, forty cycles past the panel."""
+"""The whole chain on a stretch of the paper's room, traced: what `make demo` does, thirty-two cycles past the panel."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.scene import load_scene
 
 ROOT = Path(__file__).parents[2]
-CYCLES = 40
+CYCLES = 32
 
 
 @pytest.fixture(scope="module")

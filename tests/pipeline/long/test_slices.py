@@ -22,20 +22,21 @@ from rislam_rt.pipeline.store.run_folder import open_run
 from rislam_rt.storage.netcdf import read_dataset
 
 ROOT = Path(__file__).parents[3]
+CYCLES, SLICE = 7, 4
 BOUND = {"bound_m", "over_bound", "walls", "ghost_walls"}
 """What only a run in one piece has, and what hangs on it."""
 
 
 @pytest.fixture
 def short_slices(monkeypatch):
-    monkeypatch.setattr(slices, "SLICE", 4)
+    monkeypatch.setattr(slices, "SLICE", SLICE)
 
 
 @pytest.fixture(scope="module")
 def spec():
     settings = [
         "channel=image_source",
-        "cycles=10",
+        f"cycles={CYCLES}",
         "depth=1",
         'schemes=["random", "no_ris"]',
         "receiver.estimator=bound",
@@ -56,17 +57,17 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def done(room, spec, tmp_path_factory):
-    """A completed run of three slices, the last of them short; nobody changes it."""
+    """A completed run of two slices, the last of them short; nobody changes it."""
     folder = tmp_path_factory.mktemp("done") / "run"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(slices, "SLICE", 4)
+        patch.setattr(slices, "SLICE", SLICE)
         return lead(room, spec, folder), folder
 
 
 def test_scores_counted_slice_by_slice_are_those_of_the_whole(room, spec, short_slices, done):
     found, folder = done
     assert is_long(room, spec)
-    assert sorted(p.name for p in (folder / "slices").iterdir()) == [f"{n:05d}" for n in range(3)]
+    assert sorted(p.name for p in (folder / "slices").iterdir()) == [f"{n:05d}" for n in range(2)]
     run = run_identity(spec, room).digest
     for name, scores in found.summary["schemes"].items():
         parts = list(slices.read_parts(folder, name, _cut(room), run))
@@ -98,7 +99,7 @@ def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
 def _cut(room):
     from rislam_rt.pipeline.run import cut_scene
 
-    return cut_scene(room, 10)
+    return cut_scene(room, CYCLES)
 
 
 def test_a_stopped_run_goes_on_and_leaves_the_same(room, spec, short_slices, done, tmp_path):
@@ -133,8 +134,8 @@ def test_it_can_be_read_again_and_a_changed_slice_is_told(short_slices, done, tm
     assert again.summary["schemes"]["random"]["rmse_m"] == pytest.approx(
         found.summary["schemes"]["random"]["rmse_m"], rel=1e-6
     )  # the room's path file holds nanometres
-    assert len(again.shown.schemes["random"].position) == 10
-    file = folder / "slices" / "00002" / "scheme_random.nc"
+    assert len(again.shown.schemes["random"].position) == CYCLES
+    file = folder / "slices" / "00001" / "scheme_random.nc"
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
     file.write_bytes(data)

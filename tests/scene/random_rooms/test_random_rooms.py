@@ -50,7 +50,7 @@ def test_rooms_are_those_that_they_were_before_agents_went_along_walls(rooms: li
 
 
 def test_every_room_passes_the_check_and_is_closed(rooms: list[RandomRoom]) -> None:
-    for room in rooms[:40]:
+    for room in rooms[:20]:
         findings = check_scene(room.scene)
         assert [f.line for f in findings if f.severity == "error"] == []
         warnings = [f for f in findings if f.severity == "warning"]

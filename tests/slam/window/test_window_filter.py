@@ -45,7 +45,7 @@ def run():
     return found, motion, shift, slam.smoothed(state), (state, paths, radio)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(x, marks=pytest.mark.slow) for x in (1, 2, 3))])
 def test_an_agent_that_sets_out_from_rest_was_told_right(seed):
     """The told velocity is noise about zero, whose direction says nothing about the compass."""
     scene, count, rng = load_scene(ROOM), 9, np.random.default_rng(seed)
@@ -174,7 +174,7 @@ def test_a_turning_body_needs_no_compass():
     assert len(found[-1].map.wall_offset) >= 3
 
 
-@pytest.mark.parametrize("rate", [-4.0, 2.5])
+@pytest.mark.parametrize("rate", [-4.0, pytest.param(2.5, marks=pytest.mark.slow)])
 def test_a_turn_on_the_spot_that_no_compass_tells_is_followed(rate):
     """Radians in a second, from one cycle to the next: beyond all gates, and the map explains all of it."""
     rng, config = np.random.default_rng(6), replace(CONFIG, heading="estimated")

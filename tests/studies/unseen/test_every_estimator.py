@@ -21,7 +21,7 @@ from rislam_rt.scene.random_rooms import RandomRoom
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
 from rislam_rt.studies.unseen.cell import find_setup, scheme_here, trace_key
 
-CYCLES, OF_THE_DEFAULT = 80, 50
+CYCLES, OF_THE_DEFAULT = 60, 40
 """The default filter, which maps walls, takes longest, and is within its limits sooner."""
 
 
@@ -60,8 +60,8 @@ CASES = [
 ]
 
 SELDOM = {
-    ("default", 103), ("landmarks", 103), ("bp_slam_aoa", 103), ("bp_slam_aoa", 233), ("bp_slam", 266),
-    ("channel_slam", 266),
+    ("default", 103), ("default", 266), ("landmarks", 103), ("bp_slam_aoa", 103), ("bp_slam_aoa", 233),
+    ("bp_slam", 266), ("channel_slam", 266),
 }  # fmt: skip
 """Runs of estimators that also run in another room."""
 
@@ -104,11 +104,12 @@ def test_most_births_are_of_the_right_kind(case: Case) -> None:
     assert scores["births_right"] >= 0.75 * scores["births_judged"]
 
 
-def test_the_maps_hold_most_of_what_is_heard_and_no_crowd() -> None:
-    """Walls and points at their places after 5 s, of two runs together: 18 of 25 heard, and 1 that is not there."""
+@pytest.mark.parametrize("case", often(CASES[1:3]), ids=lambda case: f"{case.name}-{case.room}")
+def test_the_map_holds_most_of_what_is_heard_and_no_crowd(case: Case) -> None:
+    """Walls and points at their places after 4 s: 9 of 14, in the other room 8 of 11 and one that is not there."""
     names = ("walls_found", "points_found", "walls_heard", "points_heard", "ghost_walls", "ghost_points")
-    count = {name: sum(run(case, None)[name] for case in CASES[1:3]) for name in names}
-    found, heard, ghosts = (count[names[n]] + count[names[n + 1]] for n in (0, 2, 4))
+    scores = run(case, None)
+    found, heard, ghosts = (scores[names[n]] + scores[names[n + 1]] for n in (0, 2, 4))
     assert found > 0.5 * heard
     assert ghosts < 0.25 * found
 

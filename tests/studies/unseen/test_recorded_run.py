@@ -22,7 +22,7 @@ from rislam_rt.shipped import find_pipeline, find_room
 from rislam_rt.studies.unseen import recorded_run
 from rislam_rt.studies.unseen.score import OVER_TIME
 
-CYCLES = 24
+CYCLES = 20
 SETTINGS = (
     "channel=image_source", f"cycles={CYCLES}", "depth=1", "receiver.estimator=bound", 'schemes=["random", "no_ris"]',
 )  # fmt: skip
@@ -109,10 +109,9 @@ def test_progress_is_told_and_a_replay_that_strays_is_not_taken_for_the_run(
         assert one.recording.scores["rmse_m"] == recordings[one.recording.scheme].scores["rmse_m"]
 
 
-def test_a_run_in_slices_is_recorded_as_a_whole(
-    room: Scene, spec: PipelineSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(slices, "SLICE", 10)
+def test_a_run_in_slices_is_recorded_as_a_whole(room: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(slices, "SLICE", 9)
+    spec = load_spec(find_pipeline("trace_then_slam"), [*SETTINGS[:-1], 'schemes=["random"]'])
     with open_run(tmp_path / "long", run_identity(spec, room)) as store:
         run_long(room, spec, store, rng=np.random.default_rng(7), jobs=1, progress=lambda *_: None)
     result = read_whole(tmp_path / "long")

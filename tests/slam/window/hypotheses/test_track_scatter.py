@@ -40,7 +40,7 @@ def pull(amplitude: float, snr: float, rng: np.random.Generator) -> float:
     return float(np.mean((off / np.array([delay[0], *across[0]])) ** 2))
 
 
-@pytest.mark.parametrize("snr", [1e2, 1e4])
+@pytest.mark.parametrize("snr", [1e2, pytest.param(1e4, marks=pytest.mark.slow)])
 def test_a_neighbour_moves_a_component_by_its_own_snr(snr: float) -> None:
     rng, amplitude = np.random.default_rng(3), 0.1
     squares = np.array([pull(amplitude, snr, rng) for _ in range(4000)])

@@ -122,29 +122,33 @@ def test_what_slants_and_a_ceiling_that_slopes_are_as_rare_as_each_other_pitch_b
     assert alone.gain[0] == 0.0
 
 
-def _map_after(scene: Scene, walk: Trajectory, radio: RadioConfig, seed: int) -> MapEstimate:
+def _map_after(scene: Scene, walk: Trajectory, radio: RadioConfig, seed: int, receiver: ReceiverConfig) -> MapEstimate:
     """Map of the default filter after a walk through a room without a panel."""
     paths, config, rng = ImageSourceChannel(scene, radio, 2).paths(walk), SlamConfig(), np.random.default_rng(seed)
     start = StartPrior(walk.position[0], walk.velocity[0], float(walk.heading[0]))
     state = slam.init(start, walk.body, None, SensorModel(radio), config, rng=rng)
     for cycle, heading in enumerate(walk.heading.tolist()):
-        heard, _ = measure(paths.of_cycle(cycle), 0, heading, radio, ReceiverConfig(), rng=rng)
+        heard, _ = measure(paths.of_cycle(cycle), 0, heading, radio, receiver, rng=rng)
         state, _ = slam.step(state, heard, None, 0.1 if cycle else 0.0, heading, config, rng=rng)
     return slam.estimate(state, config).map
 
 
-def test_a_wall_that_leans_out_is_found_by_what_comes_down_from_the_ceiling() -> None:
+@pytest.mark.parametrize("receiver", [pytest.param("waveform", marks=pytest.mark.slow), "bound"])
+def test_a_wall_that_leans_out_is_found_by_what_comes_down_from_the_ceiling(receiver: str) -> None:
     """`wall_y1` leans out by 3.4 degrees: alone it throws its return below the horizon, where nothing is heard."""
     scene, radio = load_scene(ROOMS / "tilted_room"), with_reference_snr(RadioConfig(), 13.0)
     walk = scene.agent[100:130]
-    found, true = _map_after(replace(scene, ris=None), walk, radio, 2).wall_normal, build_walls(scene)
+    true, heard_by = build_walls(scene), ReceiverConfig(estimator=receiver)
+    found = _map_after(replace(scene, ris=None), walk, radio, 2, heard_by).wall_normal
     angle = np.degrees(np.arccos(np.clip(abs(found @ true.normal.T), 0.0, 1.0)))
     assert angle[:, true.names.index("wall_y1")].min() < 2.0
     assert angle.min(axis=1).max() < 10.0
 
 
-@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), 2])
-def test_a_beam_before_known_things_is_found_by_what_comes_over_the_ceiling(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("receiver", "seed"), [*(pytest.param("waveform", seed, marks=pytest.mark.slow) for seed in (1, 2)), ("bound", 2)]
+)
+def test_a_beam_before_known_things_is_found_by_what_comes_over_the_ceiling(receiver: str, seed: int) -> None:
     """A beam hangs 0.7 m down from the ceiling before a wall and three spheres, and begins 2 m on: it is never heard by
     itself, and they are known when the return over ceiling and beam begins."""
     room, radio = load_scene(ROOMS / "paper_room"), with_reference_snr(RadioConfig(), 13.0)
@@ -160,7 +164,7 @@ def test_a_beam_before_known_things_is_found_by_what_comes_over_the_ceiling(seed
     scene = replace(
         room, ris=None, reflectors=(*room.reflectors, beam), scatterers=(*room.scatterers, *spheres), agent=walk
     )
-    found = _map_after(scene, walk, radio, seed)
+    found = _map_after(scene, walk, radio, seed, ReceiverConfig(estimator=receiver))
     square = np.abs(found.wall_normal).max(axis=1) > np.cos(np.radians(1.0))
     assert square.all()
     assert np.abs(found.wall_offset[found.wall_normal[:, 0] > 0.9] - 3.2).min() < 0.02

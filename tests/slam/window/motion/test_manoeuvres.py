@@ -1,6 +1,7 @@
 """Manoeuvres: an agent that sets off from rest or climbs, where its map measures nothing of it, and what is none."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,14 @@ def follow(place, velocity, turned, seed, depth=2, **settings):
     return np.array(off), np.array(square)
 
 
+@cache
+def about_to_hear(count):
+    """The state of a level walk that has moved on after `count` cycles and asks for manoeuvres next."""
+    place = np.array([1.2, 2.4, 0.8]) + np.arange(count)[:, None] * [0.06, 0.02, 0.0]
+    *_, state = states(place, np.tile([0.6, 0.2, 0.0], (count, 1)), 0.32, 0)
+    return manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32))
+
+
 def states(place, velocity, turned, seed, depth=2, dark=(), first=0.0, wrong=0.0):
     """States of the filter after each cycle, for an agent as `follow` has it, which hears nothing in `dark` cycles,
     `first` [s] after the start in the first, and told a start that is faster by `wrong` [m/s] along x."""
@@ -56,7 +65,9 @@ def states(place, velocity, turned, seed, depth=2, dark=(), first=0.0, wrong=0.0
         yield state
 
 
-@pytest.mark.parametrize(("turned", "seed"), [(0.0, 0), (0.7, 1)], ids=["along the array", "across it"])
+@pytest.mark.parametrize(
+    ("turned", "seed"), [pytest.param(0.0, 0, marks=pytest.mark.slow), (0.7, 1)], ids=["along the array", "across it"]
+)
 def test_who_sets_off_along_the_walls_is_followed(turned, seed):
     """At 1 m/s^2 from rest, before anything is born. Along the walls the array hears ahead and behind alike."""
     time = np.maximum(0.1 * (np.arange(COUNT) - 1), 0.0)
@@ -68,7 +79,7 @@ def test_who_sets_off_along_the_walls_is_followed(turned, seed):
     assert square[-8:].max() < 9.2  # chi^2, 2 dof: 0.99
 
 
-@pytest.mark.parametrize(("push", "seed"), [(0.5, 0), (0.8, 1), (0.8, 2)])
+@pytest.mark.parametrize(("push", "seed"), [(0.5, 0), (0.8, 1), pytest.param(0.8, 2, marks=pytest.mark.slow)])
 def test_who_sets_off_at_once_is_followed_before_anything_is_born(push, seed):
     """From rest in the first cycle: the first tracks tell of it as soon as two of their lengths have to agree."""
     time, way = 0.1 * np.arange(9)[:, None], np.array([np.cos(0.4), np.sin(0.4), 0.0])
@@ -78,7 +89,9 @@ def test_who_sets_off_at_once_is_followed_before_anything_is_born(push, seed):
     assert square[4:].max() < 9.2  # chi^2, 2 dof: 0.99
 
 
-@pytest.mark.parametrize(("dark", "first", "since"), [((4,), 0.0, 6), ((2,), 0.0, 5), ((), 0.1, 4)])
+@pytest.mark.parametrize(
+    ("dark", "first", "since"), [((4,), 0.0, 6), pytest.param((2,), 0.0, 5, marks=pytest.mark.slow), ((), 0.1, 4)]
+)
 def test_who_sets_off_at_once_is_followed_whatever_is_not_heard(dark, first, since):
     """A cycle without components delays by a cycle or two; so long as there are no longer tracks, four lengths do."""
     time, way = 0.1 * np.arange(9)[:, None], np.array([np.cos(0.4), np.sin(0.4), 0.0])
@@ -93,7 +106,7 @@ def test_the_first_tracks_are_asked_sooner(count, many):
     assert length_rates.enough_measured(np.repeat(np.arange(10, 10 + count), 3)) == many
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(x, marks=pytest.mark.slow) for x in (1, 2, 3))])
 def test_a_start_told_wrong_is_no_manoeuvre(seed):
     """The first tracks tell of it in the cycle before a manoeuvre is asked for: no acceleration would explain it."""
     place = np.array([1.6, 1.8, 0.9]) + np.arange(9)[:, None] * [0.03, 0.01, 0.0]
@@ -106,9 +119,7 @@ def test_a_start_told_wrong_is_no_manoeuvre(seed):
 @pytest.mark.parametrize(("lively", "level"), [(1e-3, True), (1e-3, False), (0.999, True), (0.999, False)])
 def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypatch):
     """One that goes on only to be likelier than not; and most floors are level."""
-    place = np.array([1.2, 2.4, 0.8]) + np.arange(12)[:, None] * [0.06, 0.02, 0.0]
-    *_, state = states(place, np.tile([0.6, 0.2, 0.0], (12, 1)), 0.32, 0)
-    state, found, accel = manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32)), {}, np.zeros(3)
+    state, found, accel = about_to_hear(12), {}, np.zeros(3)
     mode = np.full(state.level.shape, (1.0 - lively) / (state.level.shape[1] - 1))
     mode[:, -1] = lively
     monkeypatch.setattr(
@@ -136,9 +147,7 @@ def test_no_path_tells_more_than_that_it_is_another(monkeypatch):
 def test_no_manoeuvre_is_believed_that_the_map_contradicts(monkeypatch):
     """Tracks speak for a climb while the ceiling is heard where it is from a level floor: as much as they outweigh that
     its path is another than it was held for, and no more."""
-    place = np.array([1.2, 2.4, 0.8]) + np.arange(25)[:, None] * [0.06, 0.02, 0.0]
-    *_, state = states(place, np.tile([0.6, 0.2, 0.0], (25, 1)), 0.32, 0)
-    state = manoeuvres.with_rates(window_filter._move(state, 0.1, 0.32))
+    state = about_to_hear(25)
     accel = state.window.accel + np.array([0.0, 0.0, 0.3]) * (np.arange(len(state.window.accel)) > 12)[:, None]
     climbed = state._replace(window=state.window._replace(accel=accel))
     assert manoeuvres._log_borne_out(state, state, 22) == 0.0
