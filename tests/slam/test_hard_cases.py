@@ -80,7 +80,7 @@ def _led(kind: str, seed: int, most: int = 12, **settings: Any) -> Any:
 @pytest.mark.parametrize(
     ("kind", "seed", "heading"),
     [
-        ("speed wrong by 0.3 m/s", 2, "known"),
+        pytest.param("speed wrong by 0.3 m/s", 2, "known", marks=pytest.mark.slow),
         ("speed wrong by 0.3 m/s", 2, "estimated"),
         ("compass wrong by 0.5 rad", 4, "known"),
     ],

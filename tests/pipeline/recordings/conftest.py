@@ -10,7 +10,7 @@ from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.shipped import find_pipeline
 from rislam_rt.studies.unseen import Inputs, Recorder
 
-CYCLES = 30
+CYCLES = 20
 CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_ris']", "slam.use_vt=true",
            "receiver.estimator=bound"]  # fmt: skip
 Table = dict[str, list[float]]

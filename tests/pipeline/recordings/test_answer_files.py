@@ -17,11 +17,12 @@ from rislam_rt.pipeline.recordings.replay import Answers
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.studies.unseen import Inputs
 
-CYCLES = 30
+CYCLES = 20
 PAGE = Path(__file__).parents[3] / "docs" / "own_measurements.md"
 
 
-def answers_of(recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec) -> Answers:
+@pytest.fixture(scope="module")
+def answers(recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec) -> Answers:
     return rislam_rt.localise(recorded[0], spec, rng=np.random.default_rng(0))
 
 
@@ -33,8 +34,7 @@ def test_the_page_names_every_column_and_key() -> None:
     assert re.findall(r"^\| `(\w+)` \|", keys, re.MULTILINE) == list(MapEstimate.__dataclass_fields__)
 
 
-def test_what_is_not_finite_is_null(recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec) -> None:
-    answers = answers_of(recorded, spec)
+def test_what_is_not_finite_is_null(recorded: tuple[Inputs, np.ndarray], answers: Answers) -> None:
     last = answers.estimates[-1]
     files = answer_files(recorded[0], answers)
     known = json.loads(files["map.json"])
@@ -43,13 +43,14 @@ def test_what_is_not_finite_is_null(recorded: tuple[Inputs, np.ndarray], spec: P
     np.testing.assert_array_equal(known["covariance"], last.map.covariance)
     assert known["ident"] == last.map.ident.tolist()
     assert "panel" not in known
-    odd = np.full(last.map.wall_std.shape, np.inf)
+    known, odd = last.map.wall_std, np.full(last.map.wall_std.shape, np.inf)
     object.__setattr__(last.map, "wall_std", odd)
-    assert json.loads(answer_files(recorded[0], answers)["map.json"])["wall_std"] == [[None, None]] * len(odd)
+    told = json.loads(answer_files(recorded[0], answers)["map.json"])["wall_std"]
+    object.__setattr__(last.map, "wall_std", known)  # others look at it too
+    assert told == [[None, None]] * len(odd)
 
 
-def test_a_row_a_cycle(recorded: tuple[Inputs, np.ndarray], spec: PipelineSpec) -> None:
-    answers = answers_of(recorded, spec)
+def test_a_row_a_cycle(recorded: tuple[Inputs, np.ndarray], answers: Answers) -> None:
     rows = list(csv.DictReader(io.StringIO(answer_files(recorded[0], answers)["estimate.csv"].decode())))
     assert [float(row["heading_rad"]) for row in rows] == [float(f"{one.heading:.9g}") for one in answers.estimates]
     assert [float(row["cov_xy_m2"]) for row in rows] == [

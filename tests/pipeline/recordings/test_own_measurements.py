@@ -26,7 +26,7 @@ from rislam_rt.shipped import find_pipeline, find_room
 from rislam_rt.slam import StartPrior
 from rislam_rt.studies.unseen import Inputs
 
-CYCLES = 30
+CYCLES = 20
 CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_ris']", "slam.use_vt=true",
            "receiver.estimator=bound"]  # fmt: skip
 BODY = {"tx": "0.05,0,0", "rx": "-0.05,0,0"}

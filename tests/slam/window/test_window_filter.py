@@ -18,7 +18,7 @@ from rislam_rt.slam.window.divergence import recovery
 from rislam_rt.slam.window.relinearisation import predictions, whitened
 from rislam_rt.slam.window.smoother import window_gaussian
 
-ROOM, CYCLES = Path(__file__).parents[3] / "scenes" / "paper_room", 70
+ROOM, CYCLES = Path(__file__).parents[3] / "scenes" / "paper_room", 56
 CONFIG = SlamConfig(filter="window", use_vt=True)
 RECEIVER = ReceiverConfig("bound", alternation=False)
 
@@ -204,7 +204,7 @@ def _dash(motion, count, push):
 
 
 def test_a_start_that_nothing_announced_is_followed(run):
-    """An agent that walked calmly for 7 s sets off like a person: its returns are not thrown out one by one."""
+    """An agent that walked calmly for 5 s sets off like a person: its returns are not thrown out one by one."""
     _, motion, shift, _, (state, _, radio) = run
     dash, rng = _dash(motion, 8, np.array([-0.5, 0.4, 0.0])), np.random.default_rng(9)
     paths = without_panel(ImageSourceChannel(replace(load_scene(ROOM), agent=dash), radio, 2).paths(dash))
