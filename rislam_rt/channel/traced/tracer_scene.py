@@ -38,7 +38,7 @@ class WallBoxes(NamedTuple):
     half: mi.Vector3f
     """(W,) [m] half the size of each wall's bounds."""
     extent: float
-    """[m] Half the longest side of the room."""
+    """[m] Largest coordinate of a wall about the origin: half the longest side of a room about its middle."""
     margin: mi.Float
     """[m] A thousandth of the room, hundreds of times what float32 leaves uncertain; no constant of a kernel, which
     every room would compile anew."""

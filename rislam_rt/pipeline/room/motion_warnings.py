@@ -1,9 +1,11 @@
 """Warnings of a motion of the agent that receiver or filter does not reckon with: too fast, or manoeuvring too hard."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from rislam_rt.channel.doppler import end_velocities
 from rislam_rt.constants import MAX_SPEED
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.measurement.slot_motion import slot_weights
@@ -21,10 +23,6 @@ FEWEST_DIGITS, MOST_DIGITS = 3, 17
 """Significant digits of a speed in a message, and how many tell any two numbers of float64 apart."""
 
 
-HALF_POWER = 0.443
-"""Turns within the slot that leave half of a path's power in its mean: sinc(0.443)^2 = 0.5."""
-
-
 def motion_warnings(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
     """Warnings of an agent that is faster than its receiver assumes, but for rounding, so fast that returns average out
     within a measurement slot, or that speeds up as nothing on a floor does; `file` is what they name as their place."""
@@ -36,24 +34,33 @@ def motion_warnings(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, 
 
 def _averaged_returns(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
     """Motion warning of a slot in which a wall's return from ahead loses more than half of its power, as its phase
-    turns by its Doppler shift (`measurement.slot_motion`)."""
-    speed = np.linalg.norm(scene.agent.velocity, axis=1)
+    turns by its Doppler shift (`measurement.slot_motion`), with the longest slot of one digit that keeps it."""
+    tx, rx = end_velocities(scene.agent)
+    speed = np.linalg.norm(0.5 * (tx + rx), axis=1)
     cycle = int(np.argmax(speed))
     shift = 2.0 * float(speed[cycle]) / radio.wavelength
-    turns = shift * receiver.slot
-    if turns <= HALF_POWER:
+    kept = _kept(shift, receiver)
+    if kept**2 >= 0.5:
         return
-    kept = float(np.abs(slot_weights(np.array([shift]), receiver)[0][0]))
     lost = f"loses {-20.0 * np.log10(kept):.2g} dB of its SNR" if kept > 0.01 else "is not heard"
-    shorter = HALF_POWER / shift
-    digit = 10.0 ** np.floor(np.log10(shorter))
     message = (
         f"{receiver.slot:g} s, and at {speed[cycle]:.3g} m/s (cycle {cycle}) a wall's return from ahead turns by "
-        f"{turns:.2g} wavelengths within them: it {lost}, so that what moves is heard worst"
+        f"{shift * receiver.slot:.2g} wavelengths within them: it {lost}, so that what moves is heard worst"
     )
-    slot = float(np.floor(shorter / digit) * digit)
+    turning = replace(receiver, code_dwell=0.0)  # codes that are held for long keep the slot from being shorter
+    slots = [digit * 10.0**power for power in range(-1, -12, -1) for digit in range(9, 0, -1)]
+    slot = next(
+        slot for slot in slots if slot < receiver.slot and _kept(shift, replace(turning, slot=slot)) ** 2 >= 0.5
+    )
     mend = f"give budget.measure_s = {slot:.1g}, and {receiver.slot - slot:.6g} s to another step of the cycle"
+    if _kept(shift, replace(receiver, slot=slot)) ** 2 < 0.5:
+        mend += ", with receiver.code_dwell = 0"
     yield warning_at(file, "budget.measure_s", message, mend)
+
+
+def _kept(shift: float, receiver: ReceiverConfig) -> float:
+    """Share of a path's amplitude that is left in the mean over the slot, of a Doppler shift [Hz]."""
+    return float(np.abs(slot_weights(np.array([shift]), receiver)[0][0]))
 
 
 def _fast_agent(scene: Scene, top_speed: float, file: str) -> Iterator[Finding]:

@@ -1,5 +1,6 @@
 """A motion that receiver or filter does not reckon with is said, with its cycle."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -88,3 +89,34 @@ def test_a_slot_in_which_returns_turn_too_far_is_said_with_one_that_is_short_eno
 def test_without_alternation_a_slot_averages_as_much(room):
     (line,) = said(faster(room, 7, [0.0, 0.5, 0.0]), carrier=30e9, slot=0.01, alternation=False)
     assert "is not heard" in line
+
+
+def test_the_slot_that_is_advised_is_short_enough_and_the_longest_of_one_digit(room):
+    """At any speed and carrier, and where codes are held for so long that a shorter slot alone would not do."""
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        velocity = np.tile([0.0, rng.uniform(0.7, 3.0), 0.0], (len(room.agent), 1))
+        moving = replace(room, agent=replace(room.agent, velocity=velocity))
+        given = {"carrier": 10.0 ** rng.uniform(10.0, 11.2), "top_speed": 3.0, "code_dwell": rng.choice([0.0, 2.5e-3])}
+        (line,) = said(moving, slot=0.01, **given)
+        advice = re.search(r"give budget.measure_s = (\S+), and (\S+) s to another step", line)
+        slot, rest = (float(value) for value in advice.groups())
+        assert slot > 0.0
+        assert np.isclose(slot + rest, 0.01)
+        dwell = 0.0 if "with receiver.code_dwell = 0" in line else given["code_dwell"]
+        assert not said(moving, slot=slot, **{**given, "code_dwell": dwell})
+        one_more = slot + 10.0 ** np.floor(np.log10(slot) + 1e-9)
+        assert one_more > 0.0099 or said(moving, slot=one_more, **{**given, "code_dwell": 0.0})
+
+
+def test_what_turns_beside_its_middle_is_as_fast_as_its_antennas(room):
+    """Both antennas 0.35 m ahead of a body that turns on the spot at 1 rad/s move at 0.35 m/s."""
+    count, body = len(room.agent), room.agent.body
+    aside = replace(body, tx_offset=np.array([0.35, 0.0, 0.0]), rx_offset=np.array([0.35, 0.0, 0.01]))
+    still = np.tile(room.agent.position[:1], (count, 1))
+    turning = replace(
+        room.agent, position=still, velocity=0.0 * still, heading=room.agent.time - room.agent.time[0], body=aside
+    )
+    (line,) = said(replace(room, agent=turning), carrier=60e9, slot=0.01)
+    assert "at 0.35 m/s" in line
+    assert not said(replace(room, agent=turning), slot=0.01)
