@@ -8,6 +8,7 @@ import typer
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file
 from rislam_rt.cli.output_files import OUTPUT, write_json
 from rislam_rt.input_messages import counted
+from rislam_rt.shipped import is_shipped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,8 +43,7 @@ def command(
     """Look for what is wrong with a scene, and say what a run in it will hear.
 
     Exit code 2 if it is unusable; warnings are allowed. What a run will hear depends on radio and receiver: those of
-    the main job, of --pipeline, or as changed. With --pipeline, or schemes named by --set, what keeps that run from
-    starting in this room is an error, too.
+    the main job, of --pipeline, or as changed. What keeps that run from starting in this room is an error, too.
 
     Example: rislam-rt check myroom --set radio.reference_snr_db=0 --picture coverage.png
     """
@@ -73,10 +73,9 @@ def command(
     checked, looked = _checked_scene(Path(scene), findings), None
     if checked is not None:
         looked = survey(checked, settings)
-        named = names_schemes(spec, file, changed)
-        if named or pipeline is not None:
-            findings += _run_errors(checked, spec, (str(scene_file(scene)), str(file)), changed, named=named)
-        findings += motion_warnings(checked, settings.radio, settings.receiver, str(scene_file(scene)))
+        places = str(scene_file(scene)), "--set" if is_shipped(file) else str(file)
+        findings += _run_errors(checked, spec, places, changed, named=names_schemes(spec, file, changed))
+        findings += motion_warnings(checked, settings.radio, settings.receiver, spec.budget, places[0])
         findings += late_path_warnings(looked.paths, looked.settings, str(scene_file(scene)))
         findings += cancelled_return_warnings(looked, str(scene_file(scene)))
     for finding in findings:
@@ -106,8 +105,8 @@ def _run_errors(
     scene: "Scene", spec: "PipelineSpec", files: tuple[str, str], changed: "Sequence[str]", *, named: bool
 ) -> "list[Finding]":
     """Part of `rislam-rt check`: the error that `rislam-rt run` would end with at once, of a pipeline that does not fit
-    a scene. Its place is one of the `files` of scene and pipeline, or `--set` for what is `changed` there; `named`:
-    whether the user named the schemes."""
+    a scene. Its place is one of the `files` of scene and pipeline, or `--set` for what is `changed` there, or stands
+    in a file that comes with the package; `named`: whether the user named the schemes."""
     from rislam_rt.cli.run import panel_schemes, without_schemes
     from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import check_run

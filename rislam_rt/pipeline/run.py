@@ -28,6 +28,7 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import build_radio
+from rislam_rt.pipeline.specification.time_budget import changed_steps, fills_cycle, fitted_steps, total_seconds
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
@@ -38,8 +39,6 @@ LIBRARIES = ("numpy", "scipy", "sionna-rt", "mitsuba", "drjit", "karellen-llvm-c
 """Libraries that a run's numbers depend on; their versions are written into every result."""
 IN_ONE_PIECE = 50_000
 """Most cycles of a run that is held in memory as a whole: 5 GB in the paper's room."""
-SAME_CYCLE = 0.01
-"""Largest relative difference between the scene's cycle time and the sum of the time budget: clocks are inexact."""
 CYCLE_BYTES = 100_000
 """Memory of the paths of one cycle [bytes], in the paper's room with two bounces."""
 
@@ -191,12 +190,13 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")
-    total = budget.optimise_s + budget.communicate_s + budget.measure_s + budget.localise_s
-    step = usual_step(motion.time) if len(motion) > 1 else total
-    if abs(total - step) > SAME_CYCLE * step:
+    total = total_seconds(budget)
+    step = usual_step(motion.time) or total
+    if not fills_cycle(budget, step):
         raise ConfigError(
-            f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s, or give "
-            f"agent.cycle_s = {total:g} in the scene, to which a recording is interpolated"
+            f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s "
+            f"({changed_steps(budget, fitted_steps(budget, step))}), or give agent.cycle_s = {total:g} in the scene, "
+            "to which a recording is interpolated"
         )
     if scene.ris is None:
         need = [name for name in spec.schemes if SCHEMES[name].panel]
@@ -223,7 +223,7 @@ def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     """
     panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
     settings = build_settings(spec, panels)
-    moving = motion_warnings(scene, settings.radio, settings.receiver, f"scene '{scene.name}'")
+    moving = motion_warnings(scene, settings.radio, settings.receiver, spec.budget, f"scene '{scene.name}'")
     return (*(_large_panels(scene, spec) if panels else ()), *(finding.line for finding in moving))
 
 

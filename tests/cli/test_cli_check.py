@@ -81,11 +81,27 @@ def test_what_keeps_a_pipeline_from_running_in_a_room_is_an_error_in_the_words_o
     assert f"error: --set: {told}\n" in check("empty_box", "--set", 'schemes=["optimized"]')[1]
     mine.write_text(f'name = "mine"\n{named}\n[budget]\nmeasure_s = 0.05\n')
     assert "mine.toml: budget: the four steps sum to 0.14 s; make them" in check("paper_room", "--pipeline", mine)[1]
-    room = tmp_path / "room"
+    room = tmp_path / "levels"
     shutil.copytree(SCENES / "paper_room", room)
     scene = room / "scene.toml"
     scene.write_text(re.sub(r"(?m)^levels = .*$", "levels = 3", scene.read_text()))
     assert f"error: {scene}: ris.levels: 3 received" in check(room, "--pipeline", "trace_then_slam")[1]
+
+
+@pytest.mark.parametrize("words", [(), ("--pipeline", "trace_then_slam")])
+def test_a_cycle_that_the_budget_does_not_sum_to_is_refused_as_by_the_run(check, run, tmp_path, words):
+    """With settings that mend it, and no file of the package as what is to be edited."""
+    room = tmp_path / "room"
+    shutil.copytree(SCENES / "paper_room", room)
+    scene = room / "scene.toml"
+    scene.write_text(re.sub(r"(?m)^cycle_s = .*$", "cycle_s = 0.05", scene.read_text()))
+    told = run("run", "trace_then_slam", "--scene", room, "--no-report")[2].removeprefix("error: ")
+    code, out, _ = check(room, *words)
+    assert code == 2
+    assert f"error: --set: {told}" in out
+    assert "the four steps sum to 0.1 s; make them the scene's cycle of 0.05 s (--set budget.optimise_s=0.025 " in out
+    mend = re.search(r"\((--set .*)\)", told).group(1).split()
+    assert check(room, *words, *mend)[0] == 0
 
 
 @pytest.mark.parametrize("words", [(), ("--pipeline", "trace_then_slam"), ("--set", "radio.reference_snr_db=3")])

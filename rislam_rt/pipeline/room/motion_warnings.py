@@ -10,6 +10,9 @@ from rislam_rt.constants import MAX_SPEED
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.measurement.slot_motion import slot_weights
 from rislam_rt.model import RadioConfig, Scene
+from rislam_rt.pipeline.cycle import usual_step
+from rislam_rt.pipeline.specification.pipeline_spec import BudgetSection
+from rislam_rt.pipeline.specification.time_budget import changed_steps, fitted_steps, total_seconds
 from rislam_rt.scene.findings import Finding, warning_at
 from rislam_rt.slam.model_constants import CONSTANTS
 
@@ -23,18 +26,23 @@ FEWEST_DIGITS, MOST_DIGITS = 3, 17
 """Significant digits of a speed in a message, and how many tell any two numbers of float64 apart."""
 
 
-def motion_warnings(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
+def motion_warnings(
+    scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, budget: BudgetSection, file: str
+) -> Iterator[Finding]:  # fmt: skip
     """Warnings of an agent that is faster than its receiver assumes, but for rounding, so fast that returns average out
     within a measurement slot, or that speeds up as nothing on a floor does; `file` is what they name as their place."""
     if receiver.alternation and scene.ris is not None:
         yield from _fast_agent(scene, receiver.top_speed, file)
-    yield from _averaged_returns(scene, radio, receiver, file)
+    yield from _averaged_returns(scene, radio, receiver, budget, file)
     yield from _manoeuvring_agent(scene, file)
 
 
-def _averaged_returns(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, file: str) -> Iterator[Finding]:
+def _averaged_returns(
+    scene: Scene, radio: RadioConfig, receiver: ReceiverConfig, budget: BudgetSection, file: str
+) -> Iterator[Finding]:
     """Motion warning of a slot in which a wall's return from ahead loses more than half of its power, as its phase
-    turns by its Doppler shift (`measurement.slot_motion`), with the longest slot of one digit that keeps it."""
+    turns by its Doppler shift (`measurement.slot_motion`), with the longest slot of one digit that keeps it, and what
+    the other steps then are so that all sum to the scene's cycle."""
     tx, rx = end_velocities(scene.agent)
     speed = np.linalg.norm(0.5 * (tx + rx), axis=1)
     cycle = int(np.argmax(speed))
@@ -49,10 +57,11 @@ def _averaged_returns(scene: Scene, radio: RadioConfig, receiver: ReceiverConfig
     )
     turning = replace(receiver, code_dwell=0.0)  # codes that are held for long keep the slot from being shorter
     slots = [digit * 10.0**power for power in range(-1, -12, -1) for digit in range(9, 0, -1)]
-    slot = next(
-        slot for slot in slots if slot < receiver.slot and _kept(shift, replace(turning, slot=slot)) ** 2 >= 0.5
-    )
-    mend = f"give budget.measure_s = {slot:.1g}, and {receiver.slot - slot:.6g} s to another step of the cycle"
+    cycle_s = usual_step(scene.agent.time) or total_seconds(budget)
+    most = min(receiver.slot, fitted_steps(budget, cycle_s)["measure_s"])
+    slot = next(slot for slot in slots if slot <= most and _kept(shift, replace(turning, slot=slot)) ** 2 >= 0.5)
+    steps = fitted_steps(budget, cycle_s, float(f"{slot:.1g}"))
+    mend = f"give {changed_steps(budget, steps)}, which leaves the cycle as long as it is"
     if _kept(shift, replace(receiver, slot=slot)) ** 2 < 0.5:
         mend += ", with receiver.code_dwell = 0"
     yield warning_at(file, "budget.measure_s", message, mend)

@@ -8,14 +8,16 @@ import numpy as np
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.model import RadioConfig
 from rislam_rt.pipeline.room.motion_warnings import motion_warnings
+from rislam_rt.pipeline.specification.pipeline_spec import BudgetSection
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import find_room, shipped_rooms
 
 
-def said(scene, carrier=10e9, slot=1e-3, **receiver):
+def said(scene, carrier=10e9, slot=1e-3, budget=None, **receiver):
     """Lines of the warnings, by default with a slot that is short enough for any of these agents."""
     receiver = ReceiverConfig(slot=slot, **receiver)
-    return [finding.line for finding in motion_warnings(scene, RadioConfig(carrier), receiver, "scene.toml")]
+    budget = budget or BudgetSection(measure_s=slot, localise_s=0.05 - slot)
+    return [finding.line for finding in motion_warnings(scene, RadioConfig(carrier), receiver, budget, "scene.toml")]
 
 
 def faster(room, cycle, velocity):
@@ -78,12 +80,25 @@ def test_a_slot_in_which_returns_turn_too_far_is_said_with_one_that_is_short_eno
     (line,) = said(moving, carrier=60e9, slot=0.01)
     assert line.startswith("scene.toml: budget.measure_s: 0.01 s, and at 0.5 m/s (cycle 7) a wall's return from ahead")
     assert "turns by 2 wavelengths within them: it is not heard" in line
-    assert line.endswith("give budget.measure_s = 0.002, and 0.008 s to another step of the cycle")
+    told = "give --set budget.measure_s=0.002 --set budget.localise_s=0.048, which leaves the cycle as long as it is"
+    assert line.endswith(told)
     assert not said(moving, carrier=60e9, slot=0.002)
     assert not said(moving, slot=0.01)
     # 2 * 0.7 m/s over 0.03 m for 10 ms, by hand: sinc(0.467)^2 = 0.46
     (line,) = said(faster(room, 7, [0.7, 0.0, 0.0]), top_speed=0.7, slot=0.01)
     assert "turns by 0.47 wavelengths within them: it loses 3.4 dB of its SNR" in line
+
+
+def test_the_slot_that_is_advised_leaves_the_steps_the_scenes_cycle(room):
+    """Whatever they sum to before: a run refuses another sum."""
+    moving = faster(room, 7, [0.0, 0.5, 0.0])
+    for measure in (0.002, 0.01, 0.04):  # in all 0.022, 0.03 and 0.06 s for cycles of 0.1 s
+        budget = BudgetSection(optimise_s=0.01, communicate_s=0.01, measure_s=measure, localise_s=0.0)
+        (line,) = said(moving, carrier=400e9, slot=measure, budget=budget)
+        steps = dict(re.findall(r"--set budget\.(\w+)=(\S+)\b", line))
+        changed = budget.model_copy(update={name: float(value) for name, value in steps.items()})
+        assert np.isclose(sum(changed.model_dump().values()), 0.1)
+        assert not said(moving, carrier=400e9, slot=changed.measure_s, budget=changed)
 
 
 def test_without_alternation_a_slot_averages_as_much(room):
@@ -99,10 +114,10 @@ def test_the_slot_that_is_advised_is_short_enough_and_the_longest_of_one_digit(r
         moving = replace(room, agent=replace(room.agent, velocity=velocity))
         given = {"carrier": 10.0 ** rng.uniform(10.0, 11.2), "top_speed": 3.0, "code_dwell": rng.choice([0.0, 2.5e-3])}
         (line,) = said(moving, slot=0.01, **given)
-        advice = re.search(r"give budget.measure_s = (\S+), and (\S+) s to another step", line)
+        advice = re.search(r"give --set budget.measure_s=(\S+) --set budget.localise_s=(\S+),", line)
         slot, rest = (float(value) for value in advice.groups())
         assert slot > 0.0
-        assert np.isclose(slot + rest, 0.01)
+        assert np.isclose(slot + rest, 0.05)
         dwell = 0.0 if "with receiver.code_dwell = 0" in line else given["code_dwell"]
         assert not said(moving, slot=slot, **{**given, "code_dwell": dwell})
         one_more = slot + 10.0 ** np.floor(np.log10(slot) + 1e-9)
