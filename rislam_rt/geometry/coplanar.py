@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.constants import COPLANAR_ANGLE, RAY_OFFSET
 from rislam_rt.geometry.planes import signed_distance
-from rislam_rt.geometry.triangles import triangle_areas
+from rislam_rt.geometry.triangles import edge_planes, inside_any, outline_edges, triangle_areas
 
 ALIKE = 1e-6
 """Relative difference below which the areas of two walls count as equal: corners in float32 say no more."""
@@ -88,6 +88,22 @@ def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
     flat_a = flat_a[((flat_a.max(axis=1) > low) & (flat_a.min(axis=1) < high)).all(axis=-1)]
     step = max(1, _BLOCK // max(len(b), 1))
     return any(_any_overlap(flat_a[i : i + step], flat_b, depth) for i in range(0, len(flat_a), step))
+
+
+def lies_within(upper: Floats, lower: Floats, gap: float) -> bool:
+    """Whether coplanar triangles (U, 3, 3) lie on triangles (L, 3, 3) all over, but for `gap` [m]: their middles do,
+    and no outline of the lower ones runs through an upper one."""
+    if not inside_any(upper.mean(axis=1), lower, gap).all():
+        return False
+    start, end = outline_edges(lower).swapaxes(0, 1)
+    for inward, offset in zip(*edge_planes(upper), strict=True):
+        a, b = start @ inward.T - offset - gap, end @ inward.T - offset - gap  # how far within each edge, both ends
+        at = a / np.where(a != b, a - b, 1.0)  # where along the outline it crosses the edge's line
+        enters = np.where(b > a, at, np.where((b == a) & (a < 0.0), np.inf, 0.0)).max(axis=1)
+        leaves = np.where(b < a, at, 1.0).min(axis=1)
+        if (np.maximum(enters, 0.0) < np.minimum(leaves, 1.0)).any():
+            return False
+    return True
 
 
 def _any_overlap(a: Floats, b: Floats, depth: float) -> bool:

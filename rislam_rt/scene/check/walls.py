@@ -1,5 +1,6 @@
 """Scene check of walls: which meshes lie on each other, and which part into several walls."""
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -7,9 +8,9 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
-from rislam_rt.geometry.coplanar import CoplanarPair, stack_walls, tracer_gap
+from rislam_rt.geometry.coplanar import ALIKE, CoplanarPair, lies_within, stack_walls, tracer_gap
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
-from rislam_rt.geometry.triangles import triangle_planes
+from rislam_rt.geometry.triangles import triangle_areas, triangle_planes
 from rislam_rt.input_messages import counted
 from rislam_rt.scene.check.mesh_queries import crossings, free_ways, sphere_directions, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
@@ -19,6 +20,13 @@ NEARLY_FLAT = 1e-2
 """Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat."""
 NUM_VIEWS = 20
 """Places from which the scene check looks about, and rays from each."""
+
+
+HIDDEN, WITHIN = (
+    "nobody sees the faces where they meet; leave them",
+    "as of a window in its wall, the smaller one reflects where it is and the other elsewhere; leave them",
+)
+"""Why two meshes in one plane may stay as they are."""
 
 
 class WallParts(NamedTuple):
@@ -65,29 +73,41 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
     """Scene check: a finding for each pair of meshes that overlap in one plane; one note for all where nobody sees
-    it."""
+    it, and one for all flat meshes that lie within a larger wall, a window or a door, as it is clear what reflects."""
     normal = np.concatenate([part.normal for part in parts.flat])
     offset = np.concatenate([part.offset for part in parts.flat])
     limit = tracer_gap(room.bounds)
-    worst: dict[tuple[int, int, bool], CoplanarPair] = {}
+    worst: dict[tuple[int, int, str], CoplanarPair] = {}
     pairs = stack_walls(room.triangles, parts.owner, normal, offset, limit).pairs
     views = _views(room) if pairs else np.zeros((0, 3))
     for pair in pairs:
-        key = parts.reflector(pair.upper), parts.reflector(pair.lower), _is_seen(room, parts, pair, limit, views)
+        seen = _is_seen(room, parts, pair, limit, views)
+        why = HIDDEN if not seen else WITHIN if _is_within(room, parts, pair, limit) else ""
+        key = parts.reflector(pair.upper), parts.reflector(pair.lower), why
         if key not in worst or worst[key].gap < pair.gap:
             worst[key] = pair
-    hidden = sum(not seen for _, _, seen in worst)
-    for (upper, lower, seen), pair in worst.items():
+    left = Counter(why for _, _, why in worst)
+    for (upper, lower, why), pair in worst.items():
         names, field = [room.scene.reflectors[number].name for number in (upper, lower)], f"reflector[{upper}].mesh"
         field, apart = f"{field} ({names[0]})", f"{round(pair.gap * 1e3, 2):g} mm apart"
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
-        if seen:
-            mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm (a door or window by 1 cm, say)"
+        if not why:
+            mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm"
             yield warning_at(room.file, field, message, f"where they overlap '{names[0]}' reflects; {mend}")
-        elif hidden:
-            message += f", and {counted(hidden - 1, 'other pair')} likewise" if hidden > 1 else ""
-            yield note_at(room.file, field, message, "nobody sees the faces where they meet; leave them")
-            hidden = 0
+        elif left[why]:
+            message += f", and {counted(left[why] - 1, 'other pair')} likewise" if left[why] > 1 else ""
+            yield note_at(room.file, field, message, why)
+            left[why] = 0
+
+
+def _is_within(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: float) -> bool:
+    """Scene check: whether the upper of two walls that overlap is a flat mesh, smaller than the lower and wholly on it:
+    it reflects where it is, and the lower one elsewhere."""
+    if len(parts.flat[parts.reflector(pair.upper)].offset) > 1:
+        return False
+    upper, lower = (room.triangles[parts.owner == number] for number in (pair.upper, pair.lower))
+    smaller = triangle_areas(upper).sum() < triangle_areas(lower).sum() * (1.0 - ALIKE)
+    return bool(smaller) and lies_within(upper, lower, limit)
 
 
 def _is_seen(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: float, views: Floats) -> bool:
