@@ -51,7 +51,7 @@ def command(
     ] = None,
     rest: Annotated[str, typer.Option(metavar="MATERIAL", help="Material of all else.")] = "itu:concrete",
     carrier_ghz: Annotated[
-        float, typer.Option(min=0.1, max=1000.0, help="Carrier: small and round are meant in its wavelengths.")
+        float, typer.Option(min=0.1, max=1000.0, help="Carrier of the panel; small and round are in its wavelengths.")
     ] = 10.0,
     detail: Annotated[
         float, typer.Option(min=0.0, max=1e4, help="What is flat but narrower than this many wavelengths shades.")
@@ -74,7 +74,7 @@ def command(
     before = _named_files(scene) if overwrite else set()
     if source is not None and (source.suffix.lower() == ".xml" or str(source).startswith("sionna:")):
         own = {"--units": units, "--up": up, "--origin": origin != "0,0,0", "--material": material}
-        _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite)
+        _from_xml(source, scene, within, [name for name, value in own.items() if value], overwrite, carrier_ghz)
         _tell_left(scene, before)
         return
     if within:
@@ -151,7 +151,7 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
         raise ConfigError(f"{given[1]}: a room comes from it or from {given[0]}; leave one out")
 
 
-def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool) -> None:
+def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool, carrier_ghz: float) -> None:
     """Part of `rislam-rt new`: a scene folder from an XML scene, for whose units and materials options are
     `useless`."""
     from rislam_rt.errors import ConfigError
@@ -163,6 +163,6 @@ def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overw
         window = [float(word) for word in within.split(",")] if within.strip() else []
     except ValueError:
         raise ConfigError(f"--within: '{within[:60]}' received; give numbers parted by commas") from None
-    for note in new_from_xml(str(source), folder, within=window, overwrite=overwrite):
+    for note in new_from_xml(str(source), folder, within=window, overwrite=overwrite, carrier_ghz=carrier_ghz):
         typer.echo(f"- {note}")
     typer.echo(f"{folder}: made from '{source}'; edit its scene.toml")

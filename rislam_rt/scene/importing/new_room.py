@@ -96,8 +96,9 @@ def write_room(
     Fault
         There is no place for an agent, or the check finds an error.
     """
-    room, remarks = finish_room(draft, room_name(folder, "room"), origin)
-    files = room_files(room, "Made by `rislam-rt new --from`: start, way and panel are proposals.")
+    room, remarks = finish_room(draft, room_name(folder, "room"), origin, options.carrier_ghz)
+    made = f"Made by `rislam-rt new` for a carrier of {options.carrier_ghz:g} GHz"
+    files = room_files(room, f"{made}: start, way and panel are proposals.")
     with tempfile.TemporaryDirectory() as place:
         trial = write_files(files, Path(place) / "room")
         carrier = 1e9 * options.carrier_ghz

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Floats, cross
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.geometry.triangles import triangle_planes
@@ -18,7 +19,9 @@ from rislam_rt.scene.room_files import CYCLES, RoomFiles, panel, reflector
 from rislam_rt.scene.scene_folder import mesh_file
 
 FROM_EDGE = 0.1
-"""Distance [m] of a proposed RIS panel's centre from the edges of its host: the panel measures 9 cm."""
+"""Least distance [m] of a proposed RIS panel's centre from the edges of its host, if the panel is no larger."""
+SIZE = 6
+"""Elements along each side of a proposed RIS panel, half a wavelength apart: the paper's, in wavelengths."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,9 +40,9 @@ class RoomDraft:
         return np.concatenate([mesh.triangles for mesh in meshes])
 
 
-def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, list[str]]:
-    """Finish the draft of an imported room, with an agent on a free line and a RIS panel above it: its files, and all
-    remarks.
+def finish_room(draft: RoomDraft, name: str, origin: str, carrier_ghz: float) -> tuple[RoomFiles, list[str]]:
+    """Finish the draft of an imported room, with an agent on a free line and a RIS panel for the carrier above it: its
+    files, and all remarks.
 
     Raises
     ------
@@ -55,7 +58,7 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     table: dict[str, Any] = {"name": name}
     table["reflector"] = [reflector(key, material) for key, (_, material) in draft.reflectors.items()]
     table["shade"] = [{"name": key, "mesh": mesh_file(key)} for key in draft.occluders]
-    ris, about = propose_panel(draft, free)
+    ris, about = propose_panel(draft, free, carrier_ghz)
     table |= {"ris": ris} if ris else {}
     table["agent"] = agent | BASELINE
     meshes = {key: mesh for key, (mesh, _) in draft.reflectors.items()} | draft.occluders
@@ -68,9 +71,10 @@ def finish_room(draft: RoomDraft, name: str, origin: str) -> tuple[RoomFiles, li
     return RoomFiles({key: value for key, value in table.items() if value != []}, meshes, readme), remarks
 
 
-def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | None, str]:
-    """Propose a RIS panel of the paper's size above or beside the agent's line, with `energy` elements, which the check
-    has nothing against: its table or None, and a remark."""
+def propose_panel(draft: RoomDraft, free: FreeSpace, carrier_ghz: float) -> tuple[dict[str, Any] | None, str]:
+    """Propose a RIS panel above or beside the agent's line, the paper's size in wavelengths, with `energy` elements,
+    which the check has nothing against: its table or None, and a remark."""
+    spacing = float(f"{0.5e-9 * SPEED_OF_LIGHT / carrier_ghz:.3g}")
     names = [key for key, (mesh, _) in draft.reflectors.items() for _ in range(len(mesh.faces))]
     triangles = np.concatenate([mesh.triangles for mesh, _ in draft.reflectors.values()])
     middle, along = free.way.mean(axis=0), unit(free.way[1] - free.way[0])
@@ -84,18 +88,21 @@ def propose_panel(draft: RoomDraft, free: FreeSpace) -> tuple[dict[str, Any] | N
         center = middle + look * float((offset - normal @ middle) / (normal @ look))
         normal = normal * (1.0 if (middle - center) @ normal > 0.0 else -1.0) + 0.0
         right, _ = plane_tangents(normal)
-        if _fits(center, normal, right, names[hit], draft, free):
-            table = panel(center.round(9).tolist(), normal.tolist(), right.tolist(), names[hit], element="energy")
-            return table, f"a panel of 6 x 6 elements on '{names[hit]}'"
+        if _fits(center, normal, right, names[hit], draft, free, max(FROM_EDGE, 0.5 * SIZE * spacing)):
+            lie = center.round(9).tolist(), normal.tolist(), right.tolist(), names[hit]
+            about = f"a panel of {SIZE} x {SIZE} elements for {carrier_ghz:g} GHz on '{names[hit]}'"
+            return panel(*lie, size=SIZE, element="energy", spacing=spacing), about
     return None, "no panel: nothing flat is free above or beside the way"
 
 
-def _fits(center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace) -> bool:
-    """Whether the corners of a RIS panel proposed for the draft lie on one host and are seen from the middle of the
-    agent's line."""
+def _fits(
+    center: Floats, normal: Floats, right: Floats, host: str, draft: RoomDraft, free: FreeSpace, half: float
+) -> bool:
+    """Whether the corners of a RIS panel proposed for the draft, `half` a side [m] from its centre, lie on one host and
+    are seen from the middle of the agent's line."""
     mesh, _ = draft.reflectors[host]
     down = cross(normal, right)
-    corners = center + FROM_EDGE * np.array([right + down, right - down, -right + down, -right - down])
+    corners = center + half * np.array([right + down, right - down, -right + down, -right - down])
     middle = free.way.mean(axis=0)
     hits = ray_hits(middle, unit(corners - middle), draft.triangles)
     seen = draft.triangles[hits]

@@ -30,10 +30,10 @@ CITY_FACES = 1_000_000
 
 
 def new_from_xml(
-    source: str, folder: str | Path, *, within: Sequence[float] = (), overwrite: bool = False
+    source: str, folder: str | Path, *, within: Sequence[float] = (), overwrite: bool = False, carrier_ghz: float = 10.0
 ) -> list[str]:
-    """Make a scene folder from an XML scene file, or from `sionna:NAME`; returns remarks on what was left out or
-    supplied.
+    """Make a scene folder from an XML scene file, or from `sionna:NAME`, with a RIS panel for a carrier [GHz]; returns
+    remarks on what was left out or supplied.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def new_from_xml(
         The file cannot be used, or the folder exists and `overwrite` is False.
     """
     path = find_xml(source)
-    scene, notes = scene_of_xml(path, room_name(Path(folder), path.stem), within)
+    scene, notes = scene_of_xml(path, room_name(Path(folder), path.stem), within, carrier_ghz)
     raise_errors(list(find_errors(scene, str(path))))
     origin = f"Made by `rislam-rt new --from {path.name}`."
     about = "\n".join([origin, "", *(f"- {note}" for note in notes)] if notes else [origin])
@@ -54,8 +54,10 @@ def new_from_xml(
     return notes
 
 
-def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[Scene, list[str]]:
-    """Make a scene from an XML scene file; also remarks.
+def scene_of_xml(
+    path: Path, name: str, within: Sequence[float] = (), carrier_ghz: float = 10.0
+) -> tuple[Scene, list[str]]:
+    """Make a scene from an XML scene file; also remarks. A RIS panel that it proposes is one for that carrier [GHz].
 
     Where a `scene.toml` lies beside the file (as `rislam-rt export --xml` leaves it), agent, panel and scatterers are
     its, and a material that the XML file still has as it was written there is the exact one. Without it the agent gets
@@ -86,7 +88,7 @@ def scene_of_xml(path: Path, name: str, within: Sequence[float] = ()) -> tuple[S
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
         return replace(whole, name=name, reflectors=reflectors, occluders=occluders, digest=""), notes
     agent = _motion(path, reflectors, occluders)
-    panel, about = _panel(reflectors, occluders, agent)
+    panel, about = _panel(reflectors, occluders, agent, carrier_ghz)
     way = float(np.linalg.norm(agent.position[-1] - agent.position[0]))
     notes.append(f"proposed way: {way:.2g} m in {agent.time[-1]:.0f} s, to be edited in [agent]; {about}")
     return Scene(name, reflectors, (), panel, agent, "", occluders), notes
@@ -110,13 +112,13 @@ def _exact(read: Material, exact: Material | None) -> Material:
 
 
 def _panel(
-    reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory
+    reflectors: Sequence[Reflector], occluders: Sequence[Occluder], agent: Trajectory, carrier_ghz: float
 ) -> tuple[RisPanel | None, str]:
     """Propose a RIS panel for an XML scene above or beside the agent's path, if there is a place; and a remark."""
     hiding = {s.name: Mesh(s.vertices, s.faces) for s in occluders}
     draft = RoomDraft({r.name: (Mesh(r.vertices, r.faces), {}) for r in reflectors}, hiding)
     way = agent.position[[0, -1]]
-    table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0))
+    table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0), carrier_ghz)
     return (build_panel(RisSection(**table)) if table else None), about
 
 

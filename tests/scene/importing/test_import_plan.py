@@ -38,12 +38,17 @@ def test_one_room_from_its_corners(tmp_path: Path, corners: str) -> None:
 
 
 @pytest.mark.parametrize("ghz", [2.4, 5.0, 10.0, 28.0])
-def test_the_proposed_panel_reflects_no_more_than_a_plate(tmp_path: Path, ghz: float) -> None:
+def test_the_proposed_panel_is_one_that_the_check_finds_nothing_against_at_its_carrier(
+    tmp_path: Path, ghz: float
+) -> None:
+    """Elements half a wavelength apart, which reflect no more than a plate."""
     import_corners("0,0 4,0 4,3 0,3", tmp_path / "room", ImportOptions(carrier_ghz=ghz))
     (panel,) = load_scene(tmp_path / "room").panels
     assert panel.spec.element == "energy"
+    assert panel.spec.spacing == pytest.approx((0.5 * 0.299792458 / ghz,) * 2, rel=5e-3)  # three digits
+    assert f"for a carrier of {ghz:g} GHz" in (tmp_path / "room/README.md").read_text()
     radio = RadioConfig(carrier=1e9 * ghz, bandwidth=min(1e9, 1e9 * ghz))
-    assert not [f.line for f in check_scene(tmp_path / "room", radio) if f.field == "ris.element"]
+    assert not [f.line for f in check_scene(tmp_path / "room", radio) if f.field in ("ris.element", "ris.spacing_m")]
 
 
 def test_a_room_of_any_shape_is_closed(tmp_path: Path) -> None:

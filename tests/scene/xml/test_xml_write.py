@@ -70,11 +70,13 @@ def test_own_materials_and_shades_come_back(tmp_path):
 
 
 def test_a_scene_of_sionna_passes_its_check_and_gets_a_way(tmp_path):
-    notes = new_from_xml("sionna:simple_street_canyon", tmp_path / "canyon")
+    notes = new_from_xml("sionna:simple_street_canyon", tmp_path / "canyon", carrier_ghz=28.0)
     assert [n for n in notes if "proposed way" in n]
     findings = check_scene(tmp_path / "canyon")
     assert not [f for f in findings if f.severity == "error"]
-    agent = load_scene(tmp_path / "canyon").agent
+    room = load_scene(tmp_path / "canyon")
+    assert [panel.spec.spacing.tolist() for panel in room.panels] == [[0.00535, 0.00535]]  # half a wavelength
+    agent = room.agent
     assert (np.abs(agent.position[:, 1]) < 12.0).all(), "in the street, not behind the houses or on a roof"
     assert (agent.position[:, 2] < 2.0).all()
 
