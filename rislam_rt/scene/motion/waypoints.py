@@ -65,19 +65,29 @@ def round_corners(waypoints: Floats, radius: float, first: int = 0) -> RoundedPa
     if (turn > SHARPEST).any():
         corner = first + int(np.argmax(turn)) + 1
         raise Fault(
-            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner}",
+            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner} (the first is 0)",
             f"give a way round (up to {np.degrees(SHARPEST):.0f} degrees at a waypoint), or a halt there: agent.halt_s",
         )
     cut = np.concatenate([[0.0], np.where(turn > STRAIGHT, radius * np.tan(turn / 2.0), 0.0), [0.0]])
     left = length - cut[:-1] - cut[1:]
     if (left < 0.0).any():
         leg = int(np.argmin(left))
-        raise Fault(
-            f"{length[leg]:.3g} m from waypoint {first + leg} to {first + leg + 1}, of which the corners' arcs (radius "
-            f"{radius:.3g} m, speed squared over acceleration) take {cut[leg] + cut[leg + 1]:.3g} m",
-            "lower agent.speed_m_s, raise agent.acceleration_m_s2, or part the waypoints",
-        )
+        raise Fault(*_too_short(float(length[leg]), cut[leg : leg + 2], first + leg, radius))
     return _pieces(waypoints, along, turn, cut, left, radius)
+
+
+def _too_short(length: float, arcs: Floats, number: int, radius: float) -> tuple[str, str]:
+    """What is wrong with a leg of the way, from waypoint `number` on, that is too short for the `arcs` (2,) [m] of the
+    corners at its ends, and the mend: a halt at the larger one, at both if the other alone is too large as well."""
+    bent = [f"{number + end}" for end in range(2) if arcs[end] > 0.0]
+    halts = " and ".join(bent if arcs.min() > length else [f"{number + int(np.argmax(arcs))}"])
+    takes = f"the arc at waypoint {bent[0]} takes" if len(bent) == 1 else "the arcs at both take"
+    return (
+        f"{length:.3g} m from waypoint {number} to {number + 1} (the first is 0), of which {takes} {arcs.sum():.3g} m "
+        f"(radius {radius:.3g} m, speed squared over acceleration)",
+        f"halt at {halts} (agent.halt_s, one number of seconds for each waypoint), lower agent.speed_m_s, raise "
+        "agent.acceleration_m_s2, or part the waypoints",
+    )
 
 
 def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: Floats, radius: float) -> RoundedPath:

@@ -172,11 +172,17 @@ def test_a_room_with_halts_passes_its_check(folder: Callable[[str], Path]) -> No
         (CORNER + "halt_s = [1, 1e5, 1]\ncycle_s = 0.001", "the way of 5 m takes 1000"),
         (
             "waypoints = [[1, 1, 1], [2, 1, 1], [4, 1, 1], [1, 1, 1]]\nhalt_s = [0, 1, 0, 0]",
-            "turns back by 180 degrees at waypoint 2; give a way round (up to 170 degrees at a waypoint), or",
+            "turns back by 180 degrees at waypoint 2 (the first is 0); give a way round (up to 170 degrees at",
         ),
         (
             "waypoints = [[1, 1, 1], [2, 1, 1], [2, 2, 1], [2.2, 2, 1], [2.2, 1, 1]]\nhalt_s = [0, 1, 0, 0, 0]",
-            "0.2 m from waypoint 2 to 3, of which",
+            "0.2 m from waypoint 2 to 3 (the first is 0), of which the arcs at both take 1 m (radius 0.5 m, speed "
+            "squared over acceleration); halt at 2 and 3 (agent.halt_s, one number of seconds for each waypoint)",
+        ),
+        (
+            "waypoints = [[1, 1, 1], [2, 1, 1], [2, 1.3, 1], [4, 1.3, 1]]\nhalt_s = [0, 1, 0, 0]",
+            "0.3 m from waypoint 1 to 2 (the first is 0), of which the arc at waypoint 2 takes 0.5 m (radius 0.5 m, "
+            "speed squared over acceleration); halt at 2 (agent.halt_s",
         ),
     ],
 )
