@@ -190,10 +190,9 @@ def compute_run(
 
 
 def show_scores(summary: Mapping[str, Any]) -> None:
-    """For `rislam-rt run`: print the scores of a run from its summary, then its warnings on the error stream, those of
-    schemes that diverged without noticing first."""
-    from rislam_rt.report.terminal_tables import print_summary, unnoticed_lines
+    """For `rislam-rt run`: print the scores of a run from its summary, then its warnings on the error stream."""
+    from rislam_rt.report.terminal_tables import print_summary
 
     print_summary(summary)
-    for line in (*unnoticed_lines(summary), *summary["warnings"]):
+    for line in summary["warnings"]:
         warn(line)

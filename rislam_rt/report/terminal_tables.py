@@ -11,7 +11,7 @@ from rich.table import Column, Table
 from rislam_rt.input_messages import counted, share_text
 from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.pipeline.scores.audible_paths import HEARD
-from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
+from rislam_rt.pipeline.scores.loss_causes import is_unnoticed, words_of_loss
 from rislam_rt.pipeline.scores.wall_scores import PlaneScore, found_of_heard, plane_scores
 from rislam_rt.shipped import short_names
 
@@ -93,12 +93,6 @@ def _wall_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 def _ghosts(count: int) -> str:
     """Part of a cell of a terminal table: how many ghost walls there are, empty without any."""
     return f", {counted(count, 'ghost')}" if count else ""
-
-
-def unnoticed_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Lines below the terminal table of a run, one for each scheme that diverged without noticing."""
-    found = ((name, scores) for name, scores in summary["schemes"].items() if is_unnoticed(scores))
-    return [f"{name}: {UNNOTICED}; off by up to {_metres(scores['largest_m'])}" for name, scores in found]
 
 
 def _diverged(scores: Mapping[str, Any]) -> str:

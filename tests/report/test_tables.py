@@ -1,6 +1,7 @@
 """Rows of a run's table: every wall that is heard or found has one, the others share one."""
 
-from rislam_rt.report.terminal_tables import summary_rows, unnoticed_lines
+from rislam_rt.pipeline.scores.loss_causes import unnoticed_lines
+from rislam_rt.report.terminal_tables import summary_rows
 
 FOUND = {"rmse_m": 0.01, "angle_deg": 0.1, "bound_m": 0.005, "audible_s": 7.0}
 MISSED = {"rmse_m": None, "angle_deg": None, "bound_m": 0.02, "audible_s": 2.0}
@@ -69,6 +70,6 @@ def test_a_scheme_that_diverged_without_noticing_is_told_apart_from_one_that_not
     table = {label: cells for label, *cells in summary_rows({"schemes": schemes})}
     assert table["diverged"] == ["yes, without noticing", "yes", "no"]
     assert table["held itself for lost"] == ["never", "in 1 of 10 cycles", "never"]
-    (line,) = unnoticed_lines({"schemes": schemes})
+    (line,) = unnoticed_lines(schemes)
     assert line.startswith("silent: diverged without noticing: ")
     assert line.endswith("off by up to 3.55 m")

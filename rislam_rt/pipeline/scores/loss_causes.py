@@ -62,6 +62,13 @@ def is_unnoticed(scores: Mapping[str, Any]) -> bool:
     return bool(scores["diverged"]) and not scores["lost"]["times"]
 
 
+def unnoticed_lines(schemes: Mapping[str, Any]) -> list[str]:
+    """Warnings of a run, from the scores of its schemes by name: a line for each cause of loss that no filter told of,
+    as the scheme diverged without noticing."""
+    found = ((name, scores["largest_m"]) for name, scores in schemes.items() if is_unnoticed(scores))
+    return [f"{name}: {UNNOTICED}; off by up to {largest:.2f} m" for name, largest in found]
+
+
 def words_of_loss(lost: Mapping[str, Any]) -> str:
     """Causes of loss in words, the most frequent first, from the scores that `LossTally` gives."""
     many = len(lost["causes"]) > 1

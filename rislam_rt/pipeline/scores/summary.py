@@ -11,7 +11,7 @@ from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
-from rislam_rt.pipeline.scores.loss_causes import loss_scores
+from rislam_rt.pipeline.scores.loss_causes import loss_scores, unnoticed_lines
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
@@ -40,11 +40,12 @@ def summarise(result: SlamResult) -> dict[str, Any]:
 
 
 def summary_table(result: SlamResult, scores: Mapping[str, Any], cycles: int) -> dict[str, Any]:
-    """Table for JSON of a run of so many cycles, with the scores of its schemes by name."""
+    """Table for JSON of a run of so many cycles, with the scores of its schemes by name; its warnings are all that the
+    run ends with on the terminal."""
     return {
         "seed": result.seed, "cycles": cycles, "pipeline": result.name, "scene": result.scene.name,
         "source": result.paths.source, "trace_seconds": result.seconds.get("trace", 0.0),
-        "warnings": list(result.warnings), "schemes": scores,
+        "warnings": [*unnoticed_lines(scores), *result.warnings], "schemes": scores,
     }  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.cli.run import show_scores
 from rislam_rt.information import WallSpread
 from rislam_rt.model import MapEstimate
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound
@@ -156,14 +157,18 @@ def test_a_bound_is_wider_for_an_agent_that_may_be_livelier(short_result):
 
 
 @pytest.mark.parametrize("cycles", [slice(3, 4), slice(-1, None), slice(None)])
-def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles):
-    """Half a metre is the limit."""
+def test_a_run_is_lost_whose_error_was_large_in_any_cycle(short_result, cycles, capsys):
+    """Half a metre is the limit. The summary says so among its warnings, which are what the terminal shows."""
     scheme = short_result.schemes["random"]
     for far, lost in ((0.4, False), (0.7, True)):
         position = scheme.position.copy()
         position[cycles, 0] = short_result.scene.agent.position[cycles, 0] + far
         astray = replace(short_result, schemes={"random": replace(scheme, position=position)})
-        assert summarise(astray)["schemes"]["random"]["diverged"] is lost
+        summary = summarise(astray)
+        assert summary["schemes"]["random"]["diverged"] is lost
+        assert [line.startswith("random: diverged without noticing") for line in summary["warnings"]] == [True] * lost
+        show_scores(summary)
+        assert capsys.readouterr().err == "".join(f"warning: {line}\n" for line in summary["warnings"])
 
 
 @pytest.mark.parametrize(("name", "use_vt"), [("random", True), ("bp_slam", True), ("bp_slam", False)])
