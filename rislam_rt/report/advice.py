@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from rich.console import Console
 from rich.table import Column, Table
 
@@ -28,6 +28,8 @@ UNSAID = {"swept": "most beams miss it", "random": "most codes miss it"}
 """Why a landmark is not heard under so many codes whose best or mean is loud enough."""
 WEAKENED = "weakened by paths that come in with it"
 """Why a landmark is not heard whose strongest path is loud enough and has a component of its own."""
+LETTERS = 60
+"""Most letters in a line of the coverage map's title: so many of the widest, bold, are as wide as the picture."""
 UNSEEN = "#d9d9d9"
 """Colour of places in the coverage map that no direct path from the panel reaches."""
 
@@ -59,15 +61,17 @@ def draw_coverage(scene: Scene, coverages: Sequence[Coverage], path: Path) -> Pa
     height = float(np.clip(6.0 * (high[1] - low[1]) / (high[0] - low[0]), 2.5, 9.0)) + 1.2
     with styled():
         figure = Figure(figsize=(7.6, height * len(coverages)))
-        for axis, coverage in zip(figure.subplots(len(coverages), 1, squeeze=False).flat, coverages, strict=True):
-            _draw_map(figure, axis, scene, coverage)
+        for part, coverage in zip(figure.subfigures(len(coverages), 1, squeeze=False).flat, coverages, strict=True):
+            _draw_map(part, scene, coverage)
         return save_figure(figure, path)
 
 
-def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> None:
-    """Draw one panel's coverage map over the room's plan as advice, with a line where the SNR meets the threshold."""
+def _draw_map(figure: SubFigure, scene: Scene, coverage: Coverage) -> None:
+    """Draw one panel's coverage map over the room's plan as advice, with a line where the SNR meets the threshold; its
+    title stands above map and colours, in as many lines as it needs."""
     from matplotlib import colormaps
 
+    axis = figure.subplots()
     colours = colormaps["viridis"].with_extremes(bad=UNSEEN)
     shown = axis.pcolormesh(
         coverage.x, coverage.y, coverage.margin_db, cmap=colours, shading="nearest", zorder=-2,
@@ -79,10 +83,9 @@ def _draw_map(figure: Figure, axis: Axes, scene: Scene, coverage: Coverage) -> N
         axis.contour(coverage.x, coverage.y, level, levels=[0.0], colors="#d55e00", linewidths=2.0, zorder=1)
     draw_plan(axis, scene)
     axis.set(xlabel="x [m]", ylabel="y [m]")
-    axis.set_title(
-        f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m: heard at "
-        f"{share_text(coverage.heard)} of where it is seen", weight="bold",
-    )  # fmt: skip
+    about = wrap(f"{coverage.panel} in {scene.name}, agent at z = {coverage.height:.2f} m:", LETTERS)
+    told = f"heard at {share_text(coverage.heard)} of where it is seen"
+    figure.suptitle("\n".join([*about, told]), size=11, weight="bold")
     bar = figure.colorbar(shown, ax=axis, fraction=0.05, pad=0.02)
     bar.set_label("SNR of the direct path under the best code,\nover the threshold [dB]; grey: no such path")
 

@@ -1,14 +1,19 @@
 """The adviser's word as people read it, and the map of a panel."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 from rislam_rt.adviser.advice import Advice
 from rislam_rt.adviser.coverage import Coverage
 from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink
 from rislam_rt.adviser.tracing_cost import TraceCost
+from rislam_rt.report import advice
 from rislam_rt.report.advice import draw_coverage, print_advice
 from rislam_rt.scene import load_scene
 
@@ -105,3 +110,28 @@ def test_a_map_without_any_direct_path_is_drawn_all_the_same(tmp_path: Path) -> 
     file = draw_coverage(scene, [nothing, half], tmp_path / "map.svg")
     text = file.read_text()
     assert "<svg" in text
+
+
+@pytest.mark.parametrize(("name", "wide"), [("kitchen", 1.0), ("a room of so long a name that no line holds it", 0.2)])
+def test_the_title_of_the_coverage_map_is_within_the_picture_and_beside_nothing(
+    name: str, wide: float, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Also of a room that is much longer than wide, whose plan is narrow."""
+    scene = load_scene(ROOT / "scenes" / "paper_room")
+    walls = [replace(r, vertices=r.vertices * [wide, 1.0, 1.0]) for r in scene.reflectors]
+    scene = replace(scene, name=name, reflectors=tuple(walls))
+    drawn = []
+    monkeypatch.setattr(advice, "save_figure", lambda figure, path: drawn.append(figure) or path)
+    x, y = np.linspace(0.1, 6.0 * wide - 0.1, 20), np.linspace(0.1, 5.9, 20)
+    one = Coverage("panel", x, y, 1.2, np.full((20, 20), 25.0))
+    draw_coverage(scene, [one, one], tmp_path / "map.png")
+    canvas = FigureCanvasAgg(drawn[0])
+    canvas.draw()
+    picture = drawn[0].bbox
+    titles = [one.get_window_extent() for one in drawn[0].findobj(Text) if one.get_text().endswith("it is seen")]
+    scales = [axis.get_tightbbox() for axis in drawn[0].findobj(Axes) if axis.get_label() == "<colorbar>"]
+    assert len(titles) == len(scales) == 2
+    for title in titles:
+        assert picture.x0 < title.x0 < title.x1 < picture.x1
+        assert picture.y0 < title.y0 < title.y1 < picture.y1
+        assert not any(title.overlaps(scale) for scale in scales)
