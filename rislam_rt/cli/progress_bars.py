@@ -1,11 +1,12 @@
-"""Progress bars of runs and sweeps on the terminal's error stream, with the time left."""
+"""Progress bars of runs and sweeps on the error stream, with the time left; plain lines where it is no terminal."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rislam_rt.cli.verbosity import verbosity
-from rislam_rt.progress import Tell
+from rislam_rt.progress import Tell, hours, plain_lines, tell_nobody
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn, TaskID
@@ -21,6 +22,13 @@ def _bars(*columns: "ProgressColumn") -> "Progress":
     return Progress(*columns, console=Console(stderr=True), refresh_per_second=4, disable=verbosity().quiet)
 
 
+def _lines(bars: "Progress") -> Tell:
+    """Plain lines beside progress bars that are drawn at their end alone, as the error stream is no terminal."""
+    if bars.disable or bars.console.is_terminal:
+        return tell_nobody
+    return plain_lines(partial(bars.console.print, markup=False, highlight=False, soft_wrap=True))
+
+
 @contextmanager
 def show_progress() -> Iterator[Tell]:
     """Show progress bars within this context; yields the function to report a stage's progress with."""
@@ -32,11 +40,13 @@ def show_progress() -> Iterator[Tell]:
     )  # fmt: skip
     with _bars(*columns) as bars:
         tasks: dict[str, TaskID] = {}
+        say = _lines(bars)
 
         def tell(stage: str, at: int, total: int) -> None:
             if stage not in tasks:
                 tasks[stage] = bars.add_task(stage, total=total)
             bars.update(tasks[stage], completed=at, total=total)
+            say(stage, at, total)
 
         yield tell
 
@@ -49,6 +59,7 @@ def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
     columns = (TextColumn("cells"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[left]}"))
     with _bars(*columns) as bar:
         task = bar.add_task("cells", total=None, left="one cell goes first, to tell the cost")
+        say = _lines(bar)
 
         def tell(told: "SweepProgress") -> None:
             if told.last is None and not verbosity().quiet:
@@ -61,6 +72,7 @@ def show_sweep() -> "Iterator[Callable[[SweepProgress], None]]":
             failed = f", {told.failed} failed" if told.failed else ""
             left = f"{clock(told.cost)} left" if told.cost.cells else "done"
             bar.update(task, completed=told.done + told.failed, total=told.total, left=left + failed)
+            say("cells", told.done + told.failed, told.total)
 
         yield tell
 
@@ -75,7 +87,4 @@ def describe_cost(told: "SweepProgress") -> str:
 
 def clock(cost: "SweepCost") -> str:
     """Estimated time left of a sweep as text `h:mm:ss`."""
-    if cost.seconds is None:
-        return "unknown time"
-    whole = round(cost.seconds)
-    return f"{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}"
+    return "unknown time" if cost.seconds is None else hours(cost.seconds)
