@@ -60,11 +60,10 @@ def _averaged_returns(
     cycle_s = usual_step(scene.agent.time) or total_seconds(budget)
     most = min(receiver.slot, fitted_steps(budget, cycle_s)["measure_s"])
     slot = next(slot for slot in slots if slot <= most and _kept(shift, replace(turning, slot=slot)) ** 2 >= 0.5)
-    steps = fitted_steps(budget, cycle_s, float(f"{slot:.1g}"))
-    mend = f"give {changed_steps(budget, steps)}, which leaves the cycle as long as it is"
+    settings = changed_steps(budget, fitted_steps(budget, cycle_s, float(f"{slot:.1g}")))
     if _kept(shift, replace(receiver, slot=slot)) ** 2 < 0.5:
-        mend += ", with receiver.code_dwell = 0"
-    yield warning_at(file, "budget.measure_s", message, mend)
+        settings = f"{settings} --set receiver.code_dwell=0".lstrip()
+    yield warning_at(file, "budget.measure_s", message, f"give {settings}, which leaves the cycle as long as it is")
 
 
 def _kept(shift: float, receiver: ReceiverConfig) -> float:
