@@ -53,7 +53,7 @@ def test_no_path_is_lost_in_any_room(name):
         assert found(scene, trajectory, depth, "beams") == every
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 4, 5))])
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3, 4, 5))])
 def test_no_path_is_lost_in_a_random_room(rooms, seed):
     """A box with a dozen plates in any attitude, some of them crossing, and positions near and far from each other."""
     rng = np.random.default_rng(seed)

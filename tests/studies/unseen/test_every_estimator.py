@@ -49,6 +49,7 @@ CASES = [
     Case("default", "random", {}, 266, 0.05, 20.0, 0.4),
     Case("landmarks", "random", LANDMARKS, 103, 0.1, 10.0, 1.0),
     Case("landmarks", "random", LANDMARKS, 266, 0.2, 7.0, 0.6),
+    Case("landmarks", "random", LANDMARKS, 233, 0.12, 3.5, 0.45),
     Case("nested", "random", NESTED, 233, 0.12, 4.5, 0.65),
     Case("bp_slam", "bp_slam", {}, 233, 0.5, 1.5, 1.5),
     Case("bp_slam", "bp_slam", {}, 266, 0.8, 6.0, 2.5),
@@ -60,10 +61,10 @@ CASES = [
 ]
 
 SELDOM = {
-    ("default", 103), ("default", 266), ("landmarks", 103), ("bp_slam_aoa", 103), ("bp_slam_aoa", 233),
-    ("bp_slam", 266), ("channel_slam", 266),
+    ("default", 103), ("default", 266), ("landmarks", 103), ("landmarks", 266), ("bp_slam_aoa", 103),
+    ("bp_slam_aoa", 266), ("bp_slam", 266), ("channel_slam", 266),
 }  # fmt: skip
-"""Runs of estimators that also run in another room."""
+"""Runs of estimators that also run in room 233, which all of them share."""
 
 
 def often(cases: list[Case]) -> list[Any]:
@@ -87,7 +88,7 @@ def test_it_errs_no_more_than_it_says(case: Case) -> None:
 
 @pytest.mark.parametrize(
     "case",
-    [CASES[1], *(pytest.param(CASES[n], marks=pytest.mark.slow) for n in (5, 6, 8)), CASES[-1]],
+    [CASES[1], *(pytest.param(CASES[n], marks=pytest.mark.slow) for n in (6, 7, 9)), CASES[-2]],
     ids=lambda case: f"{case.name}-{case.room}",
 )
 def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
@@ -97,7 +98,7 @@ def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     assert scores["births"] == 0
 
 
-@pytest.mark.parametrize("case", often(CASES[:5]), ids=lambda case: f"{case.name}-{case.room}")
+@pytest.mark.parametrize("case", often(CASES[:6]), ids=lambda case: f"{case.name}-{case.room}")
 def test_most_births_are_of_the_right_kind(case: Case) -> None:
     scores = run(case, None)
     assert scores["births_judged"] >= 3
