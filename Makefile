@@ -41,7 +41,9 @@ docs: $(READY)
 # Everything is pinned with hashes, the build back end too, so that no step resolves anything by itself: pip need not ask
 # what depends on what (3 s of 45).
 # Two modules of three are never used: compiled are those that are, when they are first. Two processes install half of
-# the packages each, once pip itself is what it will stay.
+# the packages each, once pip itself is what it will stay, which the one that Python brings installs from where it lies,
+# where that is known (2 s); mkdocs-material and sionna-rt, with 10 000 files each, are in
+# different halves.
 $(READY): requirements.lock pyproject.toml
 	@python=''; \
 	for candidate in $(PYTHON) python3 python3.13 python3.12 python3.11 python; do \
@@ -53,9 +55,12 @@ $(READY): requirements.lock pyproject.toml
 	  exit 3; \
 	fi; \
 	echo "building $(VENV) with $$($$python --version)"; \
-	$$python -m venv $(VENV)
-	@awk -v to=$(VENV)/lock. '/^[^ #]/ {turn = 1 - turn; part = /^pip==/ ? "pip" : turn} {print > (to part)}' requirements.lock
-	@$(INSTALL) --no-compile --require-hashes -r $(VENV)/lock.pip
+	$$python -m venv --without-pip $(VENV)
+	@awk -v to=$(VENV)/lock. '/^[^ #]/ {turn = 1 - turn; part = /^pip==/ ? "pip" : /^mkdocs-material==/ ? 1 : /^sionna-rt==/ ? 0 : turn} {print > (to part)}' requirements.lock
+	@wheel=$$($(BIN)/python -c 'import ensurepip, pathlib; \
+	  print(*pathlib.Path(ensurepip.__file__).parent.glob("_bundled/pip-*.whl"))'); \
+	if [ ! -f "$$wheel" ]; then $(BIN)/python -m ensurepip >/dev/null; wheel=; fi; \
+	PYTHONPATH=$$wheel $(INSTALL) --no-compile --require-hashes -r $(VENV)/lock.pip
 	@printf '0\n1\n' | xargs -P 2 -I N $(INSTALL) --no-compile --require-hashes -r $(VENV)/lock.N
 	@$(INSTALL) --no-build-isolation -e .
 	@touch $@

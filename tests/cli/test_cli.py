@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser import link_budget
+from rislam_rt.storage.files import is_own
 
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "scenes" / "paper_room"
@@ -146,8 +147,14 @@ def test_run_report_and_json(run, tmp_path, monkeypatch):
     code, _, err = run("report", "mine", "--rerun", "mine.rrd")
     assert code == 3
     assert "rislam-rt[viz]" in err
-    code, again, _ = run("report", "mine")
+    code, _, err = run("report", "mine", "--gif", "run.mp4")
+    assert code == 2
+    assert "give a name that ends in .gif" in err
+    code, again, _ = run("report", "mine", "--gif", "run.gif")
     assert code == 0
+    assert "moving picture: run.gif" in again
+    assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
+    assert is_own(tmp_path / "run.gif")
     assert page.read_bytes() == first
     assert [line for line in again.splitlines() if "agent" in line] == [
         line for line in out.splitlines() if "agent" in line

@@ -12,7 +12,7 @@ import rislam_rt
 from rislam_rt.studies.unseen.score import OVER_TIME
 
 ROOT = Path(__file__).parents[2]
-SHORT = ("channel=image_source", "depth=1", "cycles=22", "receiver.estimator=bound", 'schemes=["random"]')
+SHORT = ("channel=image_source", "depth=1", "cycles=14", "receiver.estimator=bound", 'schemes=["random"]')
 RUN = ("run", "trace_then_slam", "--scene", "room", "--no-report", *(w for one in SHORT for w in ("--set", one)))
 
 
@@ -22,12 +22,12 @@ def test_a_run_in_a_room_of_ones_own_is_scored_and_recorded(run, tmp_path):
     before = {file: file.stat().st_mtime_ns for file in (tmp_path / "mine").rglob("*")}
     code, out, err = run("score", "mine", "--save", "kept", "--json", "card.json")
     assert code == 0
-    assert "replaying 22 cycles of 1 scheme: localising took " in err
+    assert "replaying 14 cycles of 1 scheme: localising took " in err
     assert "relative RMSE / relative bound" in out
     assert "not known" not in out
     assert f"recording: {Path('kept') / 'mine_random.nc'}\n" in out
     told = json.loads(Path("card.json").read_text())
-    assert (told["replayed"], told["cycles"], told["seed"]) == (True, 22, 7)
+    assert (told["replayed"], told["cycles"], told["seed"]) == (True, 14, 7)
     recording = rislam_rt.read_recording("kept/mine_random.nc")
     answers = rislam_rt.replay(recording.inputs, recording.config, recording.scheme, rng=np.random.default_rng(0))
     scores = {"ran": "random", **rislam_rt.score_run(recording.truth, recording.inputs, answers)}

@@ -1,10 +1,9 @@
-"""`show --html` and `report --gif`: files that stand alone, and one line for what cannot be."""
+"""`show --html`: files that stand alone, and one line for what cannot be."""
 
 import json
 from pathlib import Path
 
 from rislam_rt.storage.checksums import seal
-from rislam_rt.storage.files import is_own
 
 SHORT = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
 PIPELINE = Path(__file__).parents[2] / "pipelines" / "trace_then_slam.toml"
@@ -34,19 +33,6 @@ def test_a_view_that_cannot_be_is_one_line(run, tmp_path):
     code, _, err = run("show", "paper_room", "--html", "/proc/none/room.html", "--depth", 0)
     assert code == 4
     assert "/proc/none/room.html" in err
-
-
-def test_report_writes_a_moving_picture(run, tmp_path):
-    assert run("run", PIPELINE, *SHORT, "--no-report", "--out", "r")[0] == 0
-    code, _, err = run("report", "r", "--gif", "run.mp4")
-    assert code == 2
-    assert "give a name that ends in .gif" in err
-    code, out, _ = run("report", "r", "--gif", "run.gif")
-    assert code == 0
-    assert "moving picture: run.gif" in out
-    assert (tmp_path / "run.gif").read_bytes().startswith(b"GIF89a")
-    assert is_own(tmp_path / "run.gif")
-    assert (tmp_path / "r" / "report.html").exists()
 
 
 def test_report_of_a_run_with_settings_of_another_version_is_one_line(run, tmp_path):

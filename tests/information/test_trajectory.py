@@ -21,7 +21,7 @@ STEP = 1e-5
 def room():
     scene = load_scene("scenes/tilted_room")
     channel = ImageSourceChannel(scene, RadioConfig(), depth=2)
-    motion = scene.agent[:40]
+    motion = scene.agent[:20]
     walls = build_walls(scene)
     return channel.paths(motion), motion, scene.landmark_positions, walls.normal, walls.offset
 

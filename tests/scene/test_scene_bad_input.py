@@ -172,7 +172,7 @@ _TABLE = tomllib.loads(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(section=st.sampled_from(["reflector", "scatterer", "ris", "agent"]), data=st.data(), value=_JSON)
 def test_any_value_in_any_field_is_refused_or_read(section: str, data: st.DataObject, value: object) -> None:
     table = {key: [dict(v[0])] if isinstance(v, list) else v for key, v in _TABLE.items()}

@@ -41,21 +41,39 @@ def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float
 
     `slack` [m] widens every triangle, so that no ray slips through the seam between two.
     """
-    normal, offset = triangle_planes(triangles)
-    edges = edge_planes(triangles)
-    height = offset - normal @ origin
+    planes, edges = triangle_planes(triangles), edge_planes(triangles)
     nearest = np.full(len(directions), -1, dtype=np.int64)
     for rows in row_blocks(len(directions), len(triangles)):
-        slope = directions[rows] @ normal.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = height / slope
-        k, t = np.nonzero(np.isfinite(distance) & (distance > 0.0))
-        point = origin + distance[k, t][:, None] * directions[rows][k]
-        hit = _depth(point, edges, t) >= -slack
-        k, t = k[hit], t[hit]
-        order = np.argsort(-distance[k, t], kind="stable")
+        k, t, distance = _met(origin, directions[rows], planes, edges, slack)
+        order = np.argsort(-distance, kind="stable")
         nearest[k[order] + rows.start] = t[order]
     return nearest
+
+
+def hit_shares(origins: Floats, directions: Floats, triangles: Floats, slack: float = 1e-6) -> Floats:
+    """Query to a mesh: share (N,) of the rays from each point (N, 3) along unit vectors (D, 3) that hit any triangle
+    (T, 3, 3), as `ray_hits` finds them."""
+    planes, edges = triangle_planes(triangles), edge_planes(triangles)
+    blocks = row_blocks(len(directions), len(triangles))
+    hits = [
+        sum(len(np.unique(_met(origin, directions[rows], planes, edges, slack)[0])) for rows in blocks)
+        for origin in origins
+    ]
+    return np.array(hits, dtype=np.float64) / len(directions)
+
+
+def _met(
+    origin: Floats, directions: Floats, planes: tuple[Floats, Floats], edges: tuple[Floats, Floats], slack: float
+) -> tuple[Integers, Integers, Floats]:
+    """Query to a mesh: pairs (ray, triangle) that meet, of rays from a point (3,) along (D, 3), and their distances."""
+    normal, offset = planes
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (offset - normal @ origin) / (directions @ normal.T)
+    k, t = np.nonzero(np.isfinite(distance) & (distance > 0.0))
+    point = origin + distance[k, t][:, None] * directions[k]
+    hit = _depth(point, edges, t) >= -slack
+    k, t = k[hit], t[hit]
+    return k, t, distance[k, t]
 
 
 def free_ways(place: Floats, directions: Floats, triangles: Floats, box: Floats) -> Floats:

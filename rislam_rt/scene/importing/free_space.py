@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross, triangle_planes
-from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions
+from rislam_rt.scene.check.mesh_queries import crossings, hit_shares, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
 """Heights [m] above the floor that are tried for the agent: that of a trolley or a hand, then higher, then lower."""
@@ -84,7 +84,7 @@ def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, c
     if len(places) < 2:
         return None
     directions = sphere_directions(_RAYS)
-    share = np.array([(ray_hits(p, directions, triangles) >= 0).mean() for p in places])
+    share = hit_shares(places, directions, triangles)
     room = _largest_part(places, headroom, share, triangles)
     room &= share >= share[room].max() - 0.02
     places, gap, share = places[room], gap[room], share[room]
@@ -178,7 +178,7 @@ def _stood_before(points: Floats, normal: Floats, eyes: Floats, triangles: Float
         blocked, _ = crossings(np.broadcast_to(eye, before.shape), before, triangles)
         met |= ~np.isin(np.arange(len(before)), blocked)
     directions = sphere_directions(_RAYS)
-    share = np.array([(ray_hits(p, directions, triangles) >= 0).mean() for p in (eyes[0], *before[met])])
+    share = hit_shares(np.concatenate([eyes[:1], before[met]]), directions, triangles)
     return int(np.sum(share[1:] >= CLOSED * share[0]))
 
 

@@ -21,6 +21,8 @@ from rislam_rt.scene import load_scene
 
 SCENES = Path(__file__).parents[3] / "scenes"
 ROOMS = sorted(path.parent.name for path in SCENES.glob("*/scene.toml"))
+SELDOM = {"empty_box", "two_scatterers", "itu_room"}
+"""Rooms of whose walls and scatterers others have as many."""
 
 
 def found(scene, trajectory, depth, search):
@@ -41,7 +43,7 @@ def walk(agent, cycles):
     return replace(agent, **parts)
 
 
-@pytest.mark.parametrize("name", ROOMS)
+@pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.slow if x in SELDOM else ()) for x in ROOMS])
 def test_no_path_is_lost_in_any_room(name):
     scene = load_scene(SCENES / name)
     depth = 3 if name in ("l_room", "tilted_room") else 2
@@ -51,7 +53,7 @@ def test_no_path_is_lost_in_any_room(name):
         assert found(scene, trajectory, depth, "beams") == every
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 4, 5))])
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3, 4, 5))])
 def test_no_path_is_lost_in_a_random_room(rooms, seed):
     """A box with a dozen plates in any attitude, some of them crossing, and positions near and far from each other."""
     rng = np.random.default_rng(seed)

@@ -1,4 +1,7 @@
-"""Composition of legs against Sionna RT's own solvers, which trace device to device in one go."""
+"""Composition of legs against Sionna RT's own solvers, which trace device to device in one go.
+
+Slow proofs in the paper's room; of another one, `tests/channel/compare/test_path_solver.py` shows the same.
+"""
 
 import numpy as np
 import pytest
@@ -52,6 +55,7 @@ def ours(paths, kinds):
     return paths.tau[0, keep], np.abs(paths.gain[0, keep])
 
 
+@pytest.mark.slow
 def test_los_and_wall_returns(traced, devices):
     import sionna.rt as rt
 
@@ -61,6 +65,7 @@ def test_los_and_wall_returns(traced, devices):
     np.testing.assert_allclose(mine[1], theirs[1], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_scatterer_paths_are_eq_a2(traced, devices):
     """A point of constant cross-section, both legs and the walls on either, as `RCSSolver` has them."""
     from sionna.rt.rcs import ConstantRCSSensingTarget, RCSSolver

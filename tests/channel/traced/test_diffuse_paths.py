@@ -60,7 +60,7 @@ def test_diffraction_over_a_board_takes_the_shortest_way(rooms):
     board = rooms.polygon("board", [(3, -2, 0), (3, 2, 0), (3, 2, 2), (3, -2, 2)])
     trajectory = rooms.at([3.0, 0.0, 1.5], tx=(-2.0, 0.1, 0.0), rx=(2.0, -0.2, -0.2))
     extras = trace_diffuse_paths(
-        rooms.scene([board], ()), RADIO, trajectory, DiffuseConfig(diffraction=True, samples=20_000)
+        rooms.scene([board], ()), RADIO, trajectory, DiffuseConfig(diffraction=True, samples=4_000)
     )
     assert extras.kind.tolist() == [DiffuseKind.DIFFRACTED] * 4
     tx, rx = trajectory.tx[0], trajectory.rx[0]

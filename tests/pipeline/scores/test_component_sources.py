@@ -82,7 +82,7 @@ def test_pieces_of_a_wall_are_one_wall(room):
 
 def test_the_default_filter_tells_walls_apart(run_short):
     """Of what it names, nine in ten are named right, and two-wall returns are named; by its own and the true names."""
-    result = run_short("cycles=30", "receiver.estimator=waveform", 'schemes=["no_ris"]')
+    result = run_short("cycles=22", "receiver.estimator=waveform", 'schemes=["no_ris"]')
     label, truth = component_labels(result.scene, result.paths, result.schemes["no_ris"], use_vt=True)
     assert association_score(label, truth).precision > 0.9
     assert (label >= 2**32).any()

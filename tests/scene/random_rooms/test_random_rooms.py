@@ -135,7 +135,7 @@ def test_motions_are_what_they_are_called(rooms: list[RandomRoom], kind: str) ->
 
 def test_along_walls_an_agent_sets_out_from_rest() -> None:
     fastest = []
-    for room in (draw_room(seed, "along_walls") for seed in range(24)):
+    for room in (draw_room(seed, "along_walls") for seed in range(12)):
         scene, motion = room.scene, room.scene.agent
         speed = np.linalg.norm(motion.velocity[:, :2], axis=1)
         first = int(np.argmax(speed > 0.0))
@@ -167,7 +167,7 @@ def test_along_walls_an_agent_sets_out_from_rest() -> None:
 
 def test_a_carried_agent_goes_along_walls_and_bobs_once_in_a_step() -> None:
     fitted = 0
-    for seed in range(12):
+    for seed in range(6):
         smooth, motion = (draw_room(seed, ways).scene.agent for ways in ("along_walls", "carried"))
         off, speed = motion.position - smooth.position, np.linalg.norm(smooth.velocity[:, :2], axis=1)
         assert np.array_equal(motion.heading, smooth.heading)

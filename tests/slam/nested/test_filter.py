@@ -144,7 +144,7 @@ def test_the_same_seed_gives_the_same_bits(machine: str) -> None:
 
 def test_a_walk_among_points_and_walls_errs_as_it_says() -> None:
     """NEES of 4 degrees of freedom, mean of the last 10 of 40 cycles: below the 0.999 quantile of one draw of it."""
-    run = walk(fixed(400, 256), 40, walls=2, rng=np.random.default_rng(6))
+    run = walk(fixed(400, 256, "numpy"), 40, walls=2, rng=np.random.default_rng(6))
     assert run.nees[-10:].mean() < 18.5
     mean, covariance = run.moments[-1]
     std = np.sqrt(np.diag(covariance))

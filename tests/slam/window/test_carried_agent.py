@@ -52,7 +52,7 @@ def carried(place, velocity, seed):
 
 
 @cache
-def bobbing(phase=0.0):
+def bobbing(phase):
     """Positions, and what `carried` makes of them, of a walker that bobs as it steps; of what several look at, once."""
     place, velocity = course(BOB * np.sin(STEP * TIME + phase), BOB * STEP * np.cos(STEP * TIME + phase))
     return place, carried(place, velocity, 1)
@@ -71,7 +71,7 @@ def test_a_bob_is_followed_above_a_level_floor(phase):
 
 def test_where_a_bob_has_ended_there_may_be_one():
     """In the cycles after, while the window still holds a heave; and in the next one, ahead."""
-    _, (*_, state) = bobbing()
+    _, (*_, state) = bobbing(0.0)
     variance = state.window.heave_variance.copy()
     variance[-1] = 0.0
     ended = state._replace(window=state.window._replace(heave_variance=variance), heave_levels=heave.first_levels())
@@ -117,7 +117,7 @@ def height_variance(state):
 
 def test_the_height_is_as_uncertain_as_floor_and_heave_are_together():
     """Not as both are apart: what a cycle tells of their sum parts them."""
-    _, (*_, state) = bobbing()
+    _, (*_, state) = bobbing(0.0)
     inside = state._replace(cycle=state.cycle - 1)
     for _ in range(5):  # what is estimated and what it is linearised at agree
         inside, _ = relinearise(inside, 0)

@@ -55,14 +55,18 @@ def _led(room, seed):
     return state, start
 
 
-@pytest.mark.parametrize(("seeds", "most"), [(2, 6.9), pytest.param(4, 4.6, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seeds", "most"), [((1,), 10.8), pytest.param(range(4), 4.6, marks=pytest.mark.slow)])
 def test_the_place_errs_as_much_as_the_heading_at_the_start_says(room, led, seeds, most):
-    """Of the room's turn only the velocity that was told tells anything: it is 0.01 of 0.158 m/s off."""
+    """Of the room's turn only the velocity that was told tells anything: it is 0.01 of 0.158 m/s off.
+
+    What is told must be right in each draw, of which others of this file look at the same; that errors are of that size
+    rests on one draw, and on four among the slow proofs.
+    """
     motion, reach = room[0], float(np.linalg.norm(room[0].position[-1] - room[0].position[0]))
     turn_std = (STD**-2.0 + (SPEED_STD / np.linalg.norm(motion.velocity[0])) ** -2.0) ** -0.5
     across = np.array([-0.05, 0.15]) / np.hypot(0.05, 0.15)
     square = []
-    for seed in range(seeds):
+    for seed in seeds:
         state, _ = led(seed)
         found = slam.estimate(state, CONFIG)
         spread, off = found.covariance[:2, :2] - 0.01**2 * np.eye(2), (found.position - motion.position[-1])[:2]

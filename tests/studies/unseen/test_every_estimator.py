@@ -1,8 +1,8 @@
 """Accuracy of every estimator in random rooms, against dead reckoning and against its own posterior bound.
 
-Limits are about twice what was measured (seeds, rooms and settings are fixed, so that a run gives the same numbers
-until the code changes): room for another rounding, not for a filter that learns nothing, whose error is that of dead
-reckoning.
+Limits are about twice what was measured with the receiver that takes samples (seeds, rooms and settings are fixed, so
+that a run gives the same numbers until the code changes): room for another rounding, not for a filter that learns
+nothing, whose error is that of dead reckoning. They hold for the quick receiver as well, which the tests take.
 """
 
 from functools import cache
@@ -21,8 +21,8 @@ from rislam_rt.scene.random_rooms import RandomRoom
 from rislam_rt.studies.unseen import Recorder, build_truth, score_run
 from rislam_rt.studies.unseen.cell import find_setup, scheme_here, trace_key
 
-CYCLES, OF_THE_DEFAULT = 60, 40
-"""The default filter, which maps walls, takes longest, and is within its limits sooner."""
+CYCLES = 60
+"""Of every estimator, so that all that run in a room share what is heard in it, by the receiver that is quick."""
 
 
 class Case(NamedTuple):
@@ -49,6 +49,7 @@ CASES = [
     Case("default", "random", {}, 266, 0.05, 20.0, 0.4),
     Case("landmarks", "random", LANDMARKS, 103, 0.1, 10.0, 1.0),
     Case("landmarks", "random", LANDMARKS, 266, 0.2, 7.0, 0.6),
+    Case("landmarks", "random", LANDMARKS, 233, 0.12, 3.5, 0.45),
     Case("nested", "random", NESTED, 233, 0.12, 4.5, 0.65),
     Case("bp_slam", "bp_slam", {}, 233, 0.5, 1.5, 1.5),
     Case("bp_slam", "bp_slam", {}, 266, 0.8, 6.0, 2.5),
@@ -60,10 +61,10 @@ CASES = [
 ]
 
 SELDOM = {
-    ("default", 103), ("default", 266), ("landmarks", 103), ("bp_slam_aoa", 103), ("bp_slam_aoa", 233),
-    ("bp_slam", 266), ("channel_slam", 266),
+    ("default", 103), ("default", 266), ("landmarks", 103), ("landmarks", 266), ("bp_slam_aoa", 103),
+    ("bp_slam_aoa", 266), ("bp_slam", 266), ("channel_slam", 266),
 }  # fmt: skip
-"""Runs of estimators that also run in another room."""
+"""Runs of estimators that also run in room 233, which all of them share."""
 
 
 def often(cases: list[Case]) -> list[Any]:
@@ -87,7 +88,7 @@ def test_it_errs_no_more_than_it_says(case: Case) -> None:
 
 @pytest.mark.parametrize(
     "case",
-    [CASES[1], *(pytest.param(CASES[n], marks=pytest.mark.slow) for n in (5, 6, 8)), CASES[-1]],
+    [CASES[1], *(pytest.param(CASES[n], marks=pytest.mark.slow) for n in (6, 7, 9)), CASES[-2]],
     ids=lambda case: f"{case.name}-{case.room}",
 )
 def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
@@ -97,7 +98,7 @@ def test_an_estimator_that_learns_nothing_fails(case: Case) -> None:
     assert scores["births"] == 0
 
 
-@pytest.mark.parametrize("case", often(CASES[:5]), ids=lambda case: f"{case.name}-{case.room}")
+@pytest.mark.parametrize("case", often(CASES[:6]), ids=lambda case: f"{case.name}-{case.room}")
 def test_most_births_are_of_the_right_kind(case: Case) -> None:
     scores = run(case, None)
     assert scores["births_judged"] >= 3
@@ -127,7 +128,7 @@ def _kept(number: int) -> dict[str, Any]:
 def _run(case: Case, estimator: Estimator | None) -> dict[str, Any]:
     content = {
         "name": "accuracy", "channel": "image_source", "depth": 1, "schemes": [case.scheme],
-        "cycles": OF_THE_DEFAULT if case.name == "default" else CYCLES,
+        "cycles": CYCLES, "receiver": {"estimator": "bound"},
         "motion": {"sigma_a_m_s2": 0.01}, "start": {"velocity_std_m_s": 0.03}, "slam": case.settings,
         "nested": {"engine": "numpy", "num_agents": 100, "num_points": 200},
     }  # fmt: skip

@@ -192,7 +192,7 @@ def begun(walk: Walk, rng: np.random.Generator) -> WindowState:
 
 def followed(walk: Walk, state: WindowState, rng: np.random.Generator) -> Iterator[SlamEstimate]:
     """What the filter expects after each cycle, under random codes, alternated."""
-    receiver, spec = ReceiverConfig(alternation=True), walk.scene.ris.spec
+    receiver, spec = ReceiverConfig(estimator="bound", alternation=True), walk.scene.ris.spec
     for cycle in range(len(walk.motion)):
         code = RisCode(rng.integers(spec.levels, size=(spec.rows, spec.cols)), spec.levels)
         here, heading = rephase(walk.paths.of_cycle(cycle), code), float(walk.motion.heading[cycle])
