@@ -219,7 +219,12 @@ def _associate_over_motions(
         by = divergence_monitor.jump(best, observed, state.scene.use_vt)
         view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
         if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
-            return recovery.after_jump(state, by), view, (0.0, 0.0)
+            others = [
+                view_of(window).score + divergence_monitor.log_another_wall()
+                for window in divergence_monitor.with_another_wall(state.window, state.landmarks, by)
+            ]
+            if view.score + divergence_monitor.log_jump() > max(others, default=-np.inf):
+                return recovery.after_jump(state, by), view, (0.0, 0.0)
     return state._replace(window=window), best, (lively[0], lively[1])
 
 

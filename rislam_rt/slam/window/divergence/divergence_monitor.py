@@ -9,6 +9,7 @@ where the map's returns and what is heard agree.
 import numpy as np
 
 from rislam_rt.arrays import Floats
+from rislam_rt.geometry.angles import unit
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.predicted_returns import TX
@@ -16,6 +17,7 @@ from rislam_rt.slam.step_info import LossCause
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import egomotion
 from rislam_rt.slam.window.divergence.length_rates import Rates
+from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN, rotation
@@ -105,6 +107,28 @@ def log_jump() -> float:
     """Divergence monitor's prior log probability of a jump to one certain place (`CELL`), as far as the agent walks in
     a second."""
     return CONSTANTS.log_lost + 2.0 * float(np.log(CELL / CONSTANTS.walk))
+
+
+def with_another_wall(window: Window, landmarks: WindowTable, by: Floats) -> list[Window]:
+    """Sliding windows of an agent that has not jumped by `by` (3,) [m], each with one wall where it would hear of it
+    what it hears after the jump: for a trial association. What has come in front of a wall, or has gone from there,
+    moves all returns over it, and leaves all others as they are."""
+    walls = landmarks.walls
+    place = window.head[HEAD:].reshape(-1, 3)[walls]
+    normal = unit(place - landmarks.anchor[walls])
+    along = normal @ by
+    found = []
+    for row, way in zip(walls[np.abs(along) > CELL], (along[:, None] * normal)[np.abs(along) > CELL], strict=True):
+        head = window.head.copy()
+        head[HEAD + 3 * row : HEAD + 3 * row + 3] -= 2.0 * way
+        found.append(window._replace(head=head))
+    return found
+
+
+def log_another_wall() -> float:
+    """Divergence monitor's prior log probability that a wall is heard no more, and another one instead of it at one
+    certain distance (`CELL`)."""
+    return CONSTANTS.log_rare + float(np.log(CELL / CONSTANTS.size))
 
 
 def shifted(window: Window, by: Floats) -> Window:

@@ -1,12 +1,13 @@
 """Egomotion: check of the told velocity and compass against the rates at which the path lengths of the first tracks
 change.
 
-Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
-agent goes towards it: `rate = -2 u . v`, with `u` the direction of arrival. What goes to and fro between opposite walls
-keeps its length, from both sides alike; what comes over a wall on one leg alone does neither. So a velocity is wanted
-that many tracks agree on, each of them with a probability of its own of being none of these. The told velocity is one
-such, with its own deviation and what manoeuvres since may have made of it; if it was told wrong, any other within
-walking speed is as good. Laplace evidences of both decide.
+Whatever throws it, a return grows shorter by the ways that the agent goes towards where it arrives from and where it
+leaves to: `rate = -(u + w) . v`. Over a wall, a point, or two walls at right angles that is `-2 u . v`; over two other
+things it leaves to where its reciprocal path arrives from. What goes to and fro between opposite walls keeps its
+length, from both sides alike; what comes over a wall on one leg alone, and whose reciprocal is not heard, does neither.
+So a velocity is wanted that many tracks agree on, each of them with a probability of its own of being none of these.
+The told velocity is one such, with its own deviation and what manoeuvres since may have made of it; if it was told
+wrong, any other within walking speed is as good. Laplace evidences of both decide.
 """
 
 from functools import lru_cache

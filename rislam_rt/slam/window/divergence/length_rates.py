@@ -10,6 +10,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
+from rislam_rt.slam.window.reciprocal_paths import with_reciprocal
 
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for..."""
@@ -21,7 +22,8 @@ class _PlainRates(NamedTuple):
     """Rates of the path lengths of T tracks or explained paths, E in all."""
 
     toward: Floats
-    """(E, 3) direction of arrival in the room's axes, times -2: the rate is its product with the velocity."""
+    """(E, 3) sum of the directions of arrival and departure in the room's axes, times -1: the rate is its product with
+    the velocity."""
     rate: Floats
     """(E,) [m/s] rate at which the path length changes."""
     variance: Floats
@@ -91,8 +93,8 @@ class Heard(NamedTuple):
     """(K, 3) [m] its estimated positions."""
     step: float
     """[s] from pose to pose."""
-    baseline: float
-    """[m] from Tx to Rx."""
+    apart: Floats
+    """(3,) [m] from Rx to Tx, in the body's axes."""
     spacing: float
     """[wavelengths] of the antennas."""
 
@@ -113,7 +115,7 @@ class Lengths(NamedTuple):
     left: Floats
     """(N,) [m] ...and what the positions leave of it."""
     toward: Floats
-    """(E, 3) direction of arrival in the room's axes, times -2."""
+    """(E, 3) as in `Rates`."""
     number: Integers
     """(E,) number of components."""
     blur: Floats
@@ -137,13 +139,15 @@ def enough_measured(cycle: Integers) -> int:
 def lengths(heard: Heard) -> Lengths:
     """Lengths of tracks and explained paths, with what the positions leave of them, so that a turn or an acceleration
     bends none."""
-    log, heading, place, step, baseline, spacing = heard
+    log, heading, place, step, apart, spacing = heard
+    baseline = float(np.linalg.norm(apart))
     last = int(log.cycle.max(initial=0))
     first, known = last - len(heading) + 1, log.explained
     rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
     forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
     every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    rows, which, flat, spread_of, owner = log.both_ends(rows, unique_forms(every)[1], spacing)
+    ends = log.both_ends(rows, unique_forms(every)[1], spacing)
+    rows, which, flat, spread_of, owner, legs = with_reciprocal(log, ends, apart)
     count = np.bincount(which)
 
     def total(value: Floats) -> Floats:
@@ -159,13 +163,13 @@ def lengths(heard: Heard) -> Lengths:
     scatter = 0.5 * total(sure * ((seen - toward[which]) ** 2).sum(axis=1)) / np.maximum(count - 1, 1)
     doubt = np.maximum(scatter, 1.0) / total(sure)
     up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
-    toward = -2.0 * np.concatenate([toward, up[:, None]], axis=1)
+    toward = -np.concatenate([toward, up[:, None]], axis=1)[legs].sum(axis=1)
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
         length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
-        np.hypot(blur, 2.0 * np.sqrt(doubt)), owner if (np.diff(owner) < 1).any() else None,
+        np.hypot(blur, np.sqrt(2.0 * doubt[legs].sum(axis=1))), owner if (np.diff(owner) < 1).any() else None,
         enough_measured(log.cycle[log.cycle >= first]),
     )  # fmt: skip
 
@@ -253,7 +257,7 @@ def _rates(
     toward, heard = found.toward, found.heard
     rate, variance, whole = (each[fine] for each in fits)
     bend, bend_variance = (each[fine] for each in bends) if bends else (None, None)
-    turning = heard.baseline * float(np.abs(np.diff(heard.heading)).sum()) / unit
+    turning = float(np.linalg.norm(heard.apart)) * float(np.abs(np.diff(heard.heading)).sum()) / unit
     owner = None if found.owner is None else np.unique(found.owner[fine], return_inverse=True)[1]
     return Rates(
         toward[fine], rate, variance, found.blur[fine], whole, turning, bend, bend_variance, owner, believed

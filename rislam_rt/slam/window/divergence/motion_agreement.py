@@ -126,7 +126,7 @@ def _lengths(state: WindowState, rows: slice, step: float) -> length_rates.Lengt
     body, pose = state.scene.body, window_gaussian.poses(state.window)[rows]
     return length_rates.lengths(length_rates.Heard(
         state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step,
-        float(np.linalg.norm(body.tx_offset - body.rx_offset)), state.scene.radio.array.spacing,
+        body.tx_offset - body.rx_offset, state.scene.radio.array.spacing,
     ))  # fmt: skip
 
 

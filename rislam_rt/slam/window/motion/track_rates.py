@@ -1,10 +1,11 @@
 """Rates of the tracks that nothing explains yet, as measurements of the agent's way.
 
-Whatever throws it, a wall, a point, or two walls at right angles, a return grows shorter by twice the way that the
-agent goes towards it (see `egomotion`). So a track tells of the way before it is a feature: its length follows the
-poses along its direction of arrival, but for a constant and a rate of its own, which nobody knows (the length at the
-start, and what the baseline, a turn of the body and errors of the direction do). It counts by its probability of being
-such a path. Once it is born, its history enters with the feature, and the window's rows count here no more.
+Whatever throws it, a return grows shorter by the way that the agent goes towards where it arrives from, and towards
+where it leaves to: by twice the way, over a wall, a point, or two walls at right angles; over two other things there is
+a reciprocal path, which tells (`reciprocal_paths`). So a track tells of the way before it is a feature: its length
+follows the poses along these directions, but for a constant and a rate of its own, which nobody knows (the length at
+the start, and what the baseline, a turn of the body and errors of the direction do). It counts by its probability of
+being such a path. Once it is born, its history enters with the feature, and the window's rows count here no more.
 """
 
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.length_rates import enough_measured
-from rislam_rt.slam.window.measurement_log import ArrayEnds
+from rislam_rt.slam.window.reciprocal_paths import PathDirections, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
@@ -87,11 +88,13 @@ def rate_factor(state: WindowState) -> RateFactor | None:
         return None
     rows = rows[np.argsort(log.track[rows], kind="stable")]
     which = np.cumsum(np.diff(log.track[rows], prepend=log.track[rows[0]]) != 0)
-    found = _histories(state, log.both_ends(rows, which, state.scene.radio.array.spacing), first)
+    ends = log.both_ends(rows, which, state.scene.radio.array.spacing)
+    apart = state.scene.body.tx_offset - state.scene.body.rx_offset
+    found = _histories(state, with_reciprocal(log, ends, apart), first)
     return _factor(found, _shares(found, state), state)
 
 
-def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
+def _histories(state: WindowState, ends: PathDirections, start: int) -> _Histories:
     """Histories of the tracks whose rates are asked, from the window's first cycle `start` on."""
     window, log, body = state.window, state.log, state.scene.body
     rows, which, slot = ends.row, ends.which, log.cycle[ends.row] - start
@@ -104,8 +107,8 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
 
     weight, time = log.std[rows, 0] ** -2.0, clock[slot]
     mass = total(weight)
+    toward, doubt = _directions(state.heading, ends, slot, time)
     time = time - (total(weight * time) / mass)[which]
-    toward, doubt = _directions(state, ends, slot, time)
     moved, joined = np.diff(place[slot], axis=0), np.diff(which) == 0
     follow = np.append(0.0, np.cumsum(np.where(joined, np.vecdot(0.5 * (toward[1:] + toward[:-1]), moved), 0.0)))
     way = np.append(0.0, np.cumsum(np.where(joined, np.linalg.norm(moved, axis=1), 0.0)))
@@ -126,20 +129,26 @@ def _histories(state: WindowState, ends: ArrayEnds, start: int) -> _Histories:
     )  # fmt: skip
 
 
-def _directions(state: WindowState, ends: ArrayEnds, slot: Integers, time: Floats) -> tuple[Floats, Floats]:
-    """Directions of arrival (N, 3) in the room's axes, times -2, smoothed by a line over time for each track, and the
+def _directions(heading: Floats, ends: PathDirections, slot: Integers, clock: Floats) -> tuple[Floats, Floats]:
+    """Derivatives (N, 3) of the lengths by the position, in the room's axes: the directions from which each path comes
+    and into which it leaves, times -1, smoothed by lines over the times `clock` (N,) [s] for each track; and the
     variance (T,) of their error along a way of one metre."""
-    which, seen, angle = ends.which, ends.cosines, state.heading[slot]
+    which, seen, angle = ends.which, ends.cosines, heading[slot]
     cos, sin = np.cos(angle), np.sin(angle)
     flat = np.stack([cos * seen[:, 0] - sin * seen[:, 1], sin * seen[:, 0] + cos * seen[:, 1]], axis=1)
     weight = ends.std.mean(axis=1) ** -2.0
-    s, sx, sxx = (np.bincount(which, weight * time**power) for power in range(3))
-    sy, sxy = (np.stack([np.bincount(which, weight * x * side) for side in flat.T]) for x in (1.0, time))
-    rate = (s * sxy - sx * sy) / (s * sxx - sx**2)
-    smooth = ((sy - rate * sx) / s)[:, which].T + rate[:, which].T * time[:, None]
-    smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1.0)
-    up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
-    return -2.0 * np.concatenate([smooth, up[:, None]], axis=1), 4.0 / s
+    middle = np.bincount(which, weight * clock) / np.bincount(which, weight)
+    time = clock - middle[which]
+    s, sxx = (np.bincount(which, weight * time**power) for power in (0, 2))
+    mean = np.stack([np.bincount(which, weight * side) for side in flat.T]) / s
+    rate = np.stack([np.bincount(which, weight * time * side) for side in flat.T]) / sxx
+    toward = np.zeros((len(which), 3))
+    for leg in ends.legs[which].T:
+        smooth = mean[:, leg].T + rate[:, leg].T * (clock - middle[leg])[:, None]
+        smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1.0)
+        up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
+        toward -= np.concatenate([smooth, up[:, None]], axis=1)
+    return toward, (1.0 / s)[ends.legs].sum(axis=1) * 2.0
 
 
 def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:

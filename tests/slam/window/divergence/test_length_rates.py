@@ -27,7 +27,7 @@ def test_a_wall_at_the_end_of_the_array_lies_where_it_lay_before_the_agent_turne
     std[turned:, 0] = 1.2
     log = _wall_heard(heading, std)
     log.seen[turned::2, 1] *= -1.0  # the one end or the other
-    found = lengths(Heard(log, heading, np.zeros((8, 3)), 0.1, 0.0, 0.5))
+    found = lengths(Heard(log, heading, np.zeros((8, 3)), 0.1, np.zeros(3), 0.5))
     west = np.argmin(np.abs(found.toward[:, 0] - 2.0))
     np.testing.assert_allclose(found.toward[west], [2.0, 0.0, 0.0], atol=0.02)
     assert found.blur[west] < 0.01
@@ -41,6 +41,6 @@ def test_directions_count_by_how_sure_they_are():
     std = np.repeat([[0.003], [0.3]], 4, axis=0) * np.ones(2)
     log = _wall_heard(np.full(8, 0.8), std)
     log.seen[4:, 1] += 0.3
-    found = lengths(Heard(log, np.full(8, 0.8), np.zeros((8, 3)), 0.1, 0.0, 0.5))
+    found = lengths(Heard(log, np.full(8, 0.8), np.zeros((8, 3)), 0.1, np.zeros(3), 0.5))
     np.testing.assert_allclose(found.toward[0], [2.0, 0.0, 0.0], atol=0.05)
     assert found.blur[0] == pytest.approx(2.0 * 0.003 / 2.0, rel=0.1)

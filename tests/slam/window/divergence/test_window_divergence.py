@@ -112,7 +112,7 @@ def test_rates_are_those_of_walls_points_and_square_corners(heading, bend):
     step, count = 0.1, 8
     time = step * np.arange(count)[:, None]
     place = np.array([0.2, -0.1, 0.0]) * time + 0.5 * bend * np.array([0.3, 1.0, 0.0]) * time**2
-    found = rates(lengths(Heard(_log(place, heading), np.full(count, heading), place, step, 0.0, 0.5)))
+    found = rates(lengths(Heard(_log(place, heading), np.full(count, heading), place, step, np.zeros(3), 0.5)))
     assert len(found.rate) == 3
     velocity = (place[-1] - place[0]) / (step * (count - 1))
     # the direction of a point turns a little on the way: (0.2 m / 3 m)^2 of a velocity of 0.2 m/s
@@ -133,7 +133,7 @@ def test_an_acceleration_that_the_positions_leave_out_is_told_by_all_lengths(ste
     step, count, accel = 0.1, 12, np.array([0.6, -0.3, 0.0])
     time = step * np.maximum(np.arange(count) - (count - 1 - steps), 0.0)
     place = 0.5 * time[:, None] ** 2 * accel
-    heard = Heard(_log(place, 0.2), np.full(count, 0.2), 0.0 * place, step, 0.0, 0.5)
+    heard = Heard(_log(place, 0.2), np.full(count, 0.2), 0.0 * place, step, np.zeros(3), 0.5)
     found = accelerations(lengths(heard), steps)
     np.testing.assert_allclose(found.rate, found.toward @ accel, atol=0.06)  # a point turns on the way
     log_odds, told = _weigh_change(found, 1e-6)
@@ -155,9 +155,9 @@ def test_a_track_that_changes_paths_may_have_any_rate_and_one_that_keeps_to_its_
     ]
     for steps in (3, 5, 10):
         for log in (still, *hops):  # wherever it changes paths
-            found = accelerations(lengths(Heard(log, np.zeros(count), rest, step, 0.0, 0.5)), steps)
+            found = accelerations(lengths(Heard(log, np.zeros(count), rest, step, np.zeros(3), 0.5)), steps)
             assert (found.astray >= 0.9 * CONSTANTS.rare).all()
-    found = accelerations(lengths(Heard(moves, np.zeros(count), rest, step, 0.0, 0.5)), 10)
+    found = accelerations(lengths(Heard(moves, np.zeros(count), rest, step, np.zeros(3), 0.5)), 10)
     astray = np.sort(found.astray / CONSTANTS.rare)[:2]  # one path hears nothing of the way
     assert (astray <= 1e-9 + CONSTANTS.rare).all()
 
@@ -299,7 +299,9 @@ def test_a_cycle_in_which_nothing_is_weighed_names_no_cause():
 def test_a_rate_whose_direction_is_not_told_counts_for_little():
     log = _log(0.1 * np.arange(8)[:, None] * np.array([0.2, -0.1, 0.0]), 0.0)
     vague = log._replace(std=np.where(np.arange(3) == 0, log.std, 0.4))
-    found = [rates(lengths(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, 0.0, 0.5))).blur for one in (log, vague)]
+    found = [
+        rates(lengths(Heard(one, np.zeros(8), np.zeros((8, 3)), 0.1, np.zeros(3), 0.5))).blur for one in (log, vague)
+    ]
     np.testing.assert_allclose(found[1], 2.0 * 0.4 / np.sqrt(8.0))
     assert (found[0] < 0.1).all()
 
