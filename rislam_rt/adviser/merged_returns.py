@@ -13,6 +13,7 @@ import numpy as np
 from rislam_rt.adviser.link_budget import Survey
 from rislam_rt.arrays import take_rows
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.errors import ConfigError
 from rislam_rt.input_messages import share_text
 from rislam_rt.measurement import Received, build_sensor, receive
 from rislam_rt.measurement.components import NoiselessComponents, merge, single
@@ -84,5 +85,9 @@ def _bandwidth_from_which(looked: Survey) -> float:
     while low < high:
         middle = (low + high) // 2
         wider = looked.settings._replace(radio=replace(radio, bandwidth=tried[middle]))
-        low, high = (low, middle) if lone_share(looked, wider) >= MOST else (middle + 1, high)
+        try:
+            share = lone_share(looked, wider)
+        except ConfigError:  # more tones than the receiver may have
+            share = 0.0
+        low, high = (low, middle) if share >= MOST else (middle + 1, high)
     return tried[low] if low < len(tried) else 0.0

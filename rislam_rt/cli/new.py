@@ -51,7 +51,7 @@ def command(
     ] = None,
     rest: Annotated[str, typer.Option(metavar="MATERIAL", help="Material of all else.")] = "itu:concrete",
     carrier_ghz: Annotated[
-        float, typer.Option(min=0.1, max=1000.0, help="Carrier of the panel; small and round are in its wavelengths.")
+        float, typer.Option(min=0.1, max=1000.0, help="Carrier of an import; small and round are in its wavelengths.")
     ] = 10.0,
     detail: Annotated[
         float, typer.Option(min=0.0, max=1e4, help="What is flat but narrower than this many wavelengths shades.")

@@ -138,7 +138,7 @@ class BudgetSection(Section):
     """Time budget of the code design."""
     communicate_s: NotNegative = 0.01
     """Time budget of sending the code to the panel's controller."""
-    measure_s: NotNegative = 0.01
+    measure_s: Positive = 0.01
     """Time budget of sounding the channel."""
     localise_s: NotNegative = 0.04
     """Time budget of localising and mapping."""

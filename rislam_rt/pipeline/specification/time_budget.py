@@ -24,7 +24,7 @@ def fitted_steps(budget: BudgetSection, cycle: float, measure_s: float | None = 
     scale = 1.0 if fills_cycle(budget, cycle) else cycle / (total_seconds(budget) or 1.0)
     steps = {name: float(f"{scale * value:.{DIGITS}g}") for name, value in budget.model_dump().items()}
     steps["measure_s"] = steps["measure_s"] if measure_s is None else measure_s
-    rest = cycle - steps["optimise_s"] - steps["communicate_s"] - steps["measure_s"]
+    rest = round(cycle - steps["optimise_s"] - steps["communicate_s"] - steps["measure_s"], 12)
     return steps | {"localise_s": max(float(f"{rest:.{DIGITS}g}"), 0.0)}
 
 

@@ -216,14 +216,17 @@ def _associate_over_motions(
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial
     if best.surprise > 1.0 and (state.window.step[-2:] > 0.0).sum() == 2:
-        by = divergence_monitor.jump(best, observed, state.scene.use_vt)
-        view = view_of(divergence_monitor.shifted(state.window, by)) if by.any() else best
-        if view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
-            others = [
-                view_of(window).score + divergence_monitor.log_another_wall()
-                for window in divergence_monitor.with_another_wall(state.window, state.landmarks, by)
-            ]
-            if view.score + divergence_monitor.log_jump() > max(others, default=-np.inf):
+        by, view = np.zeros(3), best
+        for _ in range(2):  # the first step of the iteration may be centimetres off
+            further = by + divergence_monitor.jump(view, observed, state.scene.use_vt)
+            closer = view_of(divergence_monitor.shifted(state.window, further))
+            if not by.any() or closer.score > view.score:
+                by, view = further, closer
+        if by.any() and view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
+            walls = divergence_monitor.with_another_wall(state.window, state.landmarks, by)
+            others = [other.score for other in map(view_of, walls) if other.surprise <= 1.0]
+            another = max(others, default=-np.inf) + divergence_monitor.log_another_wall()
+            if view.score + divergence_monitor.log_jump() > another:
                 return recovery.after_jump(state, by), view, (0.0, 0.0)
     return state._replace(window=window), best, (lively[0], lively[1])
 

@@ -105,6 +105,15 @@ class Log(NamedTuple):
         np.add.at(excess, which, self.mirrored(rows, spacing) - 0.5)
         return excess > 0.0
 
+    def histories(self, first: int) -> tuple[Integers, Integers]:
+        """Rows (A,) of the components from cycle `first` on that are of a track or were associated with a path, and
+        which track or path (A,) each is of."""
+        known = self.explained
+        rows = ((known | (self.track >= 0)) & (self.cycle >= first)).nonzero()[0]
+        forms = np.where(known[rows, None], self.form[rows, 0], UNKNOWN)
+        every = np.concatenate([forms, np.where(known[rows], -1, self.track[rows])[:, None]], axis=1)
+        return rows, unique_forms(every)[1]
+
     def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "ArrayEnds":
         """Components `rows` (A,) of tracks or paths `which` (A,), with those of which most are `mirrored` once for
         either end, behind all others.

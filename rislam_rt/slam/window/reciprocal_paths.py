@@ -8,6 +8,9 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.measurement_log import ArrayEnds, Log
 
+BETWEEN = 4
+"""How far apart reciprocal paths' components are looked for, in the order of lengths of a cycle."""
+
 
 class PathDirections(NamedTuple):
     """Components of T tracks or paths, once for each pair of directions in which their paths may arrive and leave: E
@@ -49,6 +52,22 @@ def with_reciprocal(log: Log, ends: ArrayEnds, apart: Floats) -> PathDirections:
     )  # fmt: skip
 
 
+def spread_by_legs(variance: Floats, legs: Integers) -> Floats:
+    """Variances (E,) of sums of directions of arrival and departure, from those (E,) of single directions, by the pairs
+    (E, 2) of which they are: a path that comes back as it went errs by twice the same."""
+    return np.asarray(np.where(legs[:, 0] == legs[:, 1], 2.0, 1.0) * variance[legs].sum(axis=1))
+
+
+def log_there_and_back(log: Log, tracks: list[Integers], spacing: float, apart: Floats) -> Floats:
+    """Log likelihood ratio (T,) that tracks, each given as rows of the log, come back the way that they went: that
+    another component is alike in most cycles as a reciprocal path's is then `rare`."""
+    rows, which = log.histories(0)
+    ends = log.both_ends(rows, which, spacing)
+    paired = np.isin(which, ends.owner[_reciprocal(log, ends, apart)[:, 0]])
+    found = np.array([bool(paired[np.searchsorted(rows, at[-1])]) for at in tracks], dtype=np.bool_)
+    return np.where(found, CONSTANTS.log_rare, 0.0)
+
+
 def _reciprocal(log: Log, ends: ArrayEnds, apart: Floats) -> Integers:
     """Pairs (P, 2) of tracks that are alike in most cycles as reciprocal paths are, either way round."""
     up = np.sqrt(np.maximum(1.0 - np.vecdot(ends.cosines, ends.cosines), 0.0))
@@ -63,7 +82,7 @@ def _reciprocal(log: Log, ends: ArrayEnds, apart: Floats) -> Integers:
         return np.asarray(fits & (cycle[one] == cycle[two]))
 
     order = np.lexsort((length, cycle))
-    near = [np.stack([order[:-step], order[step:]]) for step in (1, 2)]  # at most one component lies in between
+    near = [np.stack([order[:-step], order[step:]]) for step in range(1, 1 + BETWEEN)]
     found = np.concatenate([ends.which[both[:, alike(*both)]].T for both in near])
     pairs, times = np.unique(np.sort(found, axis=1), axis=0, return_counts=True)
     most = np.bincount(ends.which, minlength=len(ends.owner))[pairs].max(axis=1)

@@ -1,6 +1,6 @@
 """Composition of legs against Sionna RT's own solvers, which trace device to device in one go.
 
-Slow proofs in the paper's room; of another one, `tests/channel/compare/test_path_solver.py` shows the same.
+LOS and wall returns are a slow proof here; of another room, `tests/channel/compare/test_path_solver.py` shows the same.
 """
 
 import numpy as np
@@ -65,7 +65,6 @@ def test_los_and_wall_returns(traced, devices):
     np.testing.assert_allclose(mine[1], theirs[1], rtol=1e-5)
 
 
-@pytest.mark.slow
 def test_scatterer_paths_are_eq_a2(traced, devices):
     """A point of constant cross-section, both legs and the walls on either, as `RCSSolver` has them."""
     from sionna.rt.rcs import ConstantRCSSensingTarget, RCSSolver

@@ -191,6 +191,9 @@ def _agreed_by_two(found: Rates, told: Floats) -> tuple[Floats, Floats]:
     """Horizontal velocities (S, 2), the told one and all those on which two tracks agree, and their log likelihoods
     (S,)."""
     first, second = _pairs(len(found.rate))
+    if found.owner is not None:  # of a reciprocal pair both have the same sum of directions
+        one = np.unique(found.toward, axis=0, return_index=True)[1]
+        first, second = one[_pairs(len(one))[0]], one[_pairs(len(one))[1]]
     (along, across, _), aim = found.toward.T, found.rate - found.toward[:, 2] * told[2]
     det = along[first] * across[second] - across[first] * along[second]
     fine = np.abs(det) > 0.5

@@ -8,9 +8,8 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.measurement_log import Log, unique_forms
-from rislam_rt.slam.window.reciprocal_paths import with_reciprocal
+from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.reciprocal_paths import spread_by_legs, with_reciprocal
 
 MEASURED = 6
 """Measurements of a track from which on it has a rate of length: as many as births ask for..."""
@@ -116,6 +115,8 @@ class Lengths(NamedTuple):
     """(N,) [m] ...and what the positions leave of it."""
     toward: Floats
     """(E, 3) as in `Rates`."""
+    inside: Booleans
+    """(E,) whether the directions of arrival and departure lie within the unit disc, its rim included."""
     number: Integers
     """(E,) number of components."""
     blur: Floats
@@ -142,11 +143,8 @@ def lengths(heard: Heard) -> Lengths:
     log, heading, place, step, apart, spacing = heard
     baseline = float(np.linalg.norm(apart))
     last = int(log.cycle.max(initial=0))
-    first, known = last - len(heading) + 1, log.explained
-    rows = ((known | (log.track >= 0)) & (log.cycle >= first)).nonzero()[0]
-    forms = np.where(known[rows, None], log.form[rows, 0], UNKNOWN)
-    every = np.concatenate([forms, np.where(known[rows], -1, log.track[rows])[:, None]], axis=1)
-    ends = log.both_ends(rows, unique_forms(every)[1], spacing)
+    first = last - len(heading) + 1
+    ends = log.both_ends(*log.histories(first), spacing)
     rows, which, flat, spread_of, owner, legs = with_reciprocal(log, ends, apart)
     count = np.bincount(which)
 
@@ -162,14 +160,15 @@ def lengths(heard: Heard) -> Lengths:
     # directions that scatter by more than they deviate by are as much less sure of their mean (Birge's ratio)
     scatter = 0.5 * total(sure * ((seen - toward[which]) ** 2).sum(axis=1)) / np.maximum(count - 1, 1)
     doubt = np.maximum(scatter, 1.0) / total(sure)
-    up = np.sqrt(np.maximum(1.0 - np.sum(toward**2, axis=1), 0.0))
+    rim = 1.0 - np.sum(toward**2, axis=1)
+    up = np.sqrt(np.maximum(rim, 0.0))
     toward = -np.concatenate([toward, up[:, None]], axis=1)[legs].sum(axis=1)
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     blur = 2.0 * baseline * total(weight) / np.maximum(total(weight * length), 1e-9)
     return Lengths(
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
-        length - np.vecdot(toward[which], place[since] - place[-1]), toward, count,
-        np.hypot(blur, np.sqrt(2.0 * doubt[legs].sum(axis=1))), owner if (np.diff(owner) < 1).any() else None,
+        length - np.vecdot(toward[which], place[since] - place[-1]), toward, (rim > -1e-9)[legs].all(axis=1), count,
+        np.hypot(blur, np.sqrt(spread_by_legs(doubt, legs))), owner if (np.diff(owner) < 1).any() else None,
         enough_measured(log.cycle[log.cycle >= first]),
     )  # fmt: skip
 
@@ -242,7 +241,7 @@ def _slopes(found: Lengths, x: Floats, *values: Floats) -> tuple[list[Floats], F
     s, sx, sxx = total(found.weight), total(weighted), total(found.weight * x**2)
     spread = s * sxx - sx**2
     enough = (found.number >= found.enough) & (spread > 1e-9 * s * s * found.heard.step**2)
-    enough &= np.vecdot(found.toward[:, :2], found.toward[:, :2]) <= 4.0 + 1e-9  # at the rim, but for rounding
+    enough &= found.inside
     spread = np.where(enough, spread, 1.0)
     slopes = [(s * total(weighted * value) - sx * total(found.weight * value)) / spread for value in values]
     return slopes, CONSTANTS.crowd * s / spread, enough

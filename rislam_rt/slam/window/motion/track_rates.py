@@ -16,7 +16,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.length_rates import enough_measured
-from rislam_rt.slam.window.reciprocal_paths import PathDirections, with_reciprocal
+from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
 from rislam_rt.slam.window.smoother.rate_factor import RateFactor
@@ -148,7 +148,7 @@ def _directions(heading: Floats, ends: PathDirections, slot: Integers, clock: Fl
         smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1.0)
         up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
         toward -= np.concatenate([smooth, up[:, None]], axis=1)
-    return toward, (1.0 / s)[ends.legs].sum(axis=1) * 2.0
+    return toward, spread_by_legs(1.0 / s, ends.legs)
 
 
 def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:
