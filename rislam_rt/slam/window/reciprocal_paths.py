@@ -58,16 +58,6 @@ def spread_by_legs(variance: Floats, legs: Integers) -> Floats:
     return np.asarray(np.where(legs[:, 0] == legs[:, 1], 2.0, 1.0) * variance[legs].sum(axis=1))
 
 
-def log_there_and_back(log: Log, tracks: list[Integers], spacing: float, apart: Floats) -> Floats:
-    """Log likelihood ratio (T,) that tracks, each given as rows of the log, come back the way that they went: that
-    another component is alike in most cycles as a reciprocal path's is then `rare`."""
-    rows, which = log.histories(0)
-    ends = log.both_ends(rows, which, spacing)
-    paired = np.isin(which, ends.owner[_reciprocal(log, ends, apart)[:, 0]])
-    found = np.array([bool(paired[np.searchsorted(rows, at[-1])]) for at in tracks], dtype=np.bool_)
-    return np.where(found, CONSTANTS.log_rare, 0.0)
-
-
 def _reciprocal(log: Log, ends: ArrayEnds, apart: Floats) -> Integers:
     """Pairs (P, 2) of tracks that are alike in most cycles as reciprocal paths are, either way round."""
     up = np.sqrt(np.maximum(1.0 - np.vecdot(ends.cosines, ends.cosines), 0.0))

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence.length_rates import Heard, lengths, rates
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.motion import track_rates
-from rislam_rt.slam.window.reciprocal_paths import log_there_and_back, with_reciprocal
+from rislam_rt.slam.window.reciprocal_paths import with_reciprocal
 
 STEP, COUNT = 0.1, 10
 APART = np.array([-0.06, -0.04, 0.02])
@@ -102,12 +101,3 @@ def test_an_unexplained_pair_speaks_for_the_motion_that_it_has(place):
         way = toward[ends.which == 2 + number]
         moved = np.vecdot(0.5 * (way[1:] + way[:-1]), np.diff(place, axis=0))
         np.testing.assert_allclose(moved, np.diff(length), atol=5e-4)  # the baseline of 7 cm at 11 m, of a step of 7 cm
-
-
-def test_a_track_that_another_is_the_reciprocal_of_hardly_comes_back_the_way_that_it_went(place):
-    paths = [_over(walls, place) for walls in ([NORTH, SOUTH_WEST], [NORTH], [SOUTH_WEST, NORTH])]
-    log = _log(paths)
-    tracks = [(log.track == number).nonzero()[0] for number in (2, 1, 0)]
-    told = log_there_and_back(log, tracks, 0.5, APART)
-    np.testing.assert_array_equal(told, [CONSTANTS.log_rare, 0.0, CONSTANTS.log_rare])
-    assert log_there_and_back(log, [], 0.5, APART).shape == (0,)

@@ -13,7 +13,6 @@ from rislam_rt.slam.window.hypotheses.hypotheses import (
     BESIDE,
     BOTH_WAYS,
     IS_IMAGE,
-    THERE_AND_BACK,
     TWO_WALLS,
     UPRIGHT_RISE,
     WALL,
@@ -44,7 +43,6 @@ from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.hypotheses.unheard_returns import log_unheard
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.reciprocal_paths import log_there_and_back
 from rislam_rt.slam.window.smoother.direction_priors import DirectionPriors, no_holds
 from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
@@ -137,9 +135,6 @@ def _weigh(
     wide = log_wide_or_small(table, before)
     evidence += log_amplitudes(table, fits, summary, landmarks, scene) + behind + wide
     evidence += log_beside(table, summary, known, context)
-    body = scene.body
-    back = log_there_and_back(context.log, track_rows, scene.radio.array.spacing, body.tx_offset - body.rx_offset)
-    evidence += np.where(np.isin(table.kind, THERE_AND_BACK), back[owner[track]], 0.0)
     evidence -= np.log(np.bincount(owner[:near]))[owner[track]]
     best = np.full(len(track_rows), -np.inf)
     np.maximum.at(best, owner[track], np.where(np.isfinite(fits.cost), evidence, -np.inf))

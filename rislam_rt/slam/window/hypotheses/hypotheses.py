@@ -27,8 +27,6 @@ WALL, KNOWN_WALL, WALL_KNOWN, POINT, OVER_RX, OVER_TX, OVER_SAME, TWO_WALLS, BES
 *IMAGES, BOTH_WAYS = range(9, 16)
 IMAGE, TX_IMAGE, BOTH_LEGS, THEN_WALL, WALL_THEN, OTHER_LEG = IMAGES
 
-THERE_AND_BACK = (WALL, POINT, OVER_SAME, BESIDE)
-"""Kinds whose path comes back the way that it went, so that no other is its reciprocal."""
 FAR = (TX_IMAGE, OTHER_LEG)
 """Kinds whose new wall mirrors a known point on the leg to the Tx."""
 WALLS = (WALL, KNOWN_WALL, WALL_KNOWN, BESIDE, *IMAGES, BOTH_WAYS)
