@@ -1,7 +1,6 @@
 """NetCDF files: encoding of named arrays with dimensions, units and meanings, writing whole or not at all, reading."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -102,60 +101,7 @@ def _load(path: Path) -> "xr.Dataset":
     from xarray.backends import H5NetCDFStore
 
     with _opened_once()(path, "r") as file:
-        with suppress(Exception):  # whatever is not plain is left to h5netcdf, and what is damaged, to say so
-            plain = {name: xr.Variable(*found) for name, found in _plain_variables(file).items()}
-            content, attributes, names = xr.conventions.decode_cf_variables(plain, _plain_attributes(file))
-            coordinates = {name: one for name, one in content.items() if name in names or one.dims == (name,)}
-            rest = {name: one for name, one in content.items() if name not in coordinates}
-            return xr.Dataset(rest, coordinates, attributes)
         return xr.load_dataset(H5NetCDFStore(h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")))
-
-
-HIDDEN = {"REFERENCE_LIST", "CLASS", "DIMENSION_LIST", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_NCProperties"}
-"""Attributes by which NetCDF names dimensions in an HDF5 file."""
-
-
-def _plain_variables(file: Any) -> dict[str, Any]:
-    """Variables of an HDF5 file that h5netcdf wrote, before xarray decodes them: what h5netcdf finds, in a quarter of
-    the time.
-
-    Raises
-    ------
-    Exception
-        The file is of another making, or holds what only h5netcdf can read.
-    """
-    if not file.attrs["_NCProperties"].startswith(b"version=2,h5netcdf="):
-        raise ValueError
-    dimensions, variables = {}, {}
-    for name in file:
-        data = file[name]
-        is_dimension, is_variable = "NAME" in data.attrs, True
-        if is_dimension:
-            dimensions[int(data.attrs["_Netcdf4Dimid"])] = (name, data.shape)
-            is_variable = not data.attrs["NAME"].startswith(b"This is a netCDF dimension but not a netCDF variable.")
-        if is_variable:
-            variables[name] = data
-    found = {}
-    for name, data in variables.items():
-        dims = [dimensions[number] for number in data.attrs["_Netcdf4Coordinates"].tolist()] if data.shape else []
-        if data.shape != sum((size for _, size in dims), ()) or data.dtype.kind not in "iufO" or name[0] == "_":
-            raise ValueError
-        values = np.array(data.asstr()[()], dtype=str) if data.dtype.kind == "O" else data[()]
-        found[name] = ([dim for dim, _ in dims], values, _plain_attributes(data))
-    return found
-
-
-def _plain_attributes(place: Any) -> dict[str, Any]:
-    """Attributes of a variable or of a file: text, numbers, or lists of text."""
-    found = {}
-    for name in place.attrs:
-        if name not in HIDDEN:
-            value = place.attrs[name]
-            if isinstance(value, bytes):
-                raise ValueError
-            value = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind == "O" else value
-            found[name] = value[0] if not np.isscalar(value) and len(value) == 1 else value
-    return found
 
 
 @cache

@@ -218,10 +218,11 @@ def _associate_over_motions(
     if best.surprise > 1.0 and (state.window.step[-2:] > 0.0).sum() == 2:
         by, view = np.zeros(3), best
         for _ in range(2):  # the first step of the iteration may be centimetres off
-            further = by + divergence_monitor.jump(view, observed, state.scene.use_vt)
-            closer = view_of(divergence_monitor.shifted(state.window, further))
-            if not by.any() or closer.score > view.score:
-                by, view = further, closer
+            more = divergence_monitor.jump(view, observed, state.scene.use_vt)
+            closer = view_of(divergence_monitor.shifted(state.window, by + more)) if more.any() else view
+            if closer is view or (by.any() and closer.score <= view.score):
+                break
+            by, view = by + more, closer
         if by.any() and view.score + divergence_monitor.log_jump() > max(best.score, CONSTANTS.log_lost):
             walls = divergence_monitor.with_another_wall(state.window, state.landmarks, by)
             others = [other.score for other in map(view_of, walls) if other.surprise <= 1.0]
