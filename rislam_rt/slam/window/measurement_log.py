@@ -105,14 +105,15 @@ class Log(NamedTuple):
         np.add.at(excess, which, self.mirrored(rows, spacing) - 0.5)
         return excess > 0.0
 
-    def histories(self, first: int) -> tuple[Integers, Integers]:
-        """Rows (A,) of the components from cycle `first` on that are of a track or were associated with a path, and
-        which track or path (A,) each is of."""
+    def histories(self, first: int) -> tuple[Integers, Integers, Integers]:
+        """Rows (A,) of the components from cycle `first` on that are of a track or were associated with a path, which
+        track or path (A,) each is of, and what names each of these for life (T, 6)."""
         known = self.explained
         rows = ((known | (self.track >= 0)) & (self.cycle >= first)).nonzero()[0]
         forms = np.where(known[rows, None], self.form[rows, 0], UNKNOWN)
         every = np.concatenate([forms, np.where(known[rows], -1, self.track[rows])[:, None]], axis=1)
-        return rows, unique_forms(every)[1]
+        names, which = unique_forms(every)
+        return rows, which, names
 
     def both_ends(self, rows: Integers, which: Integers, spacing: float) -> "ArrayEnds":
         """Components `rows` (A,) of tracks or paths `which` (A,), with those of which most are `mirrored` once for

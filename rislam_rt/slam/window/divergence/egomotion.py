@@ -17,7 +17,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.divergence.length_rates import Rates
+from rislam_rt.slam.window.divergence.length_rates import Kinds, Rates
 
 FEWEST = 3
 """Tracks with a rate of length from which on the motion is checked, and pairs of a return and a component from which on
@@ -235,11 +235,10 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
         speed, rise = velocity + found.believed[:2], climb + found.believed[2]
     square, rise = np.vecdot(speed, speed)[:, None], rise**2
     variance = found.variance + found.blur**2 * square + found.lean**2 * rise
-    # half of the paths shorten as the agent nears where they come from; of the others a quarter keep their length
-    # every other one of them over more than one wall, where a turn of the body changes the length as well
+    # every other path that follows does so over more than one wall, where a turn of the body changes the length as well
     precision = 1.0 / (variance + np.array([0.0, found.turning**2])[:, None, None])
     likely = np.exp(-0.5 * left**2 * precision) * np.sqrt(precision)
-    likely *= 0.25 / np.sqrt(2.0 * np.pi) * found.share
+    likely *= 0.5 / np.sqrt(2.0 * np.pi) * found.kinds.follows
     close = found.mixed(likely.sum(axis=0))
     other: Floats | float = 1.0 / (4.0 * CONSTANTS.walk)
     if found.believed is not None:
@@ -247,7 +246,32 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
         narrow = 1.0 / (variance + (found.turning**2 + 4.0 / 3.0 * (square + rise)))
         still = np.exp(-0.5 * found.whole**2 * narrow) * np.sqrt(narrow / (2.0 * np.pi))
         other = found.astray * other + (1.0 - found.astray) * still
-    return close + 0.5 / 4.0 * found.mixed(found.share * (found.kept + 3.0 * other)), likely, precision
+    kept, other = found.mixed(found.share * found.kept), found.mixed(found.share * other)
+    return close + found.kinds.keeps * kept + found.kinds.other * other, likely, precision
+
+
+def with_history(found: Rates, before: Rates, motion: Floats) -> Rates:
+    """Rates of path lengths that hold each path for what it was `before`, by its rate under the motion (3,) [m/s] of
+    that time, unless it has gone `astray` since."""
+    assert found.name is not None
+    assert before.name is not None
+    close, likely, _ = (every[..., 0, :] for every in _likelihoods(before, motion[None, :2], motion[2]))
+    followed = likely.sum(axis=0) / before.each(close)
+    kept = before.each(before.kinds.keeps * before.mixed(before.share * before.kept) / close)
+    neither = 1.0 - before.each(before.mixed(followed)) - kept
+    same = (found.name[:, None] == before.name).all(axis=2)
+    # of several directions it has the one that is nearest to where it came from
+    nearest = np.where(same, found.toward @ before.toward.T, -np.inf).argmax(axis=1)
+    owner = np.arange(found.number) if found.owner is None else found.owner
+    alike = ((nearest[:, None] == nearest) & (owner[:, None] == owner)).sum(axis=1)
+    first = np.unique(owner, return_index=True)[1]
+    follows, keeps, other = followed[nearest] / alike, kept[nearest][first], neither[nearest][first]
+    known = same.any(axis=1)[first] * (1.0 - found.mixed(found.share * found.astray))
+    sure, new = known / (found.mixed(follows) + keeps + other), 1.0 - known
+    return found._replace(known=Kinds(
+        found.each(sure) * follows + found.each(new) * found.kinds.follows, sure * keeps + new * found.kinds.keeps,
+        sure * other + new * found.kinds.other,
+    ))  # fmt: skip
 
 
 def _find_modes(found: Rates, start: Floats, told: Floats, spread: Floats) -> _Modes:

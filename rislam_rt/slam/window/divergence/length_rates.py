@@ -44,6 +44,21 @@ class _PlainRates(NamedTuple):
     any rate."""
     astray: Floats | float = CONSTANTS.rare
     """(E,) probability of a rate that no thing at rest gives: the track changed paths, or something moves by itself."""
+    name: Integers | None = None
+    """(E, 6) what names the track or path for life."""
+    known: "Kinds | None" = None
+    """What each path is held for by what it did before; None where nothing is known of that."""
+
+
+class Kinds(NamedTuple):
+    """Probabilities of what T tracks or explained paths are, by how their lengths change as the agent moves."""
+
+    follows: Floats
+    """(E,) it nears and recedes with the agent, from this direction."""
+    keeps: Floats
+    """(T,) it keeps its length, as over opposite walls."""
+    other: Floats
+    """(T,) it does neither."""
 
 
 class Rates(_PlainRates):
@@ -67,6 +82,12 @@ class Rates(_PlainRates):
     def share(self) -> Floats:
         """(E,) probability of each direction beforehand: a half where there are two."""
         return np.ones(len(self.rate)) if self.owner is None else 1.0 / np.bincount(self.owner)[self.owner]
+
+    @cached_property
+    def kinds(self) -> Kinds:
+        """What each path is held for: half of all follow the agent; of the others a quarter keep their length."""
+        every = np.ones(self.number)
+        return self.known or Kinds(0.5 * self.share, 0.125 * every, 0.375 * every)
 
     @cached_property
     def lean(self) -> Floats:
@@ -125,6 +146,8 @@ class Lengths(NamedTuple):
     """(E,) track or path of each direction; None where each has one."""
     enough: int
     """Number of components from which on a line is fitted."""
+    name: Integers
+    """(E, 6) as in `Rates`."""
 
     def total(self, value: Floats) -> Floats:
         """Sums (E,) over each history of lengths of values (N,)."""
@@ -144,7 +167,8 @@ def lengths(heard: Heard) -> Lengths:
     baseline = float(np.linalg.norm(apart))
     last = int(log.cycle.max(initial=0))
     first = last - len(heading) + 1
-    ends = log.both_ends(*log.histories(first), spacing)
+    rows, which, names = log.histories(first)
+    ends = log.both_ends(rows, which, spacing)
     rows, which, flat, spread_of, owner, legs = with_reciprocal(log, ends, apart)
     count = np.bincount(which)
 
@@ -169,7 +193,7 @@ def lengths(heard: Heard) -> Lengths:
         heard, which, np.asarray((log.cycle[rows] - last) * step), weight, length,
         length - np.vecdot(toward[which], place[since] - place[-1]), toward, (rim > -1e-9)[legs].all(axis=1), count,
         np.hypot(blur, np.sqrt(spread_by_legs(doubt, legs))), owner if (np.diff(owner) < 1).any() else None,
-        enough_measured(log.cycle[log.cycle >= first]),
+        enough_measured(log.cycle[log.cycle >= first]), names[owner],
     )  # fmt: skip
 
 
@@ -259,7 +283,8 @@ def _rates(
     turning = float(np.linalg.norm(heard.apart)) * float(np.abs(np.diff(heard.heading)).sum()) / unit
     owner = None if found.owner is None else np.unique(found.owner[fine], return_inverse=True)[1]
     return Rates(
-        toward[fine], rate, variance, found.blur[fine], whole, turning, bend, bend_variance, owner, believed
+        toward[fine], rate, variance, found.blur[fine], whole, turning, bend, bend_variance, owner, believed,
+        name=found.name[fine],
     )  # fmt: skip
 
 

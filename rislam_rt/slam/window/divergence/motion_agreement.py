@@ -14,7 +14,7 @@ from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
-from rislam_rt.slam.window.solver_limits import STILL
+from rislam_rt.slam.window.solver_limits import LASTED, STILL
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import CYCLE
 
@@ -88,6 +88,7 @@ def weigh_manoeuvre(
     found, log_odds, change = length_rates.accelerations(told, steps), -np.inf, np.zeros(3)
     if found.number < egomotion.FEWEST:
         return log_odds, change
+    found = _with_history(state, found, steps)
     calm, facing = _acceleration_covariance(state.window, steps), [np.cos(state.heading[-1]), np.sin(state.heading[-1])]
     starts = egomotion.possible_changes(found, log_prior[0])
     if starts is not None:
@@ -98,6 +99,20 @@ def weigh_manoeuvre(
         if climbs > log_odds:
             return climbs, np.array([0.0, 0.0, by])
     return log_odds, change
+
+
+def _with_history(state: WindowState, found: length_rates.Rates, steps: int) -> length_rates.Rates:
+    """Rates of path lengths that hold each path for what it was before the last `steps`, as long as a manoeuvre is
+    looked for."""
+    until = state.window.num_poses - 1 - steps
+    rows = slice(max(until - 1 - LASTED[-1], 0), until)
+    log = state.log.take(state.log.cycle < state.cycle - state.window.num_poses + 1 + until)
+    silent = not len(log.cycle) or log.cycle[-1] != state.cycle - state.window.num_poses + until
+    if silent or until - rows.start < length_rates.MEASURED:
+        return found
+    place, passed = window_gaussian.floor_poses(state.window)[rows, :3], state.window.step[rows.start : until - 1]
+    before = length_rates.rates(_lengths(state._replace(log=log), rows, float(passed.mean())))
+    return egomotion.with_history(found, before, (place[-1] - place[0]) / passed.sum()) if before.number else found
 
 
 def _latest_rates(state: WindowState) -> length_rates.Rates | None:
