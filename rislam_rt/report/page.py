@@ -11,7 +11,8 @@ import numpy as np
 from rislam_rt.measurement import build_sensor
 from rislam_rt.model import SlamResult
 from rislam_rt.pipeline.scores.audible_paths import HEARD
-from rislam_rt.pipeline.scores.summary import DIVERGED, FAR_OVER
+from rislam_rt.pipeline.scores.summary import DIVERGED
+from rislam_rt.pipeline.scores.true_loss import FAR_OVER, LASTING, LOST
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import judge_run
@@ -143,7 +144,9 @@ posterior bound of the same motion, codes and noise with landmarks and walls unk
 cut off at 1 m. Association: of the components taken for a landmark or wall, how many rightly (precision); of those
 that came from one, how many were taken for it (recall). Budget: the settings <code>budget.*</code>, against the mean
 time of each step on this machine. Diverged, by the truth: once off by more than {DIVERGED:g} m and {FAR_OVER:g}
-bounds; without noticing, if the filter, which knows no truth, never held itself for lost.</p>
+bounds; without noticing, if the filter, which knows no truth, never held itself for lost. Lost: relative to its start
+off by more than {LOST:g} m and {FAR_OVER:g} bounds for {LASTING:g} s on end; silently, if no cycle from then on says
+so and the error is more than {FAR_OVER:g} of its own deviations, too.</p>
 <h2>To repeat it</h2>
 <p class="note">{html.escape(versions)}; scene SHA-256 {html.escape(result.scene.digest)}.
 <code>rislam-rt run config.toml</code> in this folder does it again: all settings are there, the room in

@@ -39,6 +39,7 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     relative, aligned = ([s[key] for s in schemes] for key in ("relative_rmse_m", "rmse_aligned_m"))
     rows = [
         ["agent", *(_metres(s["rmse_m"]) for s in schemes)],
+        ["agent, largest error", *(_metres(s["largest_m"]) for s in schemes)],
         ["agent, relative to its start", *("-" if error is None else _metres(error) for error in relative)],
         ["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)],
         *(
@@ -50,11 +51,14 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     ]
     shares = [[share_text(s["association"][name]) for name in ("precision", "recall")] for s in schemes]
     rows += [
-        ["posterior bound of the agent", *(_metres(s["bound_m"]) for s in schemes)],
+        ["posterior bound of the agent", *(_bound(s, "") for s in schemes)],
+        ["the same, relative to its start", *(_bound(s, "relative_") for s in schemes)],
+        ["NEES per degree of freedom", *(_number(s["nees_per_dof"]) for s in schemes)],
         ["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)],
         ["association: precision, recall", *map(", ".join, shares)],
         ["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)],
         ["diverged", *(_diverged(s) for s in schemes)],
+        ["lost, relative to its start", *(_lost(s["true_loss"]) for s in schemes)],
         ["held itself for lost", *(_said(s["outcomes"]) for s in schemes)],
     ]
     if any(s["lost"]["times"] for s in schemes):
@@ -98,6 +102,27 @@ def _ghosts(count: int) -> str:
 def _diverged(scores: Mapping[str, Any]) -> str:
     """Cell of a terminal table: whether a scheme diverged by the truth, and whether it noticed."""
     return "yes, without noticing" if is_unnoticed(scores) else "yes" if scores["diverged"] else "no"
+
+
+def _lost(loss: Mapping[str, Any] | None) -> str:
+    """Cell of a terminal table: since when a scheme was lost by the truth, and whether silently."""
+    if loss is None:
+        return "-"
+    return f"from {loss['lost_at_s']:.1f} s on{', silently' if loss['silent'] else ''}" if loss["lost"] else "no"
+
+
+def _bound(scores: Mapping[str, Any], name: str) -> str:
+    """Cell of a terminal table: a bound on the agent's error, absolute or `relative_`, and how many of it the error
+    is."""
+    least, error = scores[f"{name}bound_m"], scores[f"{name}rmse_m"]
+    if not least:
+        return "-"
+    return _metres(least) if error is None else f"{_metres(least)}, RMSE {error / least:.1f} times that"
+
+
+def _number(value: float | None) -> str:
+    """Cell of a terminal table: a number of two digits after the point."""
+    return "-" if value is None else f"{value:.2f}"
 
 
 def _said(outcomes: Mapping[str, int]) -> str:

@@ -1,6 +1,7 @@
 """Rows of a run's table: every wall that is heard or found has one, the others share one."""
 
 from rislam_rt.pipeline.scores.loss_causes import unnoticed_lines
+from rislam_rt.pipeline.scores.true_loss import silent_loss_lines
 from rislam_rt.report.terminal_tables import summary_rows
 
 FOUND = {"rmse_m": 0.01, "angle_deg": 0.1, "bound_m": 0.005, "audible_s": 7.0}
@@ -14,7 +15,8 @@ def _scheme(**walls):
         "rmse_m": 0.02, "rmse_aligned_m": 0.004, "relative_rmse_m": 0.006, "largest_m": 0.03, "bound_m": 0.01,
         "landmarks": {}, "walls": walls, "map": {"gospa_m": 0.1}, "ghost_walls": 0,
         "association": {"precision": 0.9, "recall": 0.4}, "over_budget": [], "diverged": False, "outcomes": {"ok": 10},
-        "lost": {"times": 0, "first_s": None, "causes": {}},
+        "lost": {"times": 0, "first_s": None, "causes": {}}, "relative_bound_m": 0.002, "nees_per_dof": 0.834,
+        "true_loss": {"lost": False, "silent": False, "lost_at_s": None},
     }  # fmt: skip
 
 
@@ -56,8 +58,31 @@ def test_the_shape_of_the_path_and_what_was_associated_have_rows_of_their_own():
     table = {label: cells for label, *cells in summary_rows({"schemes": {"a": _scheme(), "b": one_cycle}})}
     assert table["agent, path aligned"] == ["0.4 cm", "-"]
     assert table["agent, relative to its start"] == ["0.6 cm", "-"]
+    assert table["agent, largest error"] == ["3.0 cm", "3.0 cm"]
+    assert table["posterior bound of the agent"] == 2 * ["1.0 cm, RMSE 2.0 times that"]
+    assert table["the same, relative to its start"] == ["0.2 cm, RMSE 3.0 times that", "0.2 cm"]
+    assert table["NEES per degree of freedom"] == ["0.83", "0.83"]
     assert table["association: precision, recall"] == ["90%, 40%", "90%, 40%"]
     assert table["slower than its budget"] == ["no step", "no step"]
+
+
+def test_a_scheme_that_strayed_by_less_than_half_a_metre_is_lost_all_the_same():
+    """By the truth, as `score` says it: whether silently, and with a warning of its own unless it diverged as well."""
+    lost = {"lost": True, "silent": False, "lost_at_s": 7.7}
+    schemes = {
+        "silent": _scheme() | {"true_loss": lost | {"silent": True}, "largest_m": 0.25},
+        "noticed": _scheme() | {"true_loss": lost},
+        "far": _scheme() | {"true_loss": lost | {"silent": True}, "diverged": True},
+        "good": _scheme(),
+        "in slices": _scheme() | {"true_loss": None, "bound_m": None, "relative_bound_m": None, "nees_per_dof": None},
+    }
+    table = {label: cells for label, *cells in summary_rows({"schemes": schemes})}
+    said = ["from 7.7 s on, silently", "from 7.7 s on", "from 7.7 s on, silently", "no", "-"]
+    assert table["lost, relative to its start"] == said
+    assert table["posterior bound of the agent"][-1] == table["NEES per degree of freedom"][-1] == "-"
+    (line,) = silent_loss_lines(schemes)
+    assert line.startswith("silent: silently lost from 7.7 s on: off by more than 0.1 m and 5 bounds for 1 s on end")
+    assert line.endswith("by up to 0.25 m")
 
 
 def test_a_scheme_that_diverged_without_noticing_is_told_apart_from_one_that_noticed():

@@ -1,6 +1,7 @@
 """The posterior Cramér-Rao bound of a scheme in a run: the least errors possible with its room, codes and noise."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,8 @@ class SchemeBound(NamedTuple):
 
     agent: Floats
     """(K,) [m] bound on the position error, over the axes that are filtered."""
+    relative: Floats
+    """(K,) [m] the same relative to the start, which then has no error."""
     landmarks: Mapping[str, float]
     """[m] Bound on the position error at the end of the run, of each landmark that a path was detected from."""
     walls: Mapping[str, WallSpread]
@@ -105,14 +108,16 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     """
     problem = bound_problem(scene, paths, gain, scheme, config)
     model, motion = problem.model, problem.motion
-    bound = posterior_bound(problem.rows, scene.agent.time, motion, problem.unknown_std)
-    agent = bound.rms
+    bound, from_start = (
+        posterior_bound(problem.rows, scene.agent.time, law, problem.unknown_std)
+        for law in (motion, replace(motion, start_position=0.0))
+    )
     if model is None:
-        return SchemeBound(agent, {}, {})
+        return SchemeBound(bound.rms, from_start.rms, {}, {})
     landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in problem.heard}
     walls = build_walls(scene)
     middle = np.array([walls.surface(number)[0] for number in range(len(walls))]).reshape(-1, 3)
-    return SchemeBound(agent, landmarks, model.wall_error(bound.last, middle))
+    return SchemeBound(bound.rms, from_start.rms, landmarks, model.wall_error(bound.last, middle))
 
 
 def over_distortion(paths: Paths, settings: Settings) -> Complexes:

@@ -13,13 +13,12 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
 from rislam_rt.pipeline.scores.loss_causes import loss_scores, unnoticed_lines
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
+from rislam_rt.pipeline.scores.true_loss import FAR_OVER, lost_scores, silent_loss_lines
 from rislam_rt.pipeline.scores.wall_scores import count_ghosts, seconds_audible, wall_scores
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
 DIVERGED = 0.5
 """Position error [m] beyond which a run counts as diverged."""
-FAR_OVER = 5.0
-"""Ratio of error to bound beyond which a run counts as diverged: five standard deviations even along one line."""
 NEAR_LANDMARK = 1.0
 """Largest distance [m] of an estimated point from the true landmark that it is matched with."""
 
@@ -45,7 +44,7 @@ def summary_table(result: SlamResult, scores: Mapping[str, Any], cycles: int) ->
     return {
         "seed": result.seed, "cycles": cycles, "pipeline": result.name, "scene": result.scene.name,
         "source": result.paths.source, "trace_seconds": result.seconds.get("trace", 0.0),
-        "warnings": [*unnoticed_lines(scores), *result.warnings], "schemes": scores,
+        "warnings": [*unnoticed_lines(scores), *silent_loss_lines(scores), *result.warnings], "schemes": scores,
     }  # fmt: skip
 
 
@@ -75,11 +74,13 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "final_m": float(errors[-1]),
         "largest_m": largest,
         "relative_rmse_m": None if relative is None else evaluate.root_mean_square(relative),
+        "relative_bound_m": evaluate.root_mean_square(least.relative) if least else None,
         "rmse_aligned_m": evaluate.rmse(evaluate.align(scheme.position, truth), truth) if len(truth) > 1 else None,
         "nees_per_dof": nees if nees is None or np.isfinite(nees) else None,
         "diverged": has_diverged(errors, limit),
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
         "lost": loss_scores(scheme),
+        "true_loss": true_loss(scheme, relative, least),
         "landmarks": landmark_scores(scene, scheme, least),
         "walls": walls,
         "ghost_walls": count_ghosts(scene, scheme.map),
@@ -99,6 +100,15 @@ def relative_errors(scheme: SchemeResult, truth: Floats, begin: Floats) -> Float
     return evaluate.position_errors(scheme.position - truth, scheme.start_position - begin)
 
 
+def true_loss(scheme: SchemeResult, relative: Floats | None, least: SchemeBound | None) -> dict[str, Any] | None:
+    """Score of loss by the truth, of the errors (K,) [m] relative to the start; None where these or their bound are not
+    known."""
+    if relative is None or least is None:
+        return None
+    own = np.sqrt(np.trace(scheme.covariance[:, :3, :3], axis1=1, axis2=2))
+    return lost_scores(relative, least.relative, own, scheme.time - scheme.time[0], scheme.outcome)
+
+
 def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
     """Score of consistency: NEES of the position per degree of freedom, (K,); None if all is known."""
     axes = np.flatnonzero(np.einsum("kii->ki", scheme.covariance[:, :3, :3]).min(axis=0) > 0.0)
@@ -109,7 +119,8 @@ def nees_per_dof(scheme: SchemeResult, truth: Floats) -> Floats | None:
 
 
 def has_diverged(errors: Floats, limit: Floats | None) -> bool:
-    """Score: whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one."""
+    """Score: whether the error (K,) [m] ever exceeds `DIVERGED`, and `FAR_OVER` times the bound where there is one:
+    five standard deviations even along one line."""
     least = DIVERGED if limit is None else np.maximum(DIVERGED, FAR_OVER * limit)
     return bool((errors > least).any())
 

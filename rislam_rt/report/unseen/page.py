@@ -6,9 +6,10 @@ from typing import Any
 from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
 from rislam_rt.input_messages import share_text
 from rislam_rt.pipeline.scores.audible_paths import HEARD
+from rislam_rt.pipeline.scores.true_loss import FAR_OVER, LASTING, LOST
 from rislam_rt.report.markdown import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
-from rislam_rt.studies.unseen.score import FAR_OVER, GOOD_ANGLE, GOOD_OFFSET, LASTING, LOST, NEAR_POINT, SETTLED
+from rislam_rt.studies.unseen.score import GOOD_ANGLE, GOOD_OFFSET, NEAR_POINT, SETTLED
 from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
 
 MILLI = 1e3

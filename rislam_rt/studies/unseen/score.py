@@ -12,12 +12,11 @@ from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers
 from rislam_rt.pipeline.scores.audible_paths import heard_long
 from rislam_rt.pipeline.scores.summary import NEAR_LANDMARK
+from rislam_rt.pipeline.scores.true_loss import lost_scores
 from rislam_rt.studies.unseen.truth import Truth
 
 SETTLED = 10.0
 """[s] Time after which the RMSE is computed once more, when landmarks have been born."""
-LOST, FAR_OVER, LASTING = 0.1, 5.0, 1.0
-"""A run is lost once its relative error exceeds `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] on end."""
 NEAR_POINT = NEAR_LANDMARK
 """Largest distance [m] of an estimated point from the true landmark that it is matched with.
 
@@ -70,28 +69,6 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
     scores |= panel_scores(truth, maps, inputs, told)
     scores |= kind_scores(truth, maps, answers)
     return scores if answers.maps_over_time else scores | dict.fromkeys(OVER_TIME)
-
-
-def lost_scores(relative: Floats, bound: Floats, own: Floats, time: Floats, outcomes: list[Any]) -> dict[str, Any]:
-    """Score of divergence: whether the estimate was lost, when, and whether the estimator did not notice ("silent").
-
-    It noticed if an outcome says so from then on, or if its own standard deviation `own` (K,) [m] covers the error.
-    """
-    far = relative > np.maximum(LOST, FAR_OVER * bound)
-    lost = _lasting(far, time)
-    if not lost.any():
-        return {"lost": False, "silent": False, "lost_at_s": None}
-    first = int(np.argmax(lost))
-    said = any(str(outcome) == "diverged" for outcome in outcomes[first:])
-    surprised = _lasting(far & (relative > FAR_OVER * own), time).any()
-    return {"lost": True, "silent": bool(surprised and not said), "lost_at_s": float(time[first])}
-
-
-def _lasting(flag: Booleans, time: Floats) -> Booleans:
-    """Cycles, to score births, from which on a flag (K,) is set for `LASTING` seconds without a break."""
-    step = float(np.median(np.diff(time))) if len(time) > 1 else LASTING
-    length = max(1, round(LASTING / step))
-    return np.asarray(np.convolve(flag, np.ones(length), "valid") >= length) if len(flag) >= length else flag[:0]
 
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def test_walls_in_one_plane_are_one(room):
 def test_a_plane_stands_for_no_wall_that_no_path_meets(room):
     """The same plane, with and without a bound for the wall that it lies in."""
     estimate = map_of_walls([[1.0, 0.0, 0.0]], [0.01])
-    heard = SchemeBound(np.zeros(1), {}, {"wall_x0": WallSpread(np.radians(0.5), 0.02)})
+    heard = SchemeBound(np.zeros(1), np.zeros(1), {}, {"wall_x0": WallSpread(np.radians(0.5), 0.02)})
     scores = wall_scores(room, estimate, heard)["wall_x0"]
     assert (scores["offset_m"], scores["bound_m"]) == (pytest.approx(0.01), 0.02)
     assert scores["bound_deg"] == pytest.approx(0.5)

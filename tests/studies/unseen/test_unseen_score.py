@@ -8,8 +8,9 @@ import pytest
 
 from rislam_rt.model import Body, MapEstimate, Measurement, PathKind, RisSpec, SlamEstimate, empty_map
 from rislam_rt.pipeline.recordings.replay import Answers, Inputs, answers_from_arrays
+from rislam_rt.pipeline.scores.true_loss import lost_scores
 from rislam_rt.slam import StartPrior
-from rislam_rt.studies.unseen.score import OVER_TIME, lost_scores, score_run
+from rislam_rt.studies.unseen.score import OVER_TIME, score_run
 from rislam_rt.studies.unseen.truth import Truth
 
 K = 150
