@@ -26,7 +26,7 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
     cycles = ((np.arange(number) + 0.5) / number * len(result.scene.agent)).astype(np.int64)
     direct = np.flatnonzero(result.paths.kind == PathKind.RIS)
     with styled():
-        figure = Figure(figsize=(2.1 * number + 0.8, 2.25 * len(schemes) + 0.3))
+        figure = Figure(figsize=(2.1 * number + 0.8, 2.25 * len(schemes) + 0.6))
         axes = figure.subplots(len(schemes), number, squeeze=False)
         for row, scheme in zip(axes, schemes, strict=True):
             for axis, cycle in zip(row, cycles, strict=True):
@@ -36,6 +36,7 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
                 axis.set_title(f"t = {result.scene.agent.elapsed[cycle]:.0f} s, {level}", fontsize=9)
             row[0].set_ylabel(scheme.scheme, weight="bold")
         _colour_bar(figure, axes, schemes[0].levels)
+        figure.suptitle("What the panel was set to, and the gain of its direct path", weight="bold")
     return figure
 
 

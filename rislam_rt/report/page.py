@@ -30,9 +30,9 @@ PAGE = "report.html"
 
 CAPTIONS = {
     "room": "The room from above, true and estimated. The close-up shows the end of the path with the 2σ ellipse that "
-    "the filter believes in, unless it ends too far off for one. Walls are those found from the mirror images of the "
-    "landmarks.",
-    "error": "Distance between true and estimated position; the shaded band is the filter's own standard deviation.",
+    "the filter believes in, unless it ends too far off for one. Walls are drawn dashed, "
+    "as far as the room goes: where a plane ends is not estimated.",
+    "error": "Distance between true and estimated position; dashed is the filter's own standard deviation.",
     "landmarks": "Distance between each landmark and the estimate that stands for it; a gap where there is none.",
     "levels": "Gain of the strongest path of each class, and its SNR over all antennas. The panel's direct path "
     "depends on the code: until the panel is in the map, designed codes are beams in search of it; most of them miss.",

@@ -5,35 +5,45 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
 from rislam_rt.model import STEPS, PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.report.style import KIND, scheme_colour, styled
+from rislam_rt.slam.step_info import StepOutcome
+
+LEAST_ERROR = 1e-3
+"""[m] Least error that a logarithmic axis of curves shows."""
 
 
 def draw_agent_error(result: SlamResult) -> Figure:
-    """Draw the agent's position error of all schemes against time, the filter's own standard deviation as a band."""
+    """Draw the agent's position error of all schemes against time, on a logarithmic axis, the filter's own standard
+    deviation dashed, and crosses where it held itself for lost."""
     time = result.scene.agent.elapsed
     with styled():
         figure = Figure(figsize=(8.6, 4.1))
         axis = figure.subplots()
+        handles, crosses = [], False
         for name, scheme in reversed(list(result.schemes.items())):
             error = position_errors(scheme.position, result.scene.agent.position)
             believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
-            colour = scheme_colour(name)
-            axis.fill_between(time, 0.0, 100.0 * believed, color=colour, alpha=0.15, lw=0.0)
+            colour, shown = scheme_colour(name), 100.0 * np.maximum(error, LEAST_ERROR)
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
-            axis.plot(time, 100.0 * error, color=colour, lw=1.6, label=label)
-        axis.set(xlabel="time [s]", ylabel="agent position error [cm]")
+            handles += axis.plot(time, shown, color=colour, lw=1.6, label=label)
+            axis.plot(time, 100.0 * np.maximum(believed, LEAST_ERROR), color=colour, lw=1.0, ls="--", alpha=0.7)
+            lost = np.array([outcome == StepOutcome.DIVERGED for outcome in scheme.outcome], dtype=np.bool_)
+            axis.plot(time[lost], shown[lost], color=colour, ls="none", marker="x", ms=6.0)
+            crosses |= bool(lost.any())
+        axis.set(xlabel="time [s]", ylabel="agent position error [cm]", yscale="log")
         axis.set_title("How far off the agent is, and how far off it believes to be", weight="bold")
         axis.set_xlim(*time_limits(time))
-        axis.set_ylim(0.0)
-        band = Patch(color="#555555", alpha=0.2, lw=0.0, label="the filter's own σ")
-        handles, _ = axis.get_legend_handles_labels()
-        figure.legend(handles=[*handles[::-1], band], loc="outside lower center", ncols=6, fontsize=9)
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        more = [Line2D([], [], color="#555555", lw=1.0, ls="--", label="the filter's own σ")]
+        if crosses:
+            more += [Line2D([], [], color="#555555", ls="none", marker="x", label="held itself for lost")]
+        figure.legend(handles=[*handles[::-1], *more], loc="outside lower center", ncols=5, fontsize=9)
     return figure
 
 
