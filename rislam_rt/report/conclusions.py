@@ -12,6 +12,7 @@ from rislam_rt.model import PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
 from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words_of_loss
 from rislam_rt.pipeline.scores.summary import panel_track
+from rislam_rt.pipeline.scores.true_loss import words_of_silence
 from rislam_rt.pipeline.scores.wall_scores import found_of_heard
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings, build_settings
 from rislam_rt.slam.step_info import StepOutcome
@@ -53,7 +54,11 @@ def _headline(schemes: Mapping[str, Any]) -> str:
     parts = [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in schemes.items()]
     text = f"The agent is off by {', '.join(parts)} (RMSE)"
     diverged = [_words(name) for name, scores in schemes.items() if scores["diverged"]]
-    return text + (f"; diverged with {', '.join(diverged)}." if diverged else ".")
+    lost = [
+        _words(name) for name, s in schemes.items() if not s["diverged"] and s["true_loss"] and s["true_loss"]["lost"]
+    ]
+    text += f"; diverged with {', '.join(diverged)}" if diverged else ""
+    return text + (f"; lost with {', '.join(lost)}." if lost else ".")
 
 
 def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> str:
@@ -96,8 +101,10 @@ def _lost(scores: Mapping[str, Any]) -> Iterator[str]:
     if lost["times"]:
         often = "once, after" if lost["times"] == 1 else f"{lost['times']} times, first after"
         yield f"held itself for lost {often} {lost['first_s']:.1f} s: {words_of_loss(lost)}"
-    elif is_unnoticed(scores):
+    if is_unnoticed(scores):
         yield UNNOTICED
+    elif scores["true_loss"] and scores["true_loss"]["silent"]:
+        yield words_of_silence(scores)
 
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:

@@ -51,8 +51,10 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     ]
     shares = [[share_text(s["association"][name]) for name in ("precision", "recall")] for s in schemes]
     rows += [
-        ["posterior bound of the agent", *(_bound(s, "") for s in schemes)],
-        ["the same, relative to its start", *(_bound(s, "relative_") for s in schemes)],
+        ["posterior bound of the agent", *(_fine(s["bound_m"]) for s in schemes)],
+        ["agent over it", *(_over(s, "") for s in schemes)],
+        ["bound relative to the start", *(_fine(s["relative_bound_m"]) for s in schemes)],
+        ["agent over it, relative to its start", *(_over(s, "relative_") for s in schemes)],
         ["NEES per degree of freedom", *(_number(s["nees_per_dof"]) for s in schemes)],
         ["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)],
         ["association: precision, recall", *map(", ".join, shares)],
@@ -111,13 +113,17 @@ def _lost(loss: Mapping[str, Any] | None) -> str:
     return f"from {loss['lost_at_s']:.1f} s on{', silently' if loss['silent'] else ''}" if loss["lost"] else "no"
 
 
-def _bound(scores: Mapping[str, Any], name: str) -> str:
-    """Cell of a terminal table: a bound on the agent's error, absolute or `relative_`, and how many of it the error
-    is."""
+def _over(scores: Mapping[str, Any], name: str) -> str:
+    """Cell of a terminal table: the agent's error over its bound, absolute or `relative_`."""
     least, error = scores[f"{name}bound_m"], scores[f"{name}rmse_m"]
-    if not least:
+    return f"{error / least:.1f}" if least and error is not None else "-"
+
+
+def _fine(value: float | None) -> str:
+    """Cell of a terminal table: a bound in centimetres, or in millimetres below one."""
+    if not value:
         return "-"
-    return _metres(least) if error is None else f"{_metres(least)}, RMSE {error / least:.1f} times that"
+    return f"{1000.0 * value:.2f} mm" if value < 0.01 else _metres(value)
 
 
 def _number(value: float | None) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
@@ -32,14 +32,17 @@ def draw_agent_error(result: SlamResult) -> Figure:
             colour, shown = scheme_colour(name), 100.0 * np.maximum(error, LEAST_ERROR)
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
             handles += axis.plot(time, shown, color=colour, lw=1.6, label=label)
-            axis.plot(time, 100.0 * np.maximum(believed, LEAST_ERROR), color=colour, lw=1.0, ls="--", alpha=0.7)
+            believed = np.where(believed > 0.0, np.maximum(believed, LEAST_ERROR), np.nan)  # who knows all has none
+            axis.plot(time, 100.0 * believed, color=colour, lw=1.0, ls="--", alpha=0.7)
             lost = np.array([outcome == StepOutcome.DIVERGED for outcome in scheme.outcome], dtype=np.bool_)
             axis.plot(time[lost], shown[lost], color=colour, ls="none", marker="x", ms=6.0)
             crosses |= bool(lost.any())
         axis.set(xlabel="time [s]", ylabel="agent position error [cm]", yscale="log")
         axis.set_title("How far off the agent is, and how far off it believes to be", weight="bold")
         axis.set_xlim(*time_limits(time))
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        plain = FuncFormatter(lambda value, _: f"{value:g}")
+        axis.yaxis.set_major_formatter(plain)
+        axis.yaxis.set_minor_formatter(NullFormatter() if np.ptp(np.log10(axis.get_ylim())) > 1.0 else plain)
         more = [Line2D([], [], color="#555555", lw=1.0, ls="--", label="the filter's own σ")]
         if crosses:
             more += [Line2D([], [], color="#555555", ls="none", marker="x", label="held itself for lost")]

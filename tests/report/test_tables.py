@@ -59,8 +59,9 @@ def test_the_shape_of_the_path_and_what_was_associated_have_rows_of_their_own():
     assert table["agent, path aligned"] == ["0.4 cm", "-"]
     assert table["agent, relative to its start"] == ["0.6 cm", "-"]
     assert table["agent, largest error"] == ["3.0 cm", "3.0 cm"]
-    assert table["posterior bound of the agent"] == 2 * ["1.0 cm, RMSE 2.0 times that"]
-    assert table["the same, relative to its start"] == ["0.2 cm, RMSE 3.0 times that", "0.2 cm"]
+    assert (table["posterior bound of the agent"], table["agent over it"]) == (2 * ["1.0 cm"], 2 * ["2.0"])
+    assert table["bound relative to the start"] == 2 * ["2.00 mm"]
+    assert table["agent over it, relative to its start"] == ["3.0", "-"]
     assert table["NEES per degree of freedom"] == ["0.83", "0.83"]
     assert table["association: precision, recall"] == ["90%, 40%", "90%, 40%"]
     assert table["slower than its budget"] == ["no step", "no step"]
@@ -73,16 +74,25 @@ def test_a_scheme_that_strayed_by_less_than_half_a_metre_is_lost_all_the_same():
         "silent": _scheme() | {"true_loss": lost | {"silent": True}, "largest_m": 0.25},
         "noticed": _scheme() | {"true_loss": lost},
         "far": _scheme() | {"true_loss": lost | {"silent": True}, "diverged": True},
+        "lost twice": _scheme()
+        | {
+            "true_loss": lost | {"silent": True},
+            "largest_m": 0.7,
+            "diverged": True,
+            "lost": {"times": 1, "first_s": 2.0, "causes": {"map": 1}},
+        },
         "good": _scheme(),
         "in slices": _scheme() | {"true_loss": None, "bound_m": None, "relative_bound_m": None, "nees_per_dof": None},
     }
     table = {label: cells for label, *cells in summary_rows({"schemes": schemes})}
-    said = ["from 7.7 s on, silently", "from 7.7 s on", "from 7.7 s on, silently", "no", "-"]
+    silent = "from 7.7 s on, silently"
+    said = [silent, "from 7.7 s on", silent, silent, "no", "-"]
     assert table["lost, relative to its start"] == said
-    assert table["posterior bound of the agent"][-1] == table["NEES per degree of freedom"][-1] == "-"
-    (line,) = silent_loss_lines(schemes)
+    assert table["agent over it"][-1] == table["NEES per degree of freedom"][-1] == "-"
+    line, twice = silent_loss_lines(schemes)
+    assert twice.startswith("lost twice: silently lost")
     assert line.startswith("silent: silently lost from 7.7 s on: off by more than 0.1 m and 5 bounds for 1 s on end")
-    assert line.endswith("by up to 0.25 m")
+    assert line.endswith("its position by up to 0.25 m")
 
 
 def test_a_scheme_that_diverged_without_noticing_is_told_apart_from_one_that_noticed():

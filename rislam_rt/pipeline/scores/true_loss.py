@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats
+from rislam_rt.pipeline.scores.loss_causes import is_unnoticed
 
 LOST, FAR_OVER, LASTING = 0.1, 5.0, 1.0
 """A run is lost once its relative error exceeds `LOST` [m] and `FAR_OVER` relative bounds for `LASTING` [s] on end."""
@@ -34,11 +35,18 @@ def _lasting(flag: Booleans, time: Floats) -> Booleans:
 
 
 def silent_loss_lines(schemes: Mapping[str, Any]) -> list[str]:
-    """Warnings of a run, from the scores of its schemes by name: a line for each that was lost silently by the truth,
-    and not so far off that it counts as diverged, of which another line tells."""
+    """Warnings of a run, from the scores of its schemes by name: a line for each that was silently lost by the truth,
+    unless it diverged without noticing, of which another line tells."""
     return [
-        f"{name}: silently lost from {loss['lost_at_s']:.1f} s on: off by more than {LOST:g} m and {FAR_OVER:g} bounds "
-        f"for {LASTING:g} s on end, relative to its start; by up to {scores['largest_m']:.2f} m"
+        f"{name}: {words_of_silence(scores)}"
         for name, scores in schemes.items()
-        if (loss := scores["true_loss"]) and loss["silent"] and not scores["diverged"]
+        if scores["true_loss"] and scores["true_loss"]["silent"] and not is_unnoticed(scores)
     ]
+
+
+def words_of_silence(scores: Mapping[str, Any]) -> str:
+    """Silent loss of a scheme in words, by its scores."""
+    return (
+        f"silently lost from {scores['true_loss']['lost_at_s']:.1f} s on: off by more than {LOST:g} m and {FAR_OVER:g} "
+        f"bounds for {LASTING:g} s on end, relative to its start; its position by up to {scores['largest_m']:.2f} m"
+    )

@@ -260,13 +260,18 @@ def with_history(found: Rates, before: Rates, motion: Floats) -> Rates:
     kept = before.each(before.kinds.keeps * before.mixed(before.share * before.kept) / close)
     neither = 1.0 - before.each(before.mixed(followed)) - kept
     same = (found.name[:, None] == before.name).all(axis=2)
-    # of several directions it has the one that is nearest to where it came from
-    nearest = np.where(same, found.toward @ before.toward.T, -np.inf).argmax(axis=1)
+    # of several directions each is the one that is nearest to what it was; what has none is new
+    apart = np.where(same, np.linalg.norm(found.toward[:, None] - before.toward, axis=2), np.inf)
+    nearest = apart.argmin(axis=1)
+    is_old = same.any(axis=1) & (apart.argmin(axis=0)[nearest] == np.arange(len(nearest)))
+    old = np.where(is_old, followed[nearest], 0.0)
     owner = np.arange(found.number) if found.owner is None else found.owner
-    alike = ((nearest[:, None] == nearest) & (owner[:, None] == owner)).sum(axis=1)
     first = np.unique(owner, return_index=True)[1]
-    follows, keeps, other = followed[nearest] / alike, kept[nearest][first], neither[nearest][first]
+    keeps, other = kept[nearest][first], neither[nearest][first]
+    # what followed from a direction that it no longer has is not known
     known = same.any(axis=1)[first] * (1.0 - found.mixed(found.share * found.astray))
+    known *= np.minimum(found.mixed(old) + keeps + other, 1.0)
+    follows = np.where(is_old, old, found.kinds.follows)
     sure, new = known / (found.mixed(follows) + keeps + other), 1.0 - known
     return found._replace(known=Kinds(
         found.each(sure) * follows + found.each(new) * found.kinds.follows, sure * keeps + new * found.kinds.keeps,

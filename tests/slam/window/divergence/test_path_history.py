@@ -67,6 +67,36 @@ def test_the_way_tells_at_which_end_of_the_array_a_path_arrives(rate):
     np.testing.assert_allclose(found.mixed(found.kinds.follows) + found.kinds.keeps + found.kinds.other, 1.0)
 
 
+def _reciprocal(options):
+    """Names, owners and directions of a pair of reciprocal paths: each comes back as it went, or leaves as the other
+    arrives (`both`)."""
+    one, other = AHEAD, np.array([-1.0, -1.6, -0.66])
+    both = 0.5 * (one + other)
+    toward = {"back": [one, other], "both": [one, other, both, both]}[options]
+    owner = np.array([0, 1, 0, 1])[: len(toward)]
+    return {"toward": toward, "names": 1 + owner, "owner": owner}, float(both @ MOTION)
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "least"),
+    [("both", "both", 0.9), ("back", "both", 0.15), ("both", "back", 0.2), ("back", "back", 0.0)],
+)
+def test_a_reciprocal_path_is_held_for_the_direction_that_it_had(was, now, least):
+    """The sum of two directions is shorter than twice one, however near. A direction that is new is not known, and a
+    path that followed from one that is asked no more may be anything; one that never followed from its own does not."""
+    ends, rate = _reciprocal(was)
+    before = _rates(ends["toward"], np.full(len(ends["toward"]), rate), ends["names"], owner=ends["owner"])
+    rng, ends = np.random.default_rng(0), _reciprocal(now)[0]
+    for _ in range(20):
+        near = np.array(ends["toward"]) + 0.01 * rng.standard_normal((len(ends["toward"]), 3))
+        silent = _rates(near, np.zeros(len(near)), ends["names"], owner=ends["owner"], astray=0.0)
+        found = egomotion.with_history(silent, before, MOTION)
+        follows = found.mixed(found.kinds.follows)
+        np.testing.assert_allclose(follows + found.kinds.keeps + found.kinds.other, 1.0)
+        assert (follows >= least).all()
+        assert ((follows < 0.05) == (least == 0.0)).all()
+
+
 @pytest.mark.parametrize(("before", "stops"), [((-1.2, -1.16), True), ((0.7, -0.3), False), (None, False)])
 def test_two_paths_that_followed_are_enough_to_tell_of_a_stop(before, stops):
     """The way's last half second, braked by 1.2 m/s^2: where both followed before, but not where they did as they liked
