@@ -28,6 +28,17 @@ def test_a_lost_scheme_is_named(result):
     assert judge_run(result, summary).headline.endswith("diverged with random codes.")
 
 
+def test_a_scheme_that_was_silently_lost_by_less_than_half_a_metre_is_named_and_says_so(result):
+    summary = summarise(result)
+    silent = {"lost": True, "silent": True, "lost_at_s": 7.7}
+    summary["schemes"]["random"] |= {"true_loss": silent, "largest_m": 0.25}
+    said = judge_run(result, summary)
+    assert said.headline.endswith("; lost with random codes.")
+    assert said.lost["random"][0].startswith("silently lost from 7.7 s on")
+    summary["schemes"]["random"]["true_loss"] = silent | {"silent": False}
+    assert judge_run(result, summary).lost["random"] == []
+
+
 def test_why_a_scheme_is_lost_is_said(result):
     summary = summarise(result)
     scores = summary["schemes"]["random"]
