@@ -18,12 +18,13 @@ from rislam_rt.information.position_bound import (
     range_information,
     vertex_gradient,
 )
-from rislam_rt.information.posterior_crlb import posterior_bound
+from rislam_rt.information.posterior_crlb import PosteriorBound, posterior_bound
 from rislam_rt.information.priors import MotionPrior, assumed_std, prior_from_covariance
 
 __all__ = [
-    "GradientMode", "LandmarkModel", "LinearMeasurements", "MotionPrior", "Outcome", "WallSpread", "amplitude_std",
-    "assumed_std", "build_landmark_model", "cosine_information", "delay_gain_information", "eliminate_gains",
-    "fewer_rows", "heard_paths", "map_to_position", "measurement_std", "position_bound", "position_information",
-    "posterior_bound", "prior_from_covariance", "range_information", "steering", "vertex_gradient",
+    "GradientMode", "LandmarkModel", "LinearMeasurements", "MotionPrior", "Outcome", "PosteriorBound", "WallSpread",
+    "amplitude_std", "assumed_std", "build_landmark_model", "cosine_information", "delay_gain_information",
+    "eliminate_gains", "fewer_rows", "heard_paths", "map_to_position", "measurement_std", "position_bound",
+    "position_information", "posterior_bound", "prior_from_covariance", "range_information", "steering",
+    "vertex_gradient",
 ]  # fmt: skip

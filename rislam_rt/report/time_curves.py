@@ -14,9 +14,6 @@ from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.report.style import KIND, scheme_colour, styled
 from rislam_rt.slam.step_info import StepOutcome
 
-LEAST_ERROR = 1e-3
-"""[m] Least error that a logarithmic axis of curves shows."""
-
 
 def draw_agent_error(result: SlamResult) -> Figure:
     """Draw the agent's position error of all schemes against time, on a logarithmic axis, the filter's own standard
@@ -29,11 +26,10 @@ def draw_agent_error(result: SlamResult) -> Figure:
         for name, scheme in reversed(list(result.schemes.items())):
             error = position_errors(scheme.position, result.scene.agent.position)
             believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
-            colour, shown = scheme_colour(name), 100.0 * np.maximum(error, LEAST_ERROR)
+            colour, shown = scheme_colour(name), _on_log_axis(error)
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
             handles += axis.plot(time, shown, color=colour, lw=1.6, label=label)
-            believed = np.where(believed > 0.0, np.maximum(believed, LEAST_ERROR), np.nan)  # who knows all has none
-            axis.plot(time, 100.0 * believed, color=colour, lw=1.0, ls="--", alpha=0.7)
+            axis.plot(time, _on_log_axis(believed), color=colour, lw=1.0, ls="--", alpha=0.7)
             lost = np.array([outcome == StepOutcome.DIVERGED for outcome in scheme.outcome], dtype=np.bool_)
             axis.plot(time[lost], shown[lost], color=colour, ls="none", marker="x", ms=6.0)
             crosses |= bool(lost.any())
@@ -48,6 +44,11 @@ def draw_agent_error(result: SlamResult) -> Figure:
             more += [Line2D([], [], color="#555555", ls="none", marker="x", label="held itself for lost")]
         figure.legend(handles=[*handles[::-1], *more], loc="outside lower center", ncols=5, fontsize=9)
     return figure
+
+
+def _on_log_axis(error: Floats) -> Floats:
+    """Curve [cm] of errors (K,) [m] on a logarithmic axis, which has no zero: who knows all has none."""
+    return np.where(error > 0.0, 100.0 * error, np.nan)
 
 
 def time_limits(time: Floats) -> tuple[float, float]:

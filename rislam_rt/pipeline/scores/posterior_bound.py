@@ -12,6 +12,7 @@ from rislam_rt.information import (
     LandmarkModel,
     LinearMeasurements,
     MotionPrior,
+    PosteriorBound,
     WallSpread,
     assumed_std,
     build_landmark_model,
@@ -108,16 +109,25 @@ def scheme_bound(scene: Scene, paths: Paths, gain: Any, scheme: str, config: Map
     """
     problem = bound_problem(scene, paths, gain, scheme, config)
     model, motion = problem.model, problem.motion
-    bound, from_start = (
-        posterior_bound(problem.rows, scene.agent.time, law, problem.unknown_std)
-        for law in (motion, replace(motion, start_position=0.0))
-    )
+    bound, from_start = bounds_of_motion(problem, scene.agent.time, motion)
     if model is None:
         return SchemeBound(bound.rms, from_start.rms, {}, {})
     landmarks = {name: error for name, error in model.landmark_error(bound.last).items() if name in problem.heard}
     walls = build_walls(scene)
     middle = np.array([walls.surface(number)[0] for number in range(len(walls))]).reshape(-1, 3)
     return SchemeBound(bound.rms, from_start.rms, landmarks, model.wall_error(bound.last, middle))
+
+
+def bounds_of_motion(
+    problem: BoundProblem, time: Floats, motion: MotionPrior
+) -> tuple[PosteriorBound, PosteriorBound]:  # fmt: skip
+    """Posterior bounds of a run under a prior of the motion, over the cycles at `time` (K,) [s]: absolute, and relative
+    to the start. In an unknown room no measurement tells the absolute position: the latter is with the start known
+    exactly."""
+    return (
+        posterior_bound(problem.rows, time, motion, problem.unknown_std),
+        posterior_bound(problem.rows, time, replace(motion, start_position=0.0), problem.unknown_std),
+    )
 
 
 def over_distortion(paths: Paths, settings: Settings) -> Complexes:

@@ -8,11 +8,10 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import Surfaces, root_mean_square
-from rislam_rt.information import posterior_bound
 from rislam_rt.model import Paths, Scene, SchemeResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
-from rislam_rt.pipeline.scores.posterior_bound import bound_problem
+from rislam_rt.pipeline.scores.posterior_bound import bound_problem, bounds_of_motion
 from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
@@ -77,8 +76,7 @@ def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineS
     the start.
 
     The motion model is white acceleration with the RMS that the true motion has, horizontally and vertically, whatever
-    a filter assumes. The height after the start is not known if the agent climbs. In an unknown room no measurement
-    tells the absolute position: the bound relative to the start is that with the start known exactly.
+    a filter assumes. The height after the start is not known if the agent climbs.
     """
     problem = bound_problem(scene, paths, result.gain, result.scheme, spec.model_dump(mode="json"))
     axes, time = problem.motion.axes, scene.agent.time
@@ -88,8 +86,5 @@ def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineS
         motion = replace(motion, acceleration=root_mean_square(push[:, :axes]))
     if len(push) and axes == 2:
         motion = replace(motion, axes=3, climb=root_mean_square(push[:, 2]))
-    found = [
-        posterior_bound(problem.rows, time, law, problem.unknown_std).rms
-        for law in (motion, replace(motion, start_position=0.0))
-    ]
-    return found[0], found[1]
+    bound, relative = bounds_of_motion(problem, time, motion)
+    return bound.rms, relative.rms
