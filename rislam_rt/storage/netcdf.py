@@ -1,7 +1,7 @@
 """NetCDF files: encoding of named arrays with dimensions, units and meanings, writing whole or not at all, reading."""
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,6 +105,41 @@ def _load(path: Path) -> "xr.Dataset":
 
 
 @cache
+def _read_once() -> Any:
+    """Class of data sets of a file that is only read: attributes, of which h5netcdf asks again and again, and names are
+    read once."""
+    import h5py
+
+    class AttributesOnce(h5py.AttributeManager):  # type: ignore[misc]
+        def __init__(self, parent: Any) -> None:
+            super().__init__(parent)
+            self.found: dict[str, Any] = {}
+
+        @cached_property
+        def names(self) -> tuple[str, ...]:
+            return tuple(super().__iter__())
+
+        def __iter__(self) -> Iterator[str]:
+            return iter(self.names)
+
+        def __contains__(self, name: object) -> bool:
+            return name in self.names
+
+        def __getitem__(self, name: str) -> Any:
+            if name not in self.found:
+                self.found[name] = super().__getitem__(name)
+            return self.found[name]
+
+    class ReadOnce(h5py.Dataset):  # type: ignore[misc]
+        __module__ = h5py.Dataset.__module__  # by which h5netcdf knows whose data set it is
+        attrs = cached_property(AttributesOnce)
+        maxshape = cached_property(h5py.Dataset.maxshape.fget)
+        name = cached_property(h5py.Dataset.name.fget)
+
+    return ReadOnce
+
+
+@cache
 def _opened_once() -> Any:
     """Class of HDF5 files in which every object is opened once: h5netcdf opens a variable anew each time that it asks
     for its shape, type or storage, which is most of the time that a small file takes."""
@@ -114,15 +149,25 @@ def _opened_once() -> Any:
         def __init__(self, *given: Any, **options: Any) -> None:
             super().__init__(*given, **options)
             self.opened: dict[str, Any] = {}
+            self.by_id: dict[Any, Any] = {}
+            self.reads = self.mode == "r"
 
         def __getitem__(self, name: Any) -> Any:
             if not isinstance(name, str):
-                return super().__getitem__(name)
+                of = self.by_id.get(h5py.h5r.dereference(name, self.id)) if self.by_id else None
+                return super().__getitem__(name) if of is None else of
             if name == "/":
                 return self  # through which h5netcdf deletes
             if (path := "/" + name.lstrip("/")) not in self.opened:
-                self.opened[path] = super().__getitem__(path)
+                found = super().__getitem__(path)
+                if self.reads and isinstance(found, h5py.Dataset):
+                    found = self.by_id[found.id] = _read_once()(found.id, readonly=True)
+                self.opened[path] = found
             return self.opened[path]
+
+        def create_dataset(self, name: str, *given: Any, **options: Any) -> Any:
+            made = self.opened["/" + name.lstrip("/")] = super().create_dataset(name, *given, **options)
+            return made
 
         def __delitem__(self, name: str) -> None:
             super().__delitem__(name)
@@ -130,6 +175,7 @@ def _opened_once() -> Any:
 
         def close(self) -> None:
             self.opened.clear()
+            self.by_id.clear()
             super().close()
 
     return OpenedOnce
