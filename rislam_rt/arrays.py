@@ -69,6 +69,18 @@ def cross(a: ArrayLike, b: ArrayLike) -> Floats:
     return found
 
 
+def distinct_rows(rows: NDArray[Any]) -> tuple[Integers, Integers, Integers]:
+    """Distinct rows (U,) among rows (N, M) of numbers, in lexicographic order: the number of the first that is one, by
+    row (N,) which it is, and how many are (U,). What `np.unique` says along an axis takes several times as long."""
+    order = np.lexsort(rows.T[::-1]) if rows.shape[1] else np.arange(len(rows))
+    ranked, is_new = rows[order], np.ones(len(rows), dtype=np.bool_)
+    is_new[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
+    which = np.empty(len(rows), dtype=np.int64)
+    which[order] = np.cumsum(is_new) - 1
+    begin = np.flatnonzero(is_new)
+    return order[begin], which, np.diff(np.append(begin, len(rows)))
+
+
 def show_point(point: ArrayLike) -> str:
     """Text of an array of three coordinates with four digits, for messages: `(0.5, 0.7, 0.5)`."""
     return f"({', '.join(f'{value:.4g}' for value in np.asarray(point))})"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, cross
+from rislam_rt.arrays import Booleans, Floats, Integers, cross, distinct_rows
 from rislam_rt.geometry.triangles import edge_ends, triangle_edges, triangle_planes
 from rislam_rt.model import Scene
 
@@ -111,8 +111,8 @@ def _outline(triangles: Floats, direction: Floats) -> Floats:
     ahead = np.repeat(normal @ direction > 0.0, 3)
     edges = triangle_edges(triangles)
     ends = edge_ends(edges)
-    _, first, which, count = np.unique(ends, axis=0, return_index=True, return_inverse=True, return_counts=True)
-    turned = np.bincount(which.ravel(), weights=ahead)
+    first, which, count = distinct_rows(ends)
+    turned = np.bincount(which, weights=ahead)
     return edges[first[(count == 1) | ((turned > 0) & (turned < count))]]
 
 

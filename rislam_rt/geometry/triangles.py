@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, cross
+from rislam_rt.arrays import Booleans, Floats, Integers, cross, distinct_rows
 from rislam_rt.geometry.angles import unit
 
 
@@ -51,7 +51,7 @@ def edge_ends(edges: Floats) -> Integers:
 
     Corners count as the same when they agree to a nanometre.
     """
-    _, corner = np.unique(np.round(edges.reshape(-1, 3), 9), axis=0, return_inverse=True)
+    corner = distinct_rows(np.round(edges.reshape(-1, 3), 9))[1]
     return np.sort(corner.reshape(-1, 2), axis=1)
 
 
@@ -61,7 +61,7 @@ def outline_edges(triangles: Floats, wall: Integers | None = None) -> Floats:
     edges = triangle_edges(triangles)
     owner = np.zeros(len(edges), dtype=np.int64) if wall is None else np.repeat(wall, 3)
     key = np.column_stack([owner, edge_ends(edges)])
-    _, index, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    index, _, count = distinct_rows(key)
     return edges[index[count == 1]]
 
 

@@ -2,7 +2,9 @@
 
 import platform
 from collections.abc import Mapping, MutableMapping
+from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
 from typing import NamedTuple
@@ -246,11 +248,16 @@ def library_versions() -> dict[str, str]:
     from rislam_rt import __version__
 
     found = {"rislam-rt": __version__, "python": platform.python_version()}
+    return found | _installed()
+
+
+@cache
+def _installed() -> dict[str, str]:
+    """Versions of those of the libraries that are installed, looked up once: it reads their files."""
+    found = {}
     for name in LIBRARIES:
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, join_rows, take_rows
+from rislam_rt.arrays import Booleans, Floats, Integers, distinct_rows, join_rows, take_rows
 from rislam_rt.channel.image_source.antennas import LegEnds
 from rislam_rt.channel.image_source.fresnel import Coatings
 from rislam_rt.channel.image_source.leg_candidates import SequenceSearch, candidate_rows
@@ -114,8 +114,9 @@ def _legs(
     columns: list[Integers] = []
     parts: list[tuple[Integers, Integers, ImageRays]] = []
     for rays in found:
-        unique, column = np.unique(rays.walls, axis=0, return_inverse=True)
-        parts.append((rays.cycle, column.ravel() + sum(len(c) for c in columns), rays))
+        first, column, _ = distinct_rows(rays.walls)
+        unique = rays.walls[first]
+        parts.append((rays.cycle, column + sum(len(c) for c in columns), rays))
         columns.append(np.pad(unique, ((0, 0), (0, depth - unique.shape[1])), constant_values=-1))
     walls = np.concatenate(columns) if columns else np.zeros((0, depth), dtype=np.int64)
     count = len(walls)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, row_blocks
+from rislam_rt.arrays import Booleans, Floats, Integers, distinct_rows, row_blocks
 from rislam_rt.channel.image_source.wall_rectangles import Rectangles, bounding_rectangles
 from rislam_rt.channel.occluders import Occluders
 from rislam_rt.channel.walls import Walls
@@ -158,7 +158,7 @@ def build_facets(walls: Walls) -> WallFacets:
     first = np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls) + 1))
     edge_normal, edge_offset = edge_planes(corners)
     points = corners.reshape(-1, 3)
-    extent, distinct = np.zeros((2, len(walls))), np.unique(points, axis=0)
+    extent, distinct = np.zeros((2, len(walls))), points[distinct_rows(points)[0]]
     for rows in row_blocks(len(walls), len(points)):
         distance = walls.normal[rows] @ distinct.T - walls.offset[rows, None]
         extent[:, rows] = distance.min(axis=1), distance.max(axis=1)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, cross
+from rislam_rt.arrays import Booleans, Floats, Integers, cross, distinct_rows
 from rislam_rt.constants import SURFACE_TOLERANCE
 
 SAME = 1e-9
@@ -88,7 +88,7 @@ def _filled(rectangles: Rectangles, corners: Floats, wall: Integers) -> Booleans
     full = 4.0 * rectangles.sizes[0] * rectangles.sizes[1]
     whole = np.abs(area - full) <= SAME * full
     mine = np.flatnonzero(whole[wall])
-    _, corner = np.unique(np.round(corners[mine].reshape(-1, 3), 9), axis=0, return_inverse=True)
+    corner = distinct_rows(np.round(corners[mine].reshape(-1, 3), 9))[1]
     corner = corner.reshape(-1, 3)
     ends = np.sort(np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2), axis=-1)
     owner = np.repeat(wall[mine], 3)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers, distinct_rows
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.measurement_log import ArrayEnds, Log
 
@@ -74,7 +74,9 @@ def _reciprocal(log: Log, ends: ArrayEnds, apart: Floats) -> Integers:
     order = np.lexsort((length, cycle))
     near = [np.stack([order[:-step], order[step:]]) for step in range(1, 1 + BETWEEN)]
     found = np.concatenate([ends.which[both[:, alike(*both)]].T for both in near])
-    pairs, times = np.unique(np.sort(found, axis=1), axis=0, return_counts=True)
+    pairs = np.sort(found, axis=1)
+    first, _, times = distinct_rows(pairs)
+    pairs = pairs[first]
     most = np.bincount(ends.which, minlength=len(ends.owner))[pairs].max(axis=1)
     pairs = pairs[2 * times > most]
     return np.concatenate([pairs, pairs[:, ::-1]])

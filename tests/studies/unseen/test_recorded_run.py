@@ -22,8 +22,8 @@ from rislam_rt.shipped import find_pipeline, find_room
 from rislam_rt.studies.unseen import recorded_run
 from rislam_rt.studies.unseen.score import OVER_TIME
 
-CYCLES, SLICED = 20, 14
-"""What is a landmark of a run is heard in twenty cycles; births come sooner."""
+CYCLES = 14
+"""The first births come in the twelfth cycle."""
 SETTINGS = (
     "channel=image_source", f"cycles={CYCLES}", "depth=1", "receiver.estimator=bound", 'schemes=["random", "no_ris"]',
 )  # fmt: skip
@@ -112,13 +112,13 @@ def test_progress_is_told_and_a_replay_that_strays_is_not_taken_for_the_run(
 
 def test_a_run_in_slices_is_recorded_as_a_whole(room: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(slices, "SLICE", 8)
-    spec = load_spec(find_pipeline("trace_then_slam"), [*SETTINGS[:-1], f"cycles={SLICED}", 'schemes=["random"]'])
+    spec = load_spec(find_pipeline("trace_then_slam"), [*SETTINGS[:-1], 'schemes=["random"]'])
     with open_run(tmp_path / "long", run_identity(spec, room)) as store:
         run_long(room, spec, store, rng=np.random.default_rng(7), jobs=1, progress=lambda *_: None)
     result = read_whole(tmp_path / "long")
     for one in recorded_run.recorded_schemes(result, tmp_path / "long"):
         assert one.apart == 0.0
-        assert len(one.recording.inputs.time) == len(one.recording.truth.bound) == SLICED
+        assert len(one.recording.inputs.time) == len(one.recording.truth.bound) == CYCLES
         assert one.recording.scores["births"] > 0
         found = result.schemes[one.recording.scheme].position
         error = np.linalg.norm(found - one.recording.truth.position, axis=1)

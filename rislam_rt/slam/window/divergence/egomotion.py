@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats, Integers, distinct_rows
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence.length_rates import Kinds, Rates
 
@@ -192,7 +192,7 @@ def _agreed_by_two(found: Rates, told: Floats) -> tuple[Floats, Floats]:
     (S,)."""
     first, second = _pairs(len(found.rate))
     if found.owner is not None:  # of a reciprocal pair both have the same sum of directions
-        one = np.unique(found.toward, axis=0, return_index=True)[1]
+        one = distinct_rows(found.toward)[0]
         first, second = one[_pairs(len(one))[0]], one[_pairs(len(one))[1]]
     (along, across, _), aim = found.toward.T, found.rate - found.toward[:, 2] * told[2]
     det = along[first] * across[second] - across[first] * along[second]
@@ -246,8 +246,8 @@ def _likelihoods(found: Rates, velocity: Floats, climb: Floats | float) -> tuple
         narrow = 1.0 / (variance + (found.turning**2 + 4.0 / 3.0 * (square + rise)))
         still = np.exp(-0.5 * found.whole**2 * narrow) * np.sqrt(narrow / (2.0 * np.pi))
         other = found.astray * other + (1.0 - found.astray) * still
-    kept, other = found.mixed(found.share * found.kept), found.mixed(found.share * other)
-    return close + found.kinds.keeps * kept + found.kinds.other * other, likely, precision
+    other = found.mixed(found.share * other)
+    return close + found.kinds.keeps * found.mixed_kept + found.kinds.other * other, likely, precision
 
 
 def with_history(found: Rates, before: Rates, motion: Floats) -> Rates:
@@ -257,7 +257,7 @@ def with_history(found: Rates, before: Rates, motion: Floats) -> Rates:
     assert before.name is not None
     close, likely, _ = (every[..., 0, :] for every in _likelihoods(before, motion[None, :2], motion[2]))
     followed = likely.sum(axis=0) / before.each(close)
-    kept = before.each(before.kinds.keeps * before.mixed(before.share * before.kept) / close)
+    kept = before.each(before.kinds.keeps * before.mixed_kept / close)
     neither = 1.0 - before.each(before.mixed(followed)) - kept
     same = (found.name[:, None] == before.name).all(axis=2)
     # of several directions each is the one that is nearest to what it was; what has none is new

@@ -76,7 +76,13 @@ class Rates(_PlainRates):
 
     def mixed(self, value: Floats) -> Floats:
         """Sums (..., T) of values (..., E) over the directions that a track or path may have."""
-        return value if self.owner is None else np.asarray(value @ (self.owner[:, None] == np.arange(self.number)))
+        return value if self.owner is None else np.asarray(value @ self._belongs)
+
+    @cached_property
+    def _belongs(self) -> Floats:
+        """(E, T) 1 where a direction is one of the track or path."""
+        assert self.owner is not None
+        return (self.owner[:, None] == np.arange(self.number)).astype(np.float64)
 
     @cached_property
     def share(self) -> Floats:
@@ -100,6 +106,11 @@ class Rates(_PlainRates):
     def kept(self) -> Floats:
         """(E,) densities of the rates were they of lengths that stay as they are."""
         return np.exp(-0.5 * self.whole**2 / self.variance) / np.sqrt(2.0 * np.pi * self.variance)
+
+    @cached_property
+    def mixed_kept(self) -> Floats:
+        """(T,) these densities by track or path, over its directions."""
+        return self.mixed(self.share * self.kept)
 
 
 class Heard(NamedTuple):
