@@ -5,6 +5,15 @@ import gc
 import pytest
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are made and saved, and their canvas stays blank: for who asks whether a file is there, of a figure that
+    another test draws."""
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr(Figure, "draw", lambda *_: None)
+
+
 def _is_whole(config: pytest.Config) -> bool:
     """Whether all tests are asked for, in no order of the caller's."""
     return config.args_source is config.ArgsSource.TESTPATHS

@@ -123,7 +123,7 @@ def test_a_panels_delay_spread_is_warned_of_once(run):
     assert words not in run("run", PIPELINE, *SHORT, *wide, "--set", "cycles=2", "--set", 'schemes=["no_ris"]')[2]
 
 
-def test_run_report_and_json(run, tmp_path, monkeypatch):
+def test_run_report_and_json(run, tmp_path, monkeypatch, undrawn):
     one = ("--set", 'schemes=["random"]')
     code, out, _ = run("run", PIPELINE, *SHORT, *one, "--json", "run.json", "--out", "mine")
     assert code == 0

@@ -8,19 +8,21 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.adviser import link_budget
+from rislam_rt.adviser import forecast_codes, link_budget
 
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
 @pytest.fixture
 def check(run, monkeypatch):
-    """The command; it looks at three places of the way, which are the columns of its table, instead of fifteen."""
-    monkeypatch.setattr(link_budget, "survey", partial(link_budget.survey, places=3))
+    """The command; it looks at one place of the way instead of fifteen, and reckons with two random codes."""
+    monkeypatch.setattr(link_budget, "survey", partial(link_budget.survey, places=1))
+    monkeypatch.setattr(forecast_codes, "RANDOM_CODES", 2)
     return lambda *arguments: run("check", *arguments)
 
 
-def test_a_panel_that_cannot_be_heard_is_said_so_with_the_mend(check, tmp_path):
+def test_a_panel_that_cannot_be_heard_is_said_so_with_the_mend(check, tmp_path, monkeypatch):
+    monkeypatch.setattr(link_budget, "survey", partial(link_budget.survey, places=3))  # the columns of its table
     arguments = ("paper_room", "--set", "radio.reference_snr_db=-12", "--json", "c.json", "--picture", "map.png")
     code, out, _ = check(*arguments)
     assert code == 0

@@ -190,7 +190,7 @@ def test_verdict_names_the_distances_where_an_order_fails(curves):
     assert "- optimised above the sphere: at none of 4 places" in findings_of(above, "tang")
 
 
-def test_compare_writes_the_page_of_its_functions(run, tmp_path):
+def test_compare_writes_the_page_of_its_functions(run, tmp_path, undrawn):
     code, out, _ = run(COMPARE, "poses=3", BOX, more=("--out", "docs", "--jobs", 1))
     assert code == 0
     assert "unexplained" in out
