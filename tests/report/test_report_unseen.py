@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rislam_rt.evaluate import share_interval
+from rislam_rt.evaluate import Interval, share_interval
 from rislam_rt.input_messages import share_text
 from rislam_rt.report.markdown import percent
 from rislam_rt.report.terminal_tables import print_cards
-from rislam_rt.report.unseen import write_unseen
+from rislam_rt.report.unseen import score_cards, write_unseen
 from rislam_rt.report.unseen.page import COLUMNS, ROWS, about_lines
 from rislam_rt.report.unseen.score_cards import by_series, card, class_cards, cycle_times, read_runs
 from rislam_rt.studies.unseen import UnseenSpec
@@ -98,7 +98,9 @@ def test_wilson_interval_against_its_formula_at_the_ends_and_in_the_middle() -> 
         assert (0.3 - p) ** 2 == pytest.approx(z2 * p * (1.0 - p) / 10)
 
 
-def test_files_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_of_a_study(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the range for the interval, which takes a hundred draws of a thousand: the test above looks at it."""
+    monkeypatch.setattr(score_cards, "bootstrap", lambda data, **_: Interval(*np.quantile(data, [0.5, 0.0, 1.0])))
     spec = UnseenSpec.model_validate({"kind": "unseen", "name": "x", "rooms": 7})
     timings = [{"ident": "0-a-13", "timing": {"optimized": {"cycle_s": 0.002}}}]
     page = write_unseen([*rows(), Row(rows()[0].cell, "missing", "", {})], spec, RECORD, tmp_path, tests=3,

@@ -23,7 +23,7 @@ from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.smoother import direction_priors, window_features, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 
-ROOM, COUNT, STD, SPEED_STD = Path(__file__).parents[3] / "scenes" / "paper_room", 60, np.radians(3.0), 0.01
+ROOM, COUNT, STD, SPEED_STD = Path(__file__).parents[3] / "scenes" / "paper_room", 45, np.radians(3.0), 0.01
 CONFIG = SlamConfig(filter="window", use_vt=True, heading="estimated")
 
 
