@@ -106,7 +106,7 @@ def test_a_jump_is_said_and_landed_from(seed: int) -> None:
 
 @pytest.mark.parametrize("heading", [pytest.param("known", marks=pytest.mark.slow), "estimated"])
 def test_a_picture_that_moves_while_no_time_passes_is_said(heading: str) -> None:
-    """No estimate can follow: what does not take any time is no motion. Within six cycles, of which it is the fourth."""
+    """No estimate can follow: what does not take any time is no motion. Said in the fourth cycle."""
     case = hard.draw_case("no time passes", 4, "window", most=12)
     config = hard.SlamConfig(filter="window", heading=heading)
     assert hard.run_case(case._replace(config=config, cycles=case.cycles[:6])).said

@@ -124,7 +124,9 @@ def _around(start: Floats, end: Floats, triangles: Floats) -> Integers:
 def _depth(points: Floats, edges: tuple[Floats, Floats], triangle: Integers) -> Floats:
     """Query to a mesh: distance (S,) [m] of points (S, 3) from their triangle's nearest edge, positive inside."""
     inward, offset = edges
-    return (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).min(axis=1, initial=np.inf)
+    first, second, third = (np.einsum("sei,si->se", inward[triangle], points) - offset[triangle]).T
+    # along so short an axis, the minimum takes thrice as long
+    return np.asarray(np.minimum(np.minimum(first, second), third))
 
 
 def _joined(found: list[tuple[Integers, Integers]]) -> tuple[Integers, Integers]:
