@@ -10,5 +10,5 @@ from rislam_rt.adviser import forecast_codes
 @pytest.fixture(scope="module", autouse=True)
 def few_random_codes() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(forecast_codes, "RANDOM_CODES", 4)
+        patch.setattr(forecast_codes, "RANDOM_CODES", 2)
         yield

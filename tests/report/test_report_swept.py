@@ -105,7 +105,7 @@ def test_gains_come_from_pairs_and_so_have_no_width_where_all_luck_is_shared(fig
         assert gain["lower_by_m"] > 0.0
 
 
-def test_failures_are_counted_and_never_dropped(tmp_path):
+def test_failures_are_counted_and_never_dropped(tmp_path, undrawn):
     found = snr_rows()
     found[0] = Row(found[0].cell, "died", "its process ended", {})
     broken = dict(found[1].result["schemes"])

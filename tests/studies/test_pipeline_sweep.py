@@ -186,16 +186,16 @@ def test_picture_shows_a_line_for_each_scheme(swept):
 def test_a_sweep_counts_what_is_lost_and_keeps_what_was_said(capsys):
     """A start told right, and one told wrong by two metres and two metres a second; the cells in this process."""
     settings = ("channel=image_source", "cycles=10", "depth=1", "receiver.estimator=bound", 'schemes=["no_ris"]')
-    sweep = slam_sweep(PIPELINE, settings, ["told.start_scale=1,200"], repeat=2)
+    sweep = slam_sweep(PIPELINE, settings, ["told.start_scale=1,200"], repeat=1)
     cells = build_cells(sweep)
     rows = [Row(cell, DONE, "", run_cell({**cell.settings, **sweep.local}, cell.seed)) for cell in cells]
     said = [row.result["schemes"]["no_ris"]["outcomes"].get("diverged", 0) > 0 for row in rows]
     assert said == [cell.point["told.start_scale"] == 200.0 for cell in cells]
     scores = score_rows(rows)
-    assert [score.diverged for score in scores] == [0, 2]
+    assert [score.diverged for score in scores] == [0, 1]
     print_sweep(scores)
     lines = [line.split("│") for line in capsys.readouterr().out.splitlines() if "no_ris" in line]
-    assert [[cell.strip() for cell in line[-4:-1]] for line in lines] == [["2", "0", "0"], ["2", "2", "0"]]
+    assert [[cell.strip() for cell in line[-4:-1]] for line in lines] == [["1", "0", "0"], ["1", "1", "0"]]
 
 
 def test_more_repetitions_and_values_are_added_to_those_that_ran():

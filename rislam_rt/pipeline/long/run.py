@@ -164,8 +164,10 @@ def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: 
     whole = (agent[first:last] for first, last in slices.slice_bounds(len(agent)))
     tracks = {"truth.tum": (tum_bytes(motion.time, motion.position, motion.heading) for motion in whole)}
     for name in about["schemes"]:
-        parts = slices.read_parts(store.folder, name, scene, run)
-        tracks[f"estimate_{name}.tum"] = (tum_bytes(p.motion.time, p.scheme.position, p.scheme.heading) for p in parts)
+        parts = zip(slices.slice_bounds(len(agent)), slices.read_schemes(store.folder, name, scene, run), strict=True)
+        tracks[f"estimate_{name}.tum"] = (
+            tum_bytes(agent.time[first:last], part.position, part.heading) for (first, last), part in parts
+        )
     for name, pieces in tracks.items():
         write_pieces(store.folder / name, pieces)
     store.adopt(tracks)

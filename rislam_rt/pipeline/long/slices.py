@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.progress import Tell
 from rislam_rt.storage.netcdf import read_dataset, write_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SLICE = 1000
 """Number of cycles in a slice. In the paper's room the paths of a cycle take 0.1 MB: 0.1 GB a slice."""
@@ -114,17 +117,37 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
     StoreError
         A file is missing or cannot be read.
     """
+    schemes = read_schemes(folder, name, scene, run)
+    for number, ((first, last), scheme) in enumerate(zip(slice_bounds(len(scene.agent)), schemes, strict=True)):
+        paths = _read_slice(folder, number, PATHS_FILE, run, last - first)
+        yield SlicePart(scene.agent[first:last], run_datasets.dataset_to_paths(paths), scheme)
+
+
+def read_schemes(folder: Path, name: str, scene: Scene, run: str) -> Iterator[SchemeResult]:
+    """Results of one scheme alone, slice by slice, as `read_parts` reads them with their paths.
+
+    Raises
+    ------
+    ResultError
+        A file is not as it was written, or of another run.
+    StoreError
+        A file is missing or cannot be read.
+    """
+    file = f"scheme_{name}.nc"
     for number, (first, last) in enumerate(slice_bounds(len(scene.agent))):
-        found = []
-        for what in (PATHS_FILE, f"scheme_{name}.nc"):
-            file = slice_file(folder, number, what)
-            data = read_dataset(file)
-            run_datasets.check_dataset(data, file, run=run, slice=str(number), cycles=last - first)
-            found.append(data)
-        scheme = run_datasets.dataset_to_scheme(found[1])
+        scheme = run_datasets.dataset_to_scheme(_read_slice(folder, number, file, run, last - first))
         if scheme.scheme != name:
-            raise ResultError(f"{file}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
-        yield SlicePart(scene.agent[first:last], run_datasets.dataset_to_paths(found[0]), scheme)
+            place = slice_file(folder, number, file)
+            raise ResultError(f"{place}: holds scheme '{scheme.scheme[:40]}'; run again with another --out")
+        yield scheme
+
+
+def _read_slice(folder: Path, number: int, name: str, run: str, cycles: int) -> "xr.Dataset":
+    """A file of a slice, of that run and of so many cycles."""
+    file = slice_file(folder, number, name)
+    data = read_dataset(file)
+    run_datasets.check_dataset(data, file, run=run, slice=str(number), cycles=cycles)
+    return data
 
 
 def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajectory, Paths, SchemeResult]:

@@ -16,12 +16,12 @@ CHANGES = [f"cycles={CYCLES}", "channel=image_source", "depth=1", "schemes=['no_
 Table = dict[str, list[float]]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def spec() -> PipelineSpec:
     return load_spec(find_pipeline("trace_then_slam"), CHANGES)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def recorded(spec: PipelineSpec) -> tuple[Inputs, np.ndarray]:
     """What the filter was given in a run, and where it held itself to be."""
     recorder, own = Recorder(ESTIMATORS["slam"]), ESTIMATORS["slam"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rislam_rt.adviser import link_budget
+from rislam_rt.adviser import forecast_codes, link_budget
 from rislam_rt.adviser.link_budget import survey
 from rislam_rt.cli.app import app
 from rislam_rt.pipeline import load_spec, run_slam
@@ -83,7 +83,8 @@ def test_a_run_says_what_check_said_of_late_paths() -> None:
 
 
 def test_check_warns_of_them_and_counts_the_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_budget, "survey", partial(survey, places=3))
+    monkeypatch.setattr(link_budget, "survey", partial(survey, places=1))
+    monkeypatch.setattr(forecast_codes, "RANDOM_CODES", 2)
     shown = CliRunner().invoke(app, ["check", str(HALL)]).output
     assert shown.count("warning: ") == 2
     assert shown.count("receiver.max_delay: ") == 1
