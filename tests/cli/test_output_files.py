@@ -63,20 +63,20 @@ def test_what_loses_nothing_is_free(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("pipeline", "file"),
+    ("pipeline", "file", "more"),
     [
-        ("fig4a", "fig4a.csv"),
-        ("fig4b", "fig4b.md"),
-        ("compare_channels", "figures/path_certificate.png"),
-        ("unseen", "unseen.json"),
-        ("train_classifier", "weights.npz"),
+        ("fig4a", "fig4a.csv", ()),
+        ("fig4b", "fig4b.md", ()),
+        ("compare_channels", "figures/path_certificate.png", ("--set", "rooms=[{scene='empty_box', picture=true}]")),
+        ("unseen", "unseen.json", ()),
+        ("train_classifier", "weights.npz", ()),
     ],
 )
-def test_a_studys_page_takes_no_others_place(run, tmp_path, pipeline, file):
+def test_a_studys_page_takes_no_others_place(run, tmp_path, pipeline, file, more):
     theirs = tmp_path / "results" / file
     theirs.parent.mkdir(parents=True)
     theirs.write_text("mine")
-    code, out, err = run("run", ROOT / f"pipelines/{pipeline}.toml", "--out", "results")
+    code, out, err = run("run", ROOT / f"pipelines/{pipeline}.toml", *more, "--out", "results")
     assert code == 2
     assert not out
     assert err == (
