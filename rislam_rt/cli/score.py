@@ -76,8 +76,8 @@ def _recording_file(folder: Path, run: Path, scheme: str) -> Path:
     """Path of the recording of a scheme, checked: the score card is not computed if it cannot be written."""
     from rislam_rt.errors import ConfigError
 
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"--save {folder}: is a file; give a folder")
+    if not folder.is_dir() and (folder.exists() or folder.suffix == ".nc"):
+        raise ConfigError(f"--save {folder}: names a file; give a folder, for one recording of each scheme")
     file = folder / f"{run.resolve().name}_{scheme}.nc"
     check_output(file, "--save ")
     return file

@@ -46,9 +46,10 @@ def test_a_run_in_a_room_of_ones_own_is_scored_and_recorded(run, tmp_path):
     code, out, err = run("score", "mine", "--no-replay", "--save", "kept")
     assert (code, out) == (2, "")
     assert err.startswith("error: --save kept/mine_random.nc: is there already, and not of this program's making")
-    assert run("score", "mine", "--no-replay", "--save", "card.json")[2] == (
-        "error: --save card.json: is a file; give a folder\n"
-    )
+    for name in ("card.json", "one.nc"):
+        assert run("score", "mine", "--no-replay", "--save", name)[2] == (
+            f"error: --save {name}: names a file; give a folder, for one recording of each scheme\n"
+        )
     assert Path("kept/mine_random.nc").read_text() == "of my own"
 
 
