@@ -74,39 +74,40 @@ class Fits(NamedTuple):
 
 
 def try_all(trials: Trials, summary: TrackSummary) -> Fits:
-    """Fit all hypotheses of what caused the tracks by Gauss-Newton; those hopelessly behind after the first step are
-    dropped, at infinite cost."""
-    count = len(trials.track)
-    active = np.arange(count)
-    cost, log_det = np.full(count, np.inf), np.zeros(count)
+    """Fit all hypotheses of what caused the tracks by Gauss-Newton, whose steps are shortened until they lead closer;
+    those hopelessly behind after the first step are dropped, at infinite cost."""
+    count, common = len(trials.track), COMMON + summary.twist.shape[-1]
+    active, cost, log_det = np.arange(count), np.full(count, np.inf), np.zeros(count)
     covariance, held = np.tile(AXES, (count, 1, 1)), np.tile(AXES, (count, 1, 1))
-    trust = np.ones((count, summary.seen.shape[1]))
-    common = COMMON + summary.twist.shape[-1]
     place, error = trials.start.copy(), np.zeros((count, common))
+    normal, step = np.zeros((count, common + 3, common + 3)), np.zeros((count, common + 3))
     for turn in range(STEPS + 1):
-        now = _equations(trials, summary, active, place[active], error[active], trust[active])
-        cost[active] = now.cost
+        at = place[active] + step[active, common:], error[active] + step[active, :common]
+        # all measurements count for the first step: what is far off a first guess may be near to the place
+        now = _equations(trials, summary, active, *at, robust=turn > 0)
+        closer = now.cost <= cost[active]
+        some = active[closer]
+        place[some], error[some], cost[some] = at[0][closer], at[1][closer], now.cost[closer]
+        normal[some] = now.normal[closer]
         if turn == STEPS:
-            last = np.eye(now.normal.shape[-1])[:, common:]
-            covariance[active] = np.linalg.solve(now.normal, last)[:, common:]
-            held[active] = np.linalg.inv(now.normal[:, common:, common:])
-            log_det[active] = np.linalg.slogdet(now.normal)[1]
             break
-        trust[active] = now.trust
-        stiff = now.normal.copy()
+        stiff = now.normal[closer]
         # a length alone leaves a ring of places, along which a straight step leads astray
-        stiff[trials.far[active], common:, common:] += AXES / ASTRAY**2
-        step = np.linalg.solve(stiff, now.slope[..., None])[..., 0]
-        length = np.sqrt(np.vecdot(step[:, common:], step[:, common:]))[:, None]
-        short = np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
-        place[active] += short * step[:, common:]
-        error[active] += short * step[:, :common]
+        stiff[trials.far[some], common:, common:] += AXES / ASTRAY**2
+        step[active] *= 0.25  # a step that led away from what is heard, as near the horizon, went too far
+        step[some] = np.linalg.solve(stiff, now.slope[closer][..., None])[..., 0]
+        length = np.sqrt(np.vecdot(step[some, common:], step[some, common:]))[:, None]
+        step[some] *= np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
         if turn in (1, STEPS - 1):
             best = np.full(len(summary.seen), np.inf)
             np.minimum.at(best, trials.track, cost)
             # an angle that its sine tells takes more steps
             lost = ~((cost < best[trials.track] + 2.0 * CERTAIN) | (trials.even & (turn == 1)))
             active, cost[lost] = np.flatnonzero(~lost), np.inf
+    last = np.eye(common + 3)[:, common:]
+    covariance[active] = np.linalg.solve(normal[active], last)[:, common:]
+    held[active] = np.linalg.inv(normal[active, common:, common:])
+    log_det[active] = np.linalg.slogdet(normal[active])[1]
     evidence = -0.5 * cost - 0.5 * log_det + 1.5 * np.log(2.0 * np.pi)
     share = np.where(trials.mixed, _shares(trials.even, error), 0.0)
     # a component lies between the two that it is made of
@@ -120,19 +121,18 @@ come on top."""
 
 
 class _Equations(NamedTuple):
-    """Normal equations of H fits, their costs, and the weights of their measurements under Student's t."""
+    """Normal equations of H fits, and their costs."""
 
     normal: Floats
     slope: Floats
     cost: Floats
-    trust: Floats
 
 
 def _equations(
-    trials: Trials, summary: TrackSummary, rows: Integers, place: Floats, error: Floats, trust: Floats
+    trials: Trials, summary: TrackSummary, rows: Integers, place: Floats, error: Floats, *, robust: bool
 ) -> _Equations:
     """Normal equations of the next Gauss-Newton step of hypotheses `rows`, at places (H, 3) and errors (H, E) of poses
-    and maps, with their costs."""
+    and maps, with their costs; measurements weigh as Student's t weighs their residuals, if it is to be `robust`."""
     track, wall, pair = trials.track[rows], trials.is_wall[rows], trials.is_pair[rows]
     moving = wall | pair
     tx, rx = summary.tx[track], summary.rx[track]
@@ -167,14 +167,18 @@ def _equations(
     wide = np.concatenate(
         [summary.twist[track], pose @ summary.uncertainty[track], *maps, split, new], axis=-1
     )  # fmt: skip
-    weight = summary.weight[track] * np.sqrt(trust)[..., None]
+    weight = summary.weight[track]
     wide *= weight[..., None]
     # the share stands in the prediction itself, the other errors are linear
     size = wide.shape[-1]
     flat = wide.reshape(len(rows), -1, size)
     told = flat[..., : error.shape[1] - 1] @ error[:, :-1, None]
     left = (summary.seen[track] - seen) * weight - told.reshape(seen.shape)
-    squared = np.vecdot(left, left) / trust
+    squared, tail = np.vecdot(left, left), CONSTANTS.tail
+    if robust:
+        trust = np.sqrt((tail + 3.0) / (tail + squared))
+        left *= trust[..., None]
+        flat *= np.repeat(trust, 3, axis=1)[..., None]
     normal = np.swapaxes(flat, 1, 2) @ flat
     slope = (np.swapaxes(flat, 1, 2) @ left.reshape(len(rows), -1, 1))[..., 0]
     common, own = np.arange(error.shape[1]), np.arange(error.shape[1], size)
@@ -184,9 +188,8 @@ def _equations(
     ridge = (2.0 * CONSTANTS.size) ** -2.0  # what nothing tells of lies in the room
     normal[:, own, own] += np.where(trials.far[rows], 1.0 / np.maximum(np.vecdot(span, span), 0.01), ridge)[:, None]
     slope[:, common] -= error
-    tail = CONSTANTS.tail
     cost = (tail + 3.0) * np.log1p(squared / tail).sum(axis=1) + np.vecdot(error, error)
-    return _Equations(normal, slope, cost, (tail + 3.0) / (tail + squared))
+    return _Equations(normal, slope, cost)
 
 
 def _mirrored(spots: Floats, place: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
