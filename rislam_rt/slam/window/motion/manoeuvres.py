@@ -32,8 +32,10 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     not. What scatter wall returns were held to have is weighed again, as long as it goes on: first by the cycles
     before, so that they tell of the motion what they can, then by all.
     """
-    window = state.window
-    if window.rates is None or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
+    window, scene = state.window, state.scene
+    if window.turns or not scene.use_vt or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
+        return state
+    if not (window.step > 0.0).all():
         return state
     told = motion_agreement.latest_lengths(state)
     if told is None:

@@ -135,6 +135,22 @@ def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypa
     assert len(found) == 3
 
 
+@pytest.mark.parametrize("blind", [None, "turns", "no walls", "told"])
+def test_who_knows_all_that_it_hears_asks_as_well(monkeypatch, blind):
+    """Where the map explains every component no track has a rate, and the explained paths tell of a manoeuvre."""
+    state, asked = about_to_hear(25), []
+    state = state._replace(window=state.window._replace(rates=None))
+    if blind == "turns":
+        state = state._replace(window=state.window._replace(accel=np.zeros((24, 4))))
+    if blind == "no walls":
+        state = state._replace(scene=state.scene._replace(use_vt=False))
+    if blind == "told":
+        state = state._replace(config=replace(CONFIG, motion="told"))
+    monkeypatch.setattr(motion_agreement, "weigh_manoeuvre", lambda *_: asked.append(1) or (-1.0, np.zeros(3)))
+    assert manoeuvres.with_manoeuvre(state) is state
+    assert (len(asked) > 0) == (blind is None)
+
+
 def test_no_path_tells_more_than_that_it_is_another(monkeypatch):
     """Each counts for a rare event at most, for and against, in the cycles that the manoeuvre has lasted."""
     returns, since = iter([np.array([-50.0, -60.0, 2.0, 30.0]), np.array([0.0, -1.0, 1.0, 1.0])]), []
