@@ -14,7 +14,7 @@ from rislam_rt.arrays import Booleans, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.input_messages import share_text
-from rislam_rt.model import PathKind
+from rislam_rt.model import PathKind, Paths
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
 from rislam_rt.scene.findings import Finding, warning_at
 
@@ -31,8 +31,7 @@ def cancelled_return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     paths, settings = looked.paths, looked.settings
     if not settings.slam.use_vt:
         return
-    lone = (paths.landmark < 0) & (np.sum(paths.tx_walls >= 0, axis=1) + np.sum(paths.rx_walls >= 0, axis=1) == 1)
-    single = np.flatnonzero(lone & (paths.kind == PathKind.VT))
+    single = single_returns(paths)
     audible = audible_paths(paths, settings, use_vt=True)[:, single]
     cancel = np.stack([_cancel(looked, cycle, single) & one[:, None] & one for cycle, one in enumerate(audible)])
     stays = np.zeros(cancel.shape, dtype=np.bool_)
@@ -51,6 +50,12 @@ def cancelled_return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
         "filter may take what else it hears for other walls",
         f"lead the way at least {apart:.2g} m off the middle, where they are told apart",
     )  # fmt: skip
+
+
+def single_returns(paths: Paths) -> Integers:
+    """Columns (N,) of the paths that are single returns of walls, for warnings of these."""
+    lone = (paths.landmark < 0) & (np.sum(paths.tx_walls >= 0, axis=1) + np.sum(paths.rx_walls >= 0, axis=1) == 1)
+    return np.flatnonzero(lone & (paths.kind == PathKind.VT))
 
 
 def _cancel(looked: Survey, cycle: int, single: Integers) -> Booleans:

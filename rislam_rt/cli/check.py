@@ -49,9 +49,8 @@ def command(
     """
     from dataclasses import asdict
 
-    from rislam_rt.adviser.cancelled_returns import cancelled_return_warnings
     from rislam_rt.adviser.link_budget import survey
-    from rislam_rt.adviser.merged_returns import merged_return_warnings
+    from rislam_rt.adviser.return_warnings import return_warnings
     from rislam_rt.cli.run import names_schemes
     from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.room.late_paths import late_path_warnings
@@ -78,8 +77,7 @@ def command(
         findings += _run_errors(checked, spec, places, changed, named=names_schemes(spec, file, changed))
         findings += motion_warnings(checked, settings.radio, settings.receiver, spec.budget, places[0])
         findings += late_path_warnings(looked.paths, looked.settings, places[0])
-        findings += cancelled_return_warnings(looked, places[0])
-        findings += merged_return_warnings(looked, places[0])
+        findings += return_warnings(looked, places[0])
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
