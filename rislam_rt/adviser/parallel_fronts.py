@@ -15,33 +15,35 @@ from rislam_rt.input_messages import counted
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
 from rislam_rt.scene.findings import Finding, warning_at
 
-SWERVE = 0.125
-"""Distance [m] between two fronts up to which one is taken for the other: as far as an agent gets aside within half a
-second at 1 m/s^2."""
+LEAST, SWERVE = 0.005, 0.125
+"""Distances [m] between two fronts from which and up to which one is taken for the other, to an agent's harm: a wall is
+known to millimetres, and in half a second an agent gets aside so far, at 1 m/s^2."""
 PARALLEL = np.deg2rad(1.0)
 """Angle [rad] up to which two fronts are parallel: their returns come from directions closer than an array tells."""
 
 
 def parallel_front_warnings(looked: Survey, file: str) -> Iterator[Finding]:
-    """Warning, one for a room, of the parallel fronts farthest apart of those that one may take for each other: walls
-    `SWERVE` apart or less that face the agent alike, of which it hears both along its way; `file` is what the warning
-    names as its place."""
+    """Warning, one for a room, of parallel fronts that one may take for each other, the farthest apart: walls from
+    `LEAST` to `SWERVE` apart that are heard along the way from the same side; `file` is what it names as its place."""
     paths, settings, walls = looked.paths, looked.settings, build_walls(looked.scene)
     single = single_returns(paths)
-    heard = single[audible_paths(paths, settings, use_vt=settings.slam.use_vt)[:, single].any(axis=0)]
-    wall = np.unique(np.maximum(paths.tx_walls.max(axis=1), paths.rx_walls.max(axis=1))[heard])
-    if not settings.slam.use_vt or len(wall) < 2:
+    if not settings.slam.use_vt or not len(single):
         return
-    middle = np.array([walls.surface(int(each))[0] for each in wall])
-    away = walls.normal[wall] @ looked.scene.agent.position[0] - walls.offset[wall]
+    heard = audible_paths(paths, settings, use_vt=True)[:, single]
+    single, heard = single[heard.any(axis=0)], heard[:, heard.any(axis=0)]
+    wall = np.maximum(paths.tx_walls[single].max(axis=1), paths.rx_walls[single].max(axis=1))
+    middle = np.array([walls.surface(int(each))[0] for each in wall]).reshape(-1, 3)
+    away = looked.scene.agent.position @ walls.normal[wall].T - walls.offset[wall]
+    away = np.where(heard, away, 0.0).sum(axis=0) / heard.sum(axis=0)  # where each is heard
     facing = np.sign(away)[:, None] * walls.normal[wall]
     gap = np.abs(np.vecdot(facing[:, None], middle[:, None] - middle))  # of each wall's plane from the others' middles
     alike = (facing @ facing.T > np.cos(PARALLEL)) & (walls.plane[wall][:, None] != walls.plane[wall])
-    gap = np.where(alike & (gap <= SWERVE), gap, 0.0)
+    gap = np.where(alike & (gap >= LEAST) & (gap <= SWERVE), gap, 0.0)
     if not gap.any():
         return
     pair = np.unravel_index(np.argmax(gap), gap.shape)
-    front, behind = (f"'{walls.names[wall[at]]}'" for at in sorted(pair, key=lambda at: abs(away[at])))
+    nearer = sorted(pair, key=lambda at: -float(facing[at] @ middle[at]))
+    front, behind = (f"'{walls.names[wall[at]]}'" for at in nearer)
     apart, others = f"{1e3 * gap[pair]:.0f} mm", int(np.count_nonzero(np.triu(np.maximum(gap, gap.T)))) - 1
     more = f" (and {counted(others, 'other pair')} likewise)" if others else ""
     yield warning_at(

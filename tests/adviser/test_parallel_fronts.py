@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.link_budget import survey
-from rislam_rt.adviser.parallel_fronts import SWERVE, parallel_front_warnings
+from rislam_rt.adviser.parallel_fronts import LEAST, SWERVE, parallel_front_warnings
 from rislam_rt.adviser.return_warnings import return_warnings
 from rislam_rt.model import Reflector
 from rislam_rt.pipeline import load_spec
@@ -18,23 +18,26 @@ ROOT = Path(__file__).parents[2]
 WALL = 4.0
 
 
-def looked(*gaps, start=1.3, turned=0.0, changed=()):
-    """Survey of the empty box with boards so far [m] before the wall at y = 4, from x = `start` [m] on, 0.8 m wide and
-    one above the other, `turned` [rad] about their upper edge; the agent goes from x = 1.0 to 1.6 m."""
+def way(x, y):
+    """Places (15, 3) [m] of the agent's way, at 1.1 m."""
+    return np.column_stack(np.broadcast_arrays(np.atleast_1d(x), np.atleast_1d(y), 1.1))
+
+
+ALONG = way(np.linspace(1.0, 1.6, 15), 2.3)
+
+
+def looked(*boards, place=ALONG, turned=0.0, changed=()):
+    """Survey of the empty box with boards from x to x at y [m], 1.2 m high, `turned` [rad] about their upper edge."""
     scene = load_scene(ROOT / "scenes" / "empty_box")
-    way = replace(
-        scene.agent[:15], position=np.column_stack([np.linspace(1.0, 1.6, 15), np.full(15, 2.3), np.full(15, 1.1)]),
-        heading=np.zeros(15),
-    )  # fmt: skip
-    boards = []
-    for number, gap in enumerate(gaps):
-        low, high = 0.6 + 0.6 * number, 1.2 + 0.6 * number
-        x, y = np.array([start, start + 0.8]), np.array([WALL - gap + turned * (high - low), WALL - gap])
-        corners = np.array([[x[0], y[0], low], [x[1], y[0], low], [x[1], y[1], high], [x[0], y[1], high]])
+    agent = replace(scene.agent[:15], position=place, heading=np.zeros(15))
+    meshes = []
+    for number, (left, right, across) in enumerate(boards):
+        low = across - 1.2 * turned
+        corners = np.array([[left, low, 0.5], [right, low, 0.5], [right, across, 1.7], [left, across, 1.7]])
         faces = np.array([[0, 1, 2], [0, 2, 3]])
-        boards.append(Reflector(f"board{number}", corners, faces, scene.reflectors[0].material))
+        meshes.append(Reflector(f"board{number}", corners, faces, scene.reflectors[0].material))
     settings = build_settings(load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed))
-    return survey(replace(scene, agent=way, reflectors=(*scene.reflectors, *boards)), settings)
+    return survey(replace(scene, agent=agent, reflectors=(*scene.reflectors, *meshes)), settings)
 
 
 def lines(found):
@@ -43,27 +46,46 @@ def lines(found):
 
 @pytest.mark.parametrize("gap", [0.015, 0.12])
 def test_a_board_before_a_wall_is_named(gap):
-    found = looked(gap)
+    found = looked((1.3, 2.1, WALL - gap))
     (line,) = lines(found)
     assert line.startswith(f"scene.toml: reflector: 'board0' stands {1e3 * gap:.0f} mm before 'wall_y4', and both are")
     assert line in [finding.line for finding in return_warnings(found, "scene.toml")]
 
 
 @pytest.mark.parametrize(
-    "found",
+    ("boards", "options"),
     [
-        looked(), looked(SWERVE + 0.01), looked(0.03, start=3.0), looked(0.03, turned=0.05),
-        looked(0.03, changed=["slam.use_vt=false"]),
+        ([], {}), ([(1.3, 2.1, WALL - SWERVE - 0.01)], {}), ([(1.3, 2.1, WALL - LEAST + 0.001)], {}),
+        ([(3.0, 3.8, WALL - 0.03)], {}), ([(1.3, 2.1, WALL - 0.03)], {"turned": 0.05}),
+        ([(1.3, 2.1, WALL - 0.03)], {"changed": ["slam.use_vt=false"]}),
     ],
-    ids=["none", "too far off", "not passed", "not parallel", "who throws wall returns away"],
+    ids=["none", "too far off", "too near", "not passed", "not parallel", "who throws wall returns away"],
 )  # fmt: skip
-def test_no_other_is(found):
-    assert lines(found) == []
+def test_no_other_is(boards, options):
+    assert lines(looked(*boards, **options)) == []
 
 
-def test_the_farthest_of_several_is_named():
-    (line,) = lines(looked(0.03, 0.05))
-    assert "'board0' stands 30 mm before 'wall_y4'" in line or "'board1' stands 50 mm before 'wall_y4'" in line
+def test_the_farthest_of_several_is_named_and_how_many_there_are():
+    (line,) = lines(looked((1.2, 1.35, WALL - 0.03), (1.4, 1.7, WALL - 0.05)))
+    assert "'board1' stands 50 mm before 'wall_y4' (and 2 other pairs likewise), and" in line
+
+
+def test_the_two_faces_of_a_partition_are_heard_from_their_own_sides():
+    """Through the gap beside it the agent comes from the one to the other."""
+    y = np.r_[np.full(5, 1.2), np.linspace(1.4, 2.8, 5), np.full(5, 3.0)]
+    place = way(np.r_[np.linspace(1.0, 1.6, 5), np.full(5, 1.8), np.linspace(1.6, 1.0, 5)], y)
+    faces = looked((0.9, 1.65, 2.0), (0.9, 1.65, 2.1), place=place)
+    assert lines(faces) == []
+    (line,) = lines(looked((0.9, 1.35, 2.0), (1.35, 1.65, 2.05), place=place))  # two boards, before and behind both
+    assert "50 mm before" in line
+
+
+def test_a_room_of_too_many_triangles_for_walls_on_the_way_is_looked_at():
+    found = looked()
+    paths = found.paths
+    none = np.zeros((paths.num_paths, 0), dtype=np.int64)
+    direct = replace(paths, tx_walls=none, rx_walls=none)
+    assert [*return_warnings(found._replace(paths=direct), "scene.toml")] == []
 
 
 def test_the_shipped_rooms_have_none():

@@ -74,7 +74,7 @@ class Fits(NamedTuple):
 
 
 def try_all(trials: Trials, summary: TrackSummary) -> Fits:
-    """Fit all hypotheses of what caused the tracks by Gauss-Newton, whose steps are shortened until they lead closer;
+    """Fit all hypotheses of what caused the tracks by Gauss-Newton, whose steps are shortened if they lead no closer;
     those hopelessly behind after the first step are dropped, at infinite cost."""
     count, common = len(trials.track), COMMON + summary.twist.shape[-1]
     active, cost, log_det = np.arange(count), np.full(count, np.inf), np.zeros(count)
@@ -94,7 +94,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         stiff = now.normal[closer]
         # a length alone leaves a ring of places, along which a straight step leads astray
         stiff[trials.far[some], common:, common:] += AXES / ASTRAY**2
-        step[active] *= 0.25  # a step that led away from what is heard, as near the horizon, went too far
+        step[active] *= 0.25  # one that led away from what is heard, as near the horizon, most often went too far
         step[some] = np.linalg.solve(stiff, now.slope[closer][..., None])[..., 0]
         length = np.sqrt(np.vecdot(step[some, common:], step[some, common:]))[:, None]
         step[some] *= np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
