@@ -242,7 +242,7 @@ FAINTEST = 1.0
 
 
 def identify(tau: Floats, cosines: Floats, gain: Complexes, received: Received, radio: RadioConfig) -> Integers:
-    """Column (N,) of the true path that each estimated component most likely is, -1 for none.
+    """Column (N,) of the true path that each component of the receiver most likely is, -1 for none.
 
     The assignment with the least sum of squared misfits in delay, cosines and amplitude. The scale is the resolution
     cell, not the bound: next to a stronger path a component errs by more than its bound, and is still that path. So it

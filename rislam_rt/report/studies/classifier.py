@@ -161,12 +161,12 @@ def classifier_page(found: Training, spec: ClassifierSpec, figures: Sequence[str
 
 
 def has_keep(found: Training, name: str) -> bool:
-    """Whether a room has any component that the classifier should keep."""
+    """Whether the classifier's page has a row for a room: whether it has any component to keep."""
     return name not in found.sets.test or bool(found.sets.test[name].keep.any())
 
 
 def share_of(found: Training, name: str) -> tuple[float, float]:
-    """Share of all components in the classifier's test, and of those to keep, that a named room has."""
+    """For the classifier's page: share of all components of its test, and of those to keep, that a named room has."""
     room, tested = found.sets.test[name], found.sets.tested
     return float(room.labelled.sum() / tested.labelled.sum()), float(room.keep.sum() / max(tested.keep.sum(), 1))
 
