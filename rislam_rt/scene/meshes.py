@@ -276,7 +276,7 @@ def _document(content: bytes) -> dict[str, Any]:
 
 
 def _num_faces(mesh: Any, accessors: list[Any]) -> int:
-    """Number of triangles of a mesh in a scene's GLB file: a third of its indices, or of its corners where it has none."""
+    """Triangles of a mesh in a scene's GLB file, counted: a third of its indices, or of its corners without any."""
     total = 0
     for part in mesh["primitives"]:
         number = part["indices"] if "indices" in part else part["attributes"]["POSITION"]

@@ -114,7 +114,8 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
 
 
 def _walls(group: Group, scheme: str) -> dict[str, float | None]:
-    """Entry of a sweep's page: walls found at the end, RMS errors, bounds and own std; share of those heard for `HEARD` s in all."""
+    """Entry of a sweep's page: walls found at the end, RMS errors, bounds and own std; share of those heard for
+    `HEARD` s in all."""
     names = group.parts(scheme, "walls")
     angle, offset, own, least, near, audible = (
         _pooled(group, scheme, "walls", names, part)

@@ -70,7 +70,7 @@ def decode(words: Words, step: Floats) -> Floats:
 
 
 def join(x: Any, y: Any, z: Any) -> tuple[Any, Any]:
-    """Pack three signed 21-bit coordinates of the engine's particles into two 32-bit words, in Dr.Jit or numpy arrays."""
+    """Pack three signed 21-bit coordinates of an engine's particles into two 32-bit words, for Dr.Jit or numpy."""
     return (x << 11) | ((z >> 10) & LOW), (y << 11) | ((z & 1023) << 1)
 
 

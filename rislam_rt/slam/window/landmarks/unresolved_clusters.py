@@ -94,8 +94,8 @@ def _with_presence(share: Floats, variance: Floats, presence: Floats) -> tuple[F
 
 
 def _neighbours(place: Floats, strength: Floats, sides: Integers | None) -> tuple[Integers, Integers, Floats]:
-    """Pairs (P,) of unresolved returns at places (R, 3) [cells], the second weaker and in the cell of the first or at its edge,
-    sorted by row, and the largest gap (P,) of each pair along an axis."""
+    """Pairs (P,) of unresolved returns at places (R, 3) [cells], the second weaker and in the cell of the first or at
+    its edge, sorted by row, and the largest gap (P,) of each pair along an axis."""
     # along the first axis a return's neighbours behind it are the next ones, up to the first beyond its edge
     order = np.argsort(place[:, 0], kind="stable")
     axes = place[order].T
