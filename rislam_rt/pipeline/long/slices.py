@@ -124,15 +124,7 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
 
 
 def read_schemes(folder: Path, name: str, scene: Scene, run: str) -> Iterator[SchemeResult]:
-    """Results of one scheme alone, slice by slice, as `read_parts` reads them with their paths.
-
-    Raises
-    ------
-    ResultError
-        A file is not as it was written, or of another run.
-    StoreError
-        A file is missing or cannot be read.
-    """
+    """Results of one scheme alone, slice by slice, as `read_parts` reads them with paths; its errors are the same."""
     file = f"scheme_{name}.nc"
     for number, (first, last) in enumerate(slice_bounds(len(scene.agent))):
         scheme = run_datasets.dataset_to_scheme(_read_slice(folder, number, file, run, last - first))

@@ -33,9 +33,9 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     before, so that they tell of the motion what they can, then by all.
     """
     window, scene = state.window, state.scene
-    if window.turns or not scene.use_vt or state.config.motion != "learnt" or len(window.step) <= LASTED[0]:
+    if window.turns or not scene.use_vt or state.config.motion != "learnt":  # as `rate_factor` has it; told stays told
         return state
-    if not (window.step > 0.0).all():
+    if len(window.step) <= LASTED[0] or not (window.step > 0.0).all():
         return state
     told = motion_agreement.latest_lengths(state)
     if told is None:
