@@ -7,12 +7,14 @@ has any. The captures change their roles for components in the sum.
 """
 
 from functools import lru_cache
+from itertools import permutations
 
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers, take_rows
 from rislam_rt.measurement.components import ReportedComponents
 from rislam_rt.measurement.config import ReceiverConfig
+from rislam_rt.measurement.detection_threshold import detection_threshold
 from rislam_rt.measurement.slot_motion import code_signs, slot_mean
 from rislam_rt.model import RadioConfig
 
@@ -21,8 +23,10 @@ DENSITY = 0.5
 returns come in beside theirs."""
 DYNAMIC_RANGE = np.log(1e3)
 """Range of the log amplitude over which a path's prior is uniform: 60 dB."""
-SHIFTS = 33
+SHIFTS = 128
 """Number of Doppler shifts, evenly up to the largest, over which the likelihood of a leak is averaged."""
+FINE = 1024
+"""Number of them over which it is asked at how many a path stays unheard."""
 MIXTURE = 0.3
 """Relative error of a leak's factor: unresolved paths have not one Doppler shift."""
 BLUR = 0.1
@@ -41,43 +45,72 @@ def panel_probability(
 
     Where there is one panel the second is None.
     """
-    over = np.zeros((len(found.gain), config.num_captures))
-    for own in range(config.num_captures):
-        here = found.capture == own
-        odds = np.zeros((np.count_nonzero(here), config.num_captures))
-        for other in range(config.num_captures):
-            if other != own:
-                factors = leak_factors(radio, config, own, other)
-                sources = take_rows(found, found.capture == other)
-                leak = _leak_odds(take_rows(found, here), sources, factors, radio)
-                odds[:, other] = np.minimum(leak, 1e300)  # a sum of them stays finite
-        total = odds.sum(axis=1)
-        certain = 1.0 / (1.0 + total)
-        over[here] = (1.0 - certain)[:, None] * odds / np.where(total > 0.0, total, 1.0)[:, None]
-        over[here, own] = certain
+    count = config.num_captures
+    leak = np.zeros((len(found.gain), len(found.gain)))
+    for own, other in permutations(range(count), 2):
+        here, there = ((found.capture == each).nonzero()[0] for each in (own, other))
+        factors = leak_factors(radio, config, own, other)
+        odds = _leak_odds(take_rows(found, here), take_rows(found, there), factors, radio)
+        leak[np.ix_(here, there)] = np.minimum(odds, 1e300)  # a sum of them stays finite
+    # of two components one may be what is left of the other, but not each of the other
+    alone = leak.sum(axis=1) == 0.0
+    odds = (leak / (1.0 + leak.sum(axis=1))) @ (found.capture[:, None] == np.arange(count))
+    for own, other in permutations(range(count), 2):
+        rows = alone & (found.capture == own)
+        odds[rows, other] = _unheard_odds(take_rows(found, rows), own, other, radio, config)
+    certain = 1.0 / (1.0 + odds.sum(axis=1))
+    over = certain[:, None] * odds
+    over[np.arange(len(over)), found.capture] = certain
     probability = np.clip(over[:, 1:].max(axis=1), SUREST, 1.0 - SUREST)
     return probability, np.argmax(over[:, 1:], axis=1) if config.panels > 1 else None
 
 
 @lru_cache(maxsize=64)
-def leak_factors(radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0) -> Complexes:
-    """Amplitude ratios (`SHIFTS`,) at which moving paths leak from capture `of` into capture `into`, for the panel's
+def leak_factors(
+    radio: RadioConfig, config: ReceiverConfig, into: int = 1, of: int = 0, shifts: int = SHIFTS
+) -> Complexes:
+    """Amplitude ratios (`shifts`,) at which moving paths leak from capture `of` into capture `into`, for the panel's
     probability.
 
     Both ends ride on the agent, so that a path shortens by twice its speed at most.
     """
-    shift = np.linspace(-1.0, 1.0, SHIFTS) * 2.0 * config.top_speed / radio.wavelength
+    shift = _shifts(shifts)[0] * 2.0 * config.top_speed / radio.wavelength
     signs = code_signs(config.order, config.panels)
     factors = np.asarray(slot_mean(shift, signs[into] * signs[of], config) / slot_mean(shift, signs[0], config))
     factors.flags.writeable = False
     return factors
 
 
+@lru_cache(maxsize=4)
+def _shifts(count: int) -> tuple[Floats, Floats]:
+    """Doppler shifts (C,) of paths, evenly within 1 of zero, and their probabilities (C,), for the panel's probability:
+    any speed up to the largest, and any direction, are alike."""
+    shift = (2.0 * np.arange(count) + 1.0 - count) / count
+    weight = -np.log(np.maximum(np.abs(shift), 0.5 / count))
+    return shift, weight / weight.sum()
+
+
+def _unheard_odds(
+    found: ReportedComponents, own: int, other: int, radio: RadioConfig, config: ReceiverConfig
+) -> Floats:
+    """Odds (N,) of each component of capture `own`, beside which nothing is heard, for being the leak of a source of
+    capture `other`, against a path of its own, for the panel's probability: a path that turns by a whole turn within
+    the slot is heard in the wrong capture alone.
+
+    The log amplitude of either is uniform beforehand, so that what counts is how likely the shifts are at which the
+    other capture stays below the threshold.
+    """
+    likely = _shifts(FINE)[1]
+    level = detection_threshold(radio, config) * found.gain_std[:, None] ** 2 / np.abs(found.gain[:, None]) ** 2
+    leaks, leaves = (np.abs(leak_factors(radio, config, *pair, FINE)) ** 2 for pair in ((own, other), (other, own)))
+    return np.asarray(((leaks * level > 1.0) @ likely) / np.maximum((leaves < level) @ likely, likely.min()))
+
+
 def _leak_odds(
     found: ReportedComponents, sources: ReportedComponents, factors: Complexes, radio: RadioConfig
 ) -> Floats:
-    """Odds (N,) of each component for being the leak of another capture's source, against a path of its own, for the
-    panel's probability."""
+    """Odds (N, S) of each component for being the leak of each of another capture's sources, against a path of its own,
+    for the panel's probability."""
     array = radio.array
     cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     gap = found.points[:, None] - sources.points
@@ -89,6 +122,8 @@ def _leak_odds(
     width = (MIXTURE * np.abs(expected)) ** 2 + spacing**2 / 6.0
     spread = found.gain_std[row, None] ** 2 + width[source]
     miss = np.abs(found.gain[row, None] - expected[source]) ** 2
-    leak = np.mean(np.exp(-miss / spread) / (np.pi * spread), axis=-1)
+    leak = (np.exp(-miss / spread) / (np.pi * spread)) @ _shifts(factors.shape[-1])[1]
     own = DENSITY / (2.0 * np.pi * DYNAMIC_RANGE * np.abs(found.gain) ** 2)
-    return np.bincount(row, place[row, source] * leak, minlength=len(place)) / own
+    odds = np.zeros(place.shape)
+    odds[row, source] = place[row, source] * leak / own[row]
+    return odds

@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rislam_rt.arrays import take_rows
 from rislam_rt.channel.doppler import doppler_shift, turn_rate
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure, receive, slot_motion
+from rislam_rt.measurement.components import ReportedComponents
 from rislam_rt.measurement.config import ORDERS
+from rislam_rt.measurement.panel_probability import panel_probability
 from rislam_rt.measurement.slot_motion import code_signs, slot_mean, slot_weights, split_by_code
 from rislam_rt.model import PathKind, RadioConfig
 from rislam_rt.scene import load_scene
@@ -123,3 +126,36 @@ def test_a_mean_over_the_slot_is_taken_once_for_paths_and_captures_that_share_it
     plain, signed = slot_weights(np.array([FASTEST]), SPLIT)
     np.testing.assert_allclose(common.gain / heard.gain, [plain[0], signed[0]])
     np.testing.assert_allclose(difference.gain / heard.gain, [signed[0], plain[0]])
+
+
+@pytest.mark.parametrize("top_speed", [0.5, 1.5])
+def test_probability_of_the_panel_is_the_frequency_with_which_it_was_the_panel(top_speed: float) -> None:
+    """A wall's path or the panel's, of any Doppler shift up to a largest speed's, heard in both captures or in one: at
+    1.5 m/s they turn by up to a whole turn within the slot, and either capture may hold the louder part."""
+    config, rng = replace(SPLIT, top_speed=top_speed), np.random.default_rng(1)
+    told, true = [], []
+    for _ in range(1500):
+        shift = rng.uniform(-1.0, 1.0) * rng.uniform() * 2.0 * top_speed / RADIO.wavelength
+        panel = bool(rng.integers(2))
+        weights = np.ravel(slot_weights(np.array([shift]), config))[:: -1 if panel else 1]
+        noise = rng.standard_normal((2, 2)) @ [1.0, 1j] / np.sqrt(2.0)
+        gain = 10.0 ** rng.uniform(0.0, 3.0) * np.exp(2j * np.pi * rng.uniform()) * weights + noise
+        heard = np.abs(gain) ** 2 > 10.0
+        if not heard.any():
+            continue
+        std = np.array([1e-9, 0.5, 0.5]) / np.abs(gain[:, None])
+        found = ReportedComponents(
+            np.zeros(2, dtype=np.int64), [30e-9, 0.1, 0.2] + std * rng.standard_normal((2, 3)), std, gain, np.ones(2),
+            np.arange(2),
+        )  # fmt: skip
+        probability, _ = panel_probability(take_rows(found, heard), RADIO, config)
+        told.append(probability[np.argmax(np.abs(gain[heard]))])
+        true.append(panel)
+    told, true = np.array(told), np.array(true)
+    for low, high in ((0.0, 0.05), (0.05, 0.3), (0.3, 0.7), (0.7, 0.95), (0.95, 1.0)):
+        some = (told >= low) & (told <= high)
+        count, expected = np.count_nonzero(some), told[some]
+        if count:  # three standard deviations of such a count, and what the shifts' steps leave out
+            spread = np.sqrt(np.mean(expected * (1.0 - expected)) / count)
+            assert abs(true[some].mean() - expected.mean()) < 3.0 * spread + 0.03
+    assert np.mean((told > 0.5) != true) < 0.08  # before, each of a pair was held for what is left of the other: 0.31

@@ -73,13 +73,15 @@ def echoes(observed: Observations, cell: Floats) -> Booleans:
     difference of two alternated codes.
 
     Two paths of one cell come out as one; a second component there comes from the difference, and if it did not run
-    over the panel it is the stronger one.
+    over the panel it is the stronger one. If neither is known to have, one is the echo of the other.
     """
     found = np.zeros(len(observed.log_amplitude), dtype=np.bool_)
     if observed.panel_odds is None:
         return found
-    found = observed.odds < 0.0
-    row, other = (observed.log_amplitude > observed.log_amplitude[found, None] + FAR_STRONGER).nonzero()
+    untold = observed.sides == UNTOLD
+    found = untold | (observed.odds < 0.0)
+    far = np.where(untold[found, None] & untold, 0.0, FAR_STRONGER)
+    row, other = (observed.log_amplitude > observed.log_amplitude[found, None] + far).nonzero()
     inside = (np.abs(observed.seen[found][row] - observed.seen[other]) < cell).all(axis=1)
     found[found] = np.bincount(row[inside], minlength=int(found.sum())) > 0
     return found

@@ -86,16 +86,23 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         # all measurements count for the first step: what is far off a first guess may be near to the place
         now = _equations(trials, summary, active, *at, robust=turn > 0)
         closer = now.cost <= cost[active]
-        some = active[closer]
+        some, back = active[closer], active[~closer]
         place[some], error[some], cost[some] = at[0][closer], at[1][closer], now.cost[closer]
-        normal[some] = now.normal[closer]
+        first = cost.copy() if turn == 0 else first
+        now = _Equations(*(field[closer] for field in now))
+        step[back] *= 0.25  # one that led away from what is heard, as near the horizon, most often went too far
+        back = back[cost[back] == first[back]]
+        if turn == 2 and len(back):
+            # where all measurements pull need not be where most of them lie
+            again = _equations(trials, summary, back, place[back], error[back], robust=True)
+            some, now = np.append(some, back), _Equations(*map(np.concatenate, zip(now, again, strict=True)))
+        normal[some] = now.normal
         if turn == STEPS:
             break
-        stiff = now.normal[closer]
+        stiff = now.normal.copy()
         # a length alone leaves a ring of places, along which a straight step leads astray
         stiff[trials.far[some], common:, common:] += AXES / ASTRAY**2
-        step[active] *= 0.25  # one that led away from what is heard, as near the horizon, most often went too far
-        step[some] = np.linalg.solve(stiff, now.slope[closer][..., None])[..., 0]
+        step[some] = np.linalg.solve(stiff, now.slope[..., None])[..., 0]
         length = np.sqrt(np.vecdot(step[some, common:], step[some, common:]))[:, None]
         step[some] *= np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
         if turn in (1, STEPS - 1):
