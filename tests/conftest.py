@@ -1,8 +1,42 @@
 """What every process that tests does once."""
 
 import gc
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any
 
 import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def no_waiting_for_the_disk() -> Iterator[None]:
+    """Files are written as ever, but nobody waits until the disk has them: no test cuts the power."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda _: None)
+        yield
+
+
+@contextmanager
+def _cells_here(jobs: int, limit: float | None) -> Iterator[Callable[[Iterable[tuple[str, Any]]], Iterator[Any]]]:
+    from rislam_rt.sweeps.cell_work import attempt
+
+    yield lambda tasks: ((name, attempt(task)) for name, task in tasks)
+
+
+@pytest.fixture(scope="session")
+def cells_here() -> Callable[[], AbstractContextManager[None]]:
+    """A context in which sweeps run their cells in this process: a worker, which other tests start, loads the package
+    anew for half a second."""
+    from rislam_rt.sweeps import run as sweep_run
+
+    @contextmanager
+    def here() -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(sweep_run, "local_pool", _cells_here)
+            yield
+
+    return here
 
 
 @pytest.fixture

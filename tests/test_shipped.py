@@ -114,7 +114,7 @@ def test_a_name_with_a_slip_is_mended() -> None:
 
 def test_a_package_folder_alone_says_where_it_looked(tmp_path: Path) -> None:
     """Copied without the folders beside it, and put on the module path; a room of one's own is beside it."""
-    shutil.copytree(ROOT / "rislam_rt", tmp_path / "rislam_rt", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "rislam_rt", tmp_path / "rislam_rt")  # with what is compiled, if anything is
     shutil.copytree(ROOT / "scenes" / "empty_box", tmp_path / "mine")
 
     def said(*words: str, code: int = 2) -> list[str]:

@@ -3,6 +3,7 @@ names of its meshes, which walls and scatterers give.
 """
 
 import hashlib
+import os
 import re
 import unicodedata
 from pathlib import Path, PurePosixPath
@@ -48,11 +49,12 @@ def read_inside(folder: Path, name: str, limit: int) -> bytes:
             hint = did_you_mean(nearest(str(relative), sorted(beside)))
             raise Fault(f"'{name[:80]}' {kind}", f"{hint} put the file there or mend the path".lstrip())
         with path.open("rb") as file:
-            content = file.read(limit + 1)
+            size = os.fstat(file.fileno()).st_size
+            content = file.read(limit + 1) if size <= limit else b""
     except (OSError, ValueError, RuntimeError) as error:
         cause = one_line(getattr(error, "strerror", None) or str(error))[:60]
         raise Fault(f"'{name[:80]}' cannot be read ({cause})", "check the file and its permissions") from None
-    if len(content) > limit:
+    if max(size, len(content)) > limit:
         raise Fault(f"'{name[:80]}' is larger than {limit} bytes", "give a smaller file")
     return content
 

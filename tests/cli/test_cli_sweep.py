@@ -3,13 +3,9 @@
 import json
 import re
 import shutil
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-
-from rislam_rt.sweeps import run as sweep_run
-from rislam_rt.sweeps.cell_work import attempt
 
 ROOT = Path(__file__).parents[2]
 PIPELINE = ROOT / "pipelines" / "trace_then_slam.toml"
@@ -23,17 +19,13 @@ def sweep(run):
 
 
 @pytest.fixture
-def cells_here(monkeypatch):
-    """Cells in this process: a worker, which other tests start, loads the package anew for a second."""
-
-    @contextmanager
-    def here(jobs, limit):
-        yield lambda tasks: ((name, attempt(task)) for name, task in tasks)
-
-    monkeypatch.setattr(sweep_run, "local_pool", here)
+def here(cells_here):
+    """Cells in this process."""
+    with cells_here():
+        yield
 
 
-def test_estimate_then_sweep_then_nothing_left(sweep, tmp_path, cells_here):
+def test_estimate_then_sweep_then_nothing_left(sweep, tmp_path, here):
     words = (PIPELINE, *TINY, "--axis", "slam.sigma_a=0.01,0.1", "--repeat", "1", "--jobs", "1")
     code, out, err = sweep(*words, "--estimate")
     assert (code, out) == (0, "")
@@ -59,7 +51,7 @@ def test_estimate_then_sweep_then_nothing_left(sweep, tmp_path, cells_here):
     assert {path: path.read_bytes() for path in before} == before
 
 
-def test_scenes_of_one_name_get_a_folder_each(sweep, tmp_path, cells_here, undrawn):
+def test_scenes_of_one_name_get_a_folder_each(sweep, tmp_path, here, undrawn):
     """A copy with darker walls, in another place: the table of the first stays as it is."""
     for place, reflection in (("a", "0.85"), ("b", "0.3")):
         shutil.copytree(ROOT / "scenes" / "paper_room", tmp_path / place / "hall")

@@ -23,7 +23,7 @@ RADIO = replace(RadioConfig(), array=RxArray(2, 3), energy=2.0, noise_psd=1e-3)
 TAU = np.array([10.0e-9, 10.6e-9, 13.0e-9])
 GAIN = np.array([1.0 + 0.3j, -0.4 + 0.9j, 0.2 - 0.1j])
 COSINES = np.array([[0.1, 0.3], [-0.5, 0.2], [0.4, -0.6]])
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(160)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
 def delay_information(tau, gain, radio, antennas=None):

@@ -145,7 +145,7 @@ def test_same_seed_same_bits_in_any_order_of_measurements(normal: tuple[Heard, C
     """To the last bit: not even whose turn it is to be looked at may hang on the order. Labels go along."""
     heard, course = normal
     rng = np.random.default_rng(9)
-    cycles = 20
+    cycles = 15
     orders = [rng.permutation(len(m)) for m in heard.measurements]
     names = ("tau", "cosines", "amplitude", "tau_std", "cosines_std", "amplitude_std", "from_panel")
     mixed = [

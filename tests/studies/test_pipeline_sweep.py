@@ -23,10 +23,11 @@ TINY = ("channel=image_source", "cycles=3", "receiver.estimator=bound", "slam.nu
 
 
 @pytest.fixture(scope="module")
-def swept(tmp_path_factory):
+def swept(tmp_path_factory, cells_here):
     folder = tmp_path_factory.mktemp("sweep")
     sweep = slam_sweep(PIPELINE, TINY, ["radio.reference_snr_db=0,13", "schemes=random,no_ris"], repeat=2)
-    return folder, run_sweep(sweep, folder).rows
+    with cells_here():
+        return folder, run_sweep(sweep, folder).rows
 
 
 def test_an_axis_takes_the_place_of_what_the_file_says_instead():

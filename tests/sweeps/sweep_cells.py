@@ -62,12 +62,12 @@ def count(settings, seed):
     return {"x": settings["x"]}
 
 
-def slow_sweep():
-    """Long enough to be killed in the middle."""
+def slow_sweep(sleep=0.1):
+    """Long enough to be killed in the middle; whoever does not kill it need not sleep [s] in every cell."""
     from rislam_rt.sweeps import Axis, Sweep
 
     axes = (Axis("x", tuple(range(10))), Axis("word", ("one", "two")))
-    return Sweep("sweep_cells:draw", axes, {"deep": {"y": 1}, "sleep": 0.1}, paired=("word",))
+    return Sweep("sweep_cells:draw", axes, {"deep": {"y": 1}}, paired=("word",), local={"sleep": sleep})
 
 
 if __name__ == "__main__":

@@ -316,13 +316,13 @@ def start(folder, jobs):
 def tell_of(folder):
     """What the rest of the slow sweep tells."""
     told = []
-    run_sweep(sweep_cells.slow_sweep(), folder, SweepOptions(jobs=2), tell=told.append)
+    run_sweep(sweep_cells.slow_sweep(0.0), folder, SweepOptions(jobs=2), tell=told.append)
     return told
 
 
 def test_killed_again_and_again_it_ends_with_the_same_bytes(tmp_path):
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    run_sweep(sweep_cells.slow_sweep(), whole, SweepOptions(jobs=2))
+    run_sweep(sweep_cells.slow_sweep(0.0), whole, SweepOptions(jobs=2))
     rng = np.random.default_rng(3)
     for _ in range(3):
         with start(killed, 2) as process:

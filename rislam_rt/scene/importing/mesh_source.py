@@ -1,6 +1,7 @@
 """Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) as triangles with names of node and material."""
 
 import json
+import os
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,10 +84,11 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
         raise Fault("no such file", "mend the path")
     try:
         with path.open("rb") as file:
-            content = file.read(limit + 1)
+            size = os.fstat(file.fileno()).st_size
+            content = file.read(limit + 1) if size <= limit else b""
     except OSError as error:
         raise Fault(f"cannot be read ({error.strerror})", "check its permissions") from None
-    if len(content) > limit:
+    if max(size, len(content)) > limit:
         raise Fault(f"larger than {limit} bytes", "simplify it, or export without textures")
     if not content:
         raise Fault("the file is empty", "export it again")
