@@ -1,10 +1,11 @@
 """One thread of linear algebra: the matrices are small, and sums in one order give the same bits on every machine."""
 
+import sys
 from collections.abc import Callable
-from functools import wraps
+from functools import lru_cache, wraps
 from typing import ParamSpec, TypeVar
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 Told = ParamSpec("Told")
 Found = TypeVar("Found")
@@ -19,7 +20,14 @@ def in_one_blas_thread(function: Callable[Told, Found]) -> Callable[Told, Found]
 
     @wraps(function)
     def limited(*args: Told.args, **kwargs: Told.kwargs) -> Found:
-        with threadpool_limits(limits=1, user_api="blas"):
+        with _libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
     return limited
+
+
+@lru_cache(maxsize=1)
+def _libraries(modules: int) -> ThreadpoolController:
+    """The libraries of linear algebra that are loaded, looked for again once there are more modules: they come with
+    one."""
+    return ThreadpoolController()
