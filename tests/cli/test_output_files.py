@@ -24,7 +24,7 @@ VIEW = ("show", "empty_box", "-q", "--depth", 0)
         (("trace", "empty_box", "--channel", "image_source", "--cycles", 1), "--out paths.nc"),
     ],
 )
-def test_a_file_of_the_users_stays_unless_told_otherwise(run, tmp_path, words, name):
+def test_a_file_of_the_users_stays_unless_told_otherwise(run, tmp_path, words, name, undrawn):
     option, _, file = name.partition(" ")
     theirs = tmp_path / file
     theirs.write_text("notes on rislam_rt, of my own")
