@@ -159,9 +159,11 @@ def test_no_scene_at_all(tmp_path: Path) -> None:
     assert "no such scene file" in refusal(tmp_path)
 
 
+ALPHABET = st.characters(exclude_categories=("Cs",))
+"""All that UTF-8 can say, as is the default, for which a new clone reckons a second long."""
 _JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(ALPHABET, max_size=8),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(ALPHABET, max_size=8), inner, max_size=4),
     max_leaves=8,
 )
 _TABLE = tomllib.loads(
@@ -184,7 +186,7 @@ def test_any_value_in_any_field_is_refused_or_read(section: str, data: st.DataOb
 
 
 @settings(max_examples=100, deadline=None)
-@given(content=st.binary(max_size=200) | st.text(max_size=200).map(str.encode))
+@given(content=st.binary(max_size=200) | st.text(ALPHABET, max_size=200).map(str.encode))
 def test_any_bytes_are_refused_as_a_scene_file(content: bytes) -> None:
     with pytest.raises(Fault):
         parse_spec(content)
