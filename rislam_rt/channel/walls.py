@@ -65,8 +65,9 @@ class Walls:
         return weight @ triangles.mean(axis=1), weight
 
 
+@lru_cache(maxsize=16)
 def build_walls(scene: Scene) -> Walls:
-    """Number the walls of a scene, each the plane that fits all its corners.
+    """Number the walls of a scene, each the plane that fits all its corners; once for all who ask of the same scene.
 
     Walls that lie on each other share one plane, that of the largest, into which the others are moved. A panel's host
     wall is the plane of the reflector named `host` that lies nearest to the panel's centre.
@@ -84,6 +85,8 @@ def build_walls(scene: Scene) -> Walls:
     moved = np.flatnonzero((stack.plane != np.arange(len(normal)))[owner])
     height = signed_distance(triangles[moved], normal[owner[moved], None], offset[owner[moved], None])
     triangles[moved] -= height[..., None] * normal[owner[moved], None]
+    for shared in (normal, offset, triangles, owner, stack.plane):
+        shared.flags.writeable = False
     return Walls(
         tuple(name for r, count in zip(scene.reflectors, counts, strict=True) for name in _names(r.name, count)),
         normal,
