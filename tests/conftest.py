@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 import pytest
-from _pytest.unraisableexception import gc_collect_iterations_key
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -55,9 +54,7 @@ def _is_whole(config: pytest.Config) -> bool:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The second process loads the tests from the end: what is not compiled yet, two need not compile twice. What was
-    left unclosed is looked for once at the end, not five times over (0.6 s of each process)."""
-    config.stash[gc_collect_iterations_key] = 1
+    """The second process loads the tests from the end: what is not compiled yet, two need not compile twice."""
     if _is_whole(config) and getattr(config, "workerinput", {}).get("workerid") == "gw1":
         tests = config.rootpath / "tests"
         config.args = [

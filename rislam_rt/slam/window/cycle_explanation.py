@@ -14,8 +14,10 @@ from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
+from rislam_rt.slam.window.births.doubted_returns import with_other_cause
 from rislam_rt.slam.window.births.explained_walls import explained_walls
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
+from rislam_rt.slam.window.births.track_fragments import with_fragments
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.landmarks.horizon_bias import correct_horizon_bias
@@ -31,7 +33,7 @@ from rislam_rt.slam.window.ris_candidate import weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.smoother.motion_basis import rotation
-from rislam_rt.slam.window.solver_limits import REFRESH
+from rislam_rt.slam.window.solver_limits import REFRESH, STRIDE
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 from rislam_rt.slam.window.unresolved_partner import partner_clear, partner_presence
@@ -289,7 +291,13 @@ def remove_or_add_features(state: WindowState, left: Residuals, view: CycleAssoc
         if not gone.any():
             gone = explained_walls(state)
         state, fresh = remove_from_map(state, ~gone), not gone.any()
-    return births(state, view) if fresh else state
+    if not fresh:
+        return state
+    after = births(state, view)
+    calm = after.landmarks.next_ident == state.landmarks.next_ident and state.cycle % STRIDE == 0
+    if calm and state.scene.use_vt:
+        after = with_other_cause(after, view)
+    return with_fragments(after) if state.cycle % REFRESH == 2 else after
 
 
 def outcome_of(heard: int, features: int, lost: bool) -> StepOutcome:

@@ -1,11 +1,12 @@
 """The cycle's assignment: looking only at what is within reach changes nothing; tracks beside a panel's path."""
 
 import numpy as np
+import pytest
 
-from rislam_rt.slam.observations import UNTOLD, Observations
+from rislam_rt.slam.observations import UNTOLD, Observations, side_of
 from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window import cycle_association, tracks
-from rislam_rt.slam.window.cycle_association import _absorbed, _rivals
+from rislam_rt.slam.window.cycle_association import _absorbed, _rivals, echoes
 from rislam_rt.slam.window.landmarks.horizon_detection import elevations, nothing_heard, prior_tilts
 from rislam_rt.slam.window.landmarks.measurement_prediction import ExpectedComponents
 from rislam_rt.slam.window.landmarks.unresolved_clusters import cluster
@@ -79,3 +80,22 @@ def test_a_louder_track_absorbs_the_panel_in_its_cell_and_claims_its_own_compone
     assert (more[[0, 2]] > 10.0).all()
     assert (more[1] == 0.0).all()
     assert (_rivals(np.ones(count, dtype=np.bool_), np.full(1, 1e-3), None) == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("odds", "gone"),
+    [
+        ((0.3, -0.3), [False, True]),  # either is what motion leaves of the other
+        ((-9.0, 9.0), [False, False]),  # a wall's return, and the panel's beside it
+        ((-9.0, 0.3), [False, False]),
+        ((-9.0, -9.0), [False, False]),  # two paths apart: an echo is fainter by more
+    ],
+)
+def test_of_two_components_of_one_cell_neither_of_which_is_known_to_be_the_panels_one_is_an_echo(odds, gone):
+    odds = np.array(odds)
+    seen, wide = np.array([[6.0, 0.2, 0.1], [6.02, 0.21, 0.1]]), np.full(2, 0.01)
+    probability = 1.0 / (1.0 + np.exp(-odds))
+    observed = Observations(seen, np.full((2, 3), 0.01), np.array([0.0, -0.8]), wide, np.ones(2), *side_of(probability))
+    np.testing.assert_array_equal(echoes(observed, CELL), gone)
+    apart = observed._replace(seen=seen + np.array([[0.0], [0.5]]) * [1.0, 0.0, 0.0])
+    assert not echoes(apart, CELL).any()

@@ -10,7 +10,6 @@ from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import remove_from_map, resolve
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
-from rislam_rt.slam.window.births.track_fragments import assign, with_fragments
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.hypotheses.hypotheses import BESIDE, BOTH_WAYS, known_features
@@ -61,8 +60,7 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
                 continue
             named = idents(context.landmarks, forms)
             if not _taken(context, track_rows[row], named[0]):
-                context = assign(context, track_rows[row], named, histories.scatter[row], part)
-                context = with_fragments(context, track_rows[row], named, histories.scatter[row], part)
+                context = _assign(context, track_rows[row], named, histories.scatter[row], part)
                 gone[rows[row]] = True
     born = -1
     for row, decision in enumerate(decisions):
@@ -117,6 +115,13 @@ def _taken(context: WindowState, at: Integers, form: Integers) -> bool:
     return bool(np.isin(log.cycle[at], log.cycle[same]).mean() > 0.5)
 
 
+def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float) -> WindowState:
+    """Associate a track's rows of the log with the paths of forms (2, 5) of idents, with extra variance by the track's
+    scatter."""
+    extra = CONSTANTS.memory * context.log.std[at] ** 2 * (scatter**2 - 1.0)
+    return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, 0.0, extra))
+
+
 def _enter(
     context: WindowState, at: Integers, decision: TrackDecision, histories: TrackSummary, row: int
 ) -> tuple[WindowState, bool]:
@@ -132,8 +137,7 @@ def _enter(
     forms[1] = _partner(decision, forms[0])
     grown = context._replace(window=window, landmarks=landmarks)
     share = min(max(decision.share, 0.0), 1.0)
-    named = idents(landmarks, forms)
-    grown = assign(grown, at, named, histories.scatter[row], share)
+    grown = _assign(grown, at, idents(landmarks, forms), histories.scatter[row], share)
     grown, left = resolve(grown, 3)
     if not np.isfinite(grown.window.head).all():
         return context, False
@@ -144,7 +148,7 @@ def _enter(
         return context, False
     square = float(np.mean(histories.scatter[row] ** 2))
     grown = grown._replace(visibility=add_clear_paths(context.visibility, forms[:1], landmarks, square))
-    return with_fragments(grown, at, named, histories.scatter[row], share), True
+    return grown, True
 
 
 def _partner(decision: TrackDecision, form: Integers) -> Integers:

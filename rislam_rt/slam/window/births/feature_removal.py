@@ -35,7 +35,7 @@ def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
         return context
     landmarks, log = context.landmarks, context.log
     lost: Booleans = np.asarray(np.isin(log.form, landmarks.ident[~keep]).any(axis=(1, 2)))
-    tracks, log = _resume(context.tracks, log, lost, context.cycle, context.window.step)
+    tracks, log = resume(context.tracks, log, lost, context.cycle, context.window.step)
     form = log.form.copy()
     form[lost] = UNKNOWN
     log = log._replace(form=form)
@@ -44,7 +44,7 @@ def remove_from_map(context: WindowState, keep: Booleans) -> WindowState:
     return resolve(context, 2)[0]
 
 
-def _resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
+def resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Floats) -> tuple[WindowTracks, Log]:
     """Begin a track for each recently detected path among the rows `lost` of the measurement log."""
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()

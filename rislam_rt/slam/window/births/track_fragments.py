@@ -1,16 +1,20 @@
-"""Track fragments: earlier tracks that broke off, of a path whose cause has become clear.
+"""Track fragments: tracks that broke off, of paths that the map explains before or after.
 
 Who sets off faster than was thought leaves tracks behind, and new ones begin where their paths are heard then. The
-birth that follows has the new track's history alone, and nothing ties the way since to the place before it.
+births that follow have the new tracks' histories alone, and nothing ties the way since to the place before it.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.divergence import motion_agreement
-from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.divergence.length_rates import MEASURED
+from rislam_rt.slam.window.measurement_log import Log, unique_forms
 from rislam_rt.slam.window.relinearisation import predictions, whitened
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.solver_limits import GATE
@@ -18,63 +22,92 @@ from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WANDER
 
 
-def assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float) -> WindowState:
-    """Associate rows of the log with the paths of forms (2, 5) of idents, with extra variance by the track's
-    scatter (3,)."""
-    extra = CONSTANTS.memory * context.log.std[at] ** 2 * (scatter**2 - 1.0)
-    return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, 0.0, extra))
+class _Pairs(NamedTuple):
+    """Pairs of a track fragment and a path of the map that was heard in other cycles, P of them, by rows of the log."""
+
+    fragment: Integers
+    """(P,) number of the fragment."""
+    row: Integers
+    """(P,) its component that is nearest in time to one of the path..."""
+    known: Integers
+    """(P,) ...and that one."""
 
 
-def with_fragments(
-    context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float
-) -> WindowState:  # fmt: skip
-    """State in which tracks that ended before the one of rows `at` began are associated with its path as well, of forms
-    (2, 5), if their last component is likelier to be of that path than new (as `tracks.match` has it) and all of theirs
-    fit it."""
-    log, first = context.log, int(context.log.cycle[at].min())
-    loose = (~log.explained & (log.track >= 0)).nonzero()[0]
-    loose = loose[~np.isin(log.track[loose], log.track[loose[log.cycle[loose] >= first]])]
-    if not len(loose):
-        return context
-    name, which = np.unique(log.track[loose], return_inverse=True)
-    last = np.zeros(len(name), dtype=np.int64)
-    np.maximum.at(last, which, loose)
-    log_odds = _log_continued(context, last, at, forms, scatter, part)
-    for number in np.argsort(-log_odds):
-        if log_odds[number] <= 0.0:
-            break
-        rows = loose[which == number]
-        if np.isin(log.cycle[rows], context.log.cycle[at]).any():
+def with_fragments(state: WindowState) -> WindowState:
+    """State in which tracks that ended are associated with the paths of the map that they are of: their component next
+    to what was heard of the path is likelier to be of it than new (as `tracks.match` has it), and all of theirs fit."""
+    log = state.log
+    loose = (~log.explained & (log.track >= 0) & ~np.isin(log.track, state.tracks.ident)).nonzero()[0]
+    which = np.unique(log.track[loose], return_inverse=True)[1]
+    pairs = _pairs(state, loose, which)
+    if not len(pairs.row):
+        return state
+    log_odds = _log_same(state, pairs)
+    trial, taken, total = log, dict[int, Integers](), 0.0
+    for at in np.argsort(-log_odds):
+        fragment = int(pairs.fragment[at])
+        if log_odds[at] <= 0.0 or fragment in taken:
             continue
-        grown, left = resolve(assign(context, rows, forms, scatter, part), 3)
-        fresh = left.left[np.isin(left.row, rows)]
-        if not np.isfinite(grown.window.head).all() or np.vecdot(fresh, fresh).mean() > 3.0 * CONSTANTS.fit:
-            continue
-        if log_odds[number] + motion_agreement.log_agreement(context, grown.window) > 0.0:
-            context, at = grown, np.append(at, rows)
-    return context
+        rows, known = loose[which == fragment], pairs.known[at]
+        same = (trial.form[:, 0] == log.form[known, 0]).all(axis=1)
+        if not np.isin(trial.cycle[rows], trial.cycle[same]).any():  # else one that is likelier is heard there
+            trial, taken[fragment], total = _joined(trial, rows, known), rows, total + log_odds[at]
+    if not taken:
+        return state
+    grown, left = resolve(state._replace(log=trial), 3)
+    square = np.vecdot(left.left, left.left)
+    fits = all(square[np.isin(left.row, rows)].mean() <= 3.0 * CONSTANTS.fit for rows in taken.values())
+    if not fits or not np.isfinite(grown.window.head).all():
+        return state
+    return grown if total + motion_agreement.log_agreement(state, grown.window) > 0.0 else state
 
 
-def _log_continued(
-    context: WindowState, last: Integers, at: Integers, forms: Integers, scatter: Floats, part: float
-) -> Floats:
-    """Log likelihood ratios (A,) of components `last` (A,) being of the path that the track of rows `at` is of, against
-    their being new, at the window's estimate."""
-    trial = assign(context, last, forms, scatter, part)
-    log, found = trial.log, whitened(trial, predictions(trial, 0))
-    keep = np.isin(found.row, last)
-    row, left, slopes = found.row[keep], found.left[keep], found.slopes[keep]
-    spread = 1.0 + prediction_variance(trial.window, found.slot[keep], slopes)
-    begin = at[np.argmin(log.cycle[at])]
-    wander = WANDER**2 + log.log_amplitude_std[row] ** 2 + log.log_amplitude_std[begin] ** 2
-    surplus = log.log_amplitude[row] - log.log_amplitude[begin]
-    square = (left**2 / spread).sum(axis=1)
-    variance = spread * (log.std[row] ** 2 + log.extra[row])
-    log_like = -0.5 * (square + np.log(2.0 * np.pi * variance).sum(axis=1))
-    log_like -= 0.5 * (surplus**2 / wander + np.log(2.0 * np.pi * wander))
-    odds = np.full(len(last), -np.inf)
-    order = np.argsort(last)
-    odds[order[np.searchsorted(last, row, sorter=order)]] = np.where(
-        square < GATE, log_like - np.log(context.config.new_density), -np.inf
+def _pairs(state: WindowState, loose: Integers, which: Integers) -> _Pairs:
+    """Pairs of fragments, rows `loose` (N,) of the log of fragment `which` (N,), and paths that have as many
+    measurements as a birth asks for, none of them in a cycle of the fragment."""
+    log, none = state.log, np.zeros(0, dtype=np.int64)
+    rows = (log.form[:, 0, 0] == TX).nonzero()[0]
+    if not len(loose) or not len(rows):
+        return _Pairs(none, none, none)
+    _, path = unique_forms(log.form[rows, 0])
+    slot = log.cycle - (state.cycle - state.window.num_poses + 1)
+    heard = np.zeros((path.max() + 1, state.window.num_poses), dtype=np.bool_)
+    heard[path, slot[rows]] = True
+    ended = np.zeros((which.max() + 1, state.window.num_poses), dtype=np.bool_)
+    ended[which, slot[loose]] = True
+    apart = (heard.astype(np.int64) @ ended.T == 0) & (heard.sum(axis=1) >= MEASURED)[:, None]
+    found = []
+    for one, fragment in zip(*apart.nonzero(), strict=True):
+        mine, theirs = rows[path == one], loose[which == fragment]
+        gap = np.abs(log.cycle[theirs][:, None] - log.cycle[mine])
+        row, known = np.unravel_index(int(gap.argmin()), gap.shape)
+        found.append((fragment, theirs[row], mine[known]))
+    return _Pairs(*np.array(found, dtype=np.int64).reshape(-1, 3).T)
+
+
+def _joined(log: Log, rows: Integers, known: Integers) -> Log:
+    """Measurement log in which the components `rows` (A,) are associated with the path of the component `known` (A,) or
+    one for all, and scatter as it does."""
+    known = np.broadcast_to(known, rows.shape)
+    scatter = (log.extra[known] - log.shared[known]) / log.std[known] ** 2 * log.std[rows] ** 2
+    return log.explain(rows, log.form[known], log.share[known], log.shared[known], scatter)
+
+
+def _log_same(state: WindowState, pairs: _Pairs) -> Floats:
+    """Log likelihood ratios (P,) of the fragments' components being of the paths of `pairs`, against their being new,
+    at the window's estimate."""
+    log, known = state.log, pairs.known
+    scatter = (log.extra[known] - log.shared[known]) / log.std[known] ** 2 * log.std[pairs.row] ** 2
+    one = log.take(pairs.row)._replace(
+        form=log.form[known], share=log.share[known], shared=log.shared[known], extra=log.shared[known] + scatter
     )
-    return odds
+    trial = state._replace(log=one)
+    found = whitened(trial, predictions(trial, 0))
+    spread = 1.0 + prediction_variance(state.window, found.slot, found.slopes)
+    square = (found.left**2 / spread).sum(axis=1)
+    log_like = -0.5 * (square + np.log(2.0 * np.pi * spread * (one.std**2 + one.extra)).sum(axis=1))
+    # over walls alone it is as loud as before; a panel's depends on the code
+    alike = np.where(one.form[:, 0, 0] == TX, 2.0 * CONSTANTS.fading**2, WANDER**2)
+    alike = alike + one.log_amplitude_std**2 + log.log_amplitude_std[known] ** 2
+    log_like -= 0.5 * ((one.log_amplitude - log.log_amplitude[known]) ** 2 / alike + np.log(2.0 * np.pi * alike))
+    return np.where(square < GATE, log_like - np.log(state.config.new_density), -np.inf)

@@ -79,7 +79,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
     count, common = len(trials.track), COMMON + summary.twist.shape[-1]
     active, cost, log_det = np.arange(count), np.full(count, np.inf), np.zeros(count)
     covariance, held = np.tile(AXES, (count, 1, 1)), np.tile(AXES, (count, 1, 1))
-    place, error = trials.start.copy(), np.zeros((count, common))
+    place, error, first = trials.start.copy(), np.zeros((count, common)), cost
     normal, step = np.zeros((count, common + 3, common + 3)), np.zeros((count, common + 3))
     for turn in range(STEPS + 1):
         at = place[active] + step[active, common:], error[active] + step[active, :common]
@@ -88,7 +88,8 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         closer = now.cost <= cost[active]
         some, back = active[closer], active[~closer]
         place[some], error[some], cost[some] = at[0][closer], at[1][closer], now.cost[closer]
-        first = cost.copy() if turn == 0 else first
+        if turn == 0:
+            first = cost.copy()
         now = _Equations(*(field[closer] for field in now))
         step[back] *= 0.25  # one that led away from what is heard, as near the horizon, most often went too far
         back = back[cost[back] == first[back]]

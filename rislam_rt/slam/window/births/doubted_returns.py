@@ -1,0 +1,57 @@
+"""Doubted returns: wall returns that scatter about their wall by more than fits, asked anew what caused them.
+
+What is associated with a wall is no track, and nothing else is asked for its cause: a ceiling's other slope, heard
+where the agent has passed under the ridge, is held for the first one's return, moved by a neighbour that the map lacks.
+"""
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Integers
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.predicted_returns import NONE, TX
+from rislam_rt.slam.window.births.births import births
+from rislam_rt.slam.window.births.feature_removal import resume
+from rislam_rt.slam.window.cycle_association import CycleAssociation
+from rislam_rt.slam.window.divergence.length_rates import MEASURED
+from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
+from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.state import WindowState
+
+
+def with_other_cause(state: WindowState, view: CycleAssociation) -> WindowState:
+    """State in which the doubted return that scatters most is that of a new wall, if that is clear: its latest
+    components are a track in a trial, the only one that is due for a birth."""
+    at = _most_doubted(state)
+    if not len(at):
+        return state
+    before, log = state.tracks, state.log
+    rows = np.isin(np.arange(len(log.cycle)), at)
+    tracks, log = resume(before._replace(looked=before.hits), log, rows, state.cycle, state.window.step)
+    form = np.where(rows[:, None, None], UNKNOWN, log.form)
+    after = births(state._replace(tracks=tracks, log=log._replace(form=form)), view)
+    of_one_wall = _over_one_wall(after.log)[at] & (after.log.form[at, 0, 3] >= state.landmarks.next_ident)
+    if not of_one_wall.all():
+        return state
+    kept = np.isin(before.ident, after.tracks.ident)
+    return after._replace(tracks=after.tracks._replace(looked=before.looked[kept]))
+
+
+def _most_doubted(state: WindowState) -> Integers:
+    """Rows (A,) of the log of the latest components over one wall, of the return that scatters most of those that are
+    heard still and have scattered by more than fits (`crowd`) for as many measurements as a birth asks for; none if
+    there is no such return."""
+    log = state.log
+    rows = _over_one_wall(log).nonzero()[0]
+    scatter, wall, most, doubted = log.scatter(rows), log.form[rows, 0, 3], CONSTANTS.crowd, rows[:0]
+    for each in np.unique(wall[log.cycle[rows] >= state.cycle - 1]):
+        own = (wall == each).nonzero()[0][-2 * MEASURED :]
+        fits = (scatter[own] <= CONSTANTS.crowd).nonzero()[0]
+        late = own[fits[-1] + 1 :] if len(fits) else own
+        if len(late) >= MEASURED and scatter[late[-1]] > most:
+            most, doubted = scatter[late[-1]], rows[late]
+    return doubted
+
+
+def _over_one_wall(log: Log) -> Booleans:
+    """Whether the components (N,) of the log are returns over one wall alone."""
+    return np.asarray((log.form[:, 0, 0] == TX) & (log.form[:, 0, [1, 2, 4]] == NONE).all(axis=1))
