@@ -63,10 +63,11 @@ def with_fragments(state: WindowState) -> WindowState:
 
 
 def _pairs(state: WindowState, loose: Integers, which: Integers) -> _Pairs:
-    """Pairs of fragments, rows `loose` (N,) of the log of fragment `which` (N,), and paths that have as many
-    measurements as a birth asks for, none of them in a cycle of the fragment."""
+    """Pairs of fragments, rows `loose` (N,) of the log of fragment `which` (N,), and paths over walls alone that have
+    as many measurements as a birth asks for, none of them in a cycle of the fragment."""
     log, none = state.log, np.zeros(0, dtype=np.int64)
     rows = (log.form[:, 0, 0] == TX).nonzero()[0]
+    rows = rows[log.scatter(rows) <= CONSTANTS.crowd]  # what scatters by more fits anything
     if not len(loose) or not len(rows):
         return _Pairs(none, none, none)
     _, path = unique_forms(log.form[rows, 0])
