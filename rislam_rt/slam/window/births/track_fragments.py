@@ -19,7 +19,6 @@ from rislam_rt.slam.window.relinearisation import predictions, whitened
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.solver_limits import GATE
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.tracks import WANDER
 
 
 class _Pairs(NamedTuple):
@@ -98,17 +97,14 @@ def _log_same(state: WindowState, pairs: _Pairs) -> Floats:
     """Log likelihood ratios (P,) of the fragments' components being of the paths of `pairs`, against their being new,
     at the window's estimate."""
     log, known = state.log, pairs.known
-    scatter = (log.extra[known] - log.shared[known]) / log.std[known] ** 2 * log.std[pairs.row] ** 2
-    one = log.take(pairs.row)._replace(
-        form=log.form[known], share=log.share[known], shared=log.shared[known], extra=log.shared[known] + scatter
-    )
+    one = _joined(log.take(np.append(pairs.row, known)), np.arange(len(known)), np.arange(len(known)) + len(known))
+    one = one.take(slice(len(known)))
     trial = state._replace(log=one)
     found = whitened(trial, predictions(trial, 0))
     spread = 1.0 + prediction_variance(state.window, found.slot, found.slopes)
     square = (found.left**2 / spread).sum(axis=1)
     log_like = -0.5 * (square + np.log(2.0 * np.pi * spread * (one.std**2 + one.extra)).sum(axis=1))
-    # over walls alone it is as loud as before; a panel's depends on the code
-    alike = np.where(one.form[:, 0, 0] == TX, 2.0 * CONSTANTS.fading**2, WANDER**2)
-    alike = alike + one.log_amplitude_std**2 + log.log_amplitude_std[known] ** 2
+    # over walls it is as loud as before
+    alike = 2.0 * CONSTANTS.fading**2 + one.log_amplitude_std**2 + log.log_amplitude_std[known] ** 2
     log_like -= 0.5 * ((one.log_amplitude - log.log_amplitude[known]) ** 2 / alike + np.log(2.0 * np.pi * alike))
     return np.where(square < GATE, log_like - np.log(state.config.new_density), -np.inf)
