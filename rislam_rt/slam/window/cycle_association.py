@@ -80,7 +80,8 @@ def echoes(observed: Observations, cell: Floats) -> Booleans:
         return found
     untold = observed.sides == UNTOLD
     found = untold | (observed.odds < 0.0)
-    far = np.where(untold[found, None] & untold, 0.0, FAR_STRONGER)
+    beside = np.where(observed.odds[found, None] < 0.0, FAR_STRONGER, np.inf)
+    far = np.where(untold[found, None] & untold, 0.0, beside)
     row, other = (observed.log_amplitude > observed.log_amplitude[found, None] + far).nonzero()
     inside = (np.abs(observed.seen[found][row] - observed.seen[other]) < cell).all(axis=1)
     found[found] = np.bincount(row[inside], minlength=int(found.sum())) > 0

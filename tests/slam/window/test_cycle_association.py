@@ -83,19 +83,22 @@ def test_a_louder_track_absorbs_the_panel_in_its_cell_and_claims_its_own_compone
 
 
 @pytest.mark.parametrize(
-    ("odds", "gone"),
+    ("odds", "fainter", "gone"),
     [
-        ((0.3, -0.3), [False, True]),  # either is what motion leaves of the other
-        ((-9.0, 9.0), [False, False]),  # a wall's return, and the panel's beside it
-        ((-9.0, 0.3), [False, False]),
-        ((-9.0, -9.0), [False, False]),  # two paths apart: an echo is fainter by more
+        ((0.3, -0.3), 0.8, [False, True]),  # either is what motion leaves of the other
+        ((-9.0, 9.0), 3.0, [False, False]),  # a wall's return, and the panel's beside it
+        ((-9.0, 1.5), 3.0, [False, False]),  # likelier the panel's than not, beside a ceiling's that is far louder
+        ((-9.0, -9.0), 0.8, [False, False]),  # two paths apart: an echo is fainter by more
+        ((-9.0, -9.0), 1.5, [False, True]),
     ],
 )
-def test_of_two_components_of_one_cell_neither_of_which_is_known_to_be_the_panels_one_is_an_echo(odds, gone):
+def test_of_two_components_of_one_cell_neither_of_which_is_known_to_be_the_panels_one_is_an_echo(odds, fainter, gone):
     odds = np.array(odds)
     seen, wide = np.array([[6.0, 0.2, 0.1], [6.02, 0.21, 0.1]]), np.full(2, 0.01)
     probability = 1.0 / (1.0 + np.exp(-odds))
-    observed = Observations(seen, np.full((2, 3), 0.01), np.array([0.0, -0.8]), wide, np.ones(2), *side_of(probability))
+    observed = Observations(
+        seen, np.full((2, 3), 0.01), np.array([0.0, -fainter]), wide, np.ones(2), *side_of(probability)
+    )
     np.testing.assert_array_equal(echoes(observed, CELL), gone)
     apart = observed._replace(seen=seen + np.array([[0.0], [0.5]]) * [1.0, 0.0, 0.0])
     assert not echoes(apart, CELL).any()

@@ -15,16 +15,17 @@ from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence.length_rates import MEASURED
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.solver_limits import STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
 def with_other_cause(state: WindowState, view: CycleAssociation) -> WindowState:
-    """State in which the doubted return that scatters most is that of a new wall, if that is clear: its latest
-    components are a track in a trial, the only one that is due for a birth."""
-    at = _most_doubted(state)
-    if not len(at):
+    """State in which one of the doubted returns, which are asked in turn, is that of a new wall, if that is clear: its
+    latest components are a track in a trial, the only one that is due for a birth."""
+    doubted = _doubted(state)
+    if not doubted:
         return state
-    before, log = state.tracks, state.log
+    at, before, log = doubted[state.cycle // STRIDE % len(doubted)], state.tracks, state.log
     rows = np.isin(np.arange(len(log.cycle)), at)
     tracks, log = resume(before._replace(looked=before.hits), log, rows, state.cycle, state.window.step)
     form = np.where(rows[:, None, None], UNKNOWN, log.form)
@@ -36,19 +37,18 @@ def with_other_cause(state: WindowState, view: CycleAssociation) -> WindowState:
     return after._replace(tracks=after.tracks._replace(looked=before.looked[kept]))
 
 
-def _most_doubted(state: WindowState) -> Integers:
-    """Rows (A,) of the log of the latest components over one wall, of the return that scatters most of those that are
-    heard still and have scattered by more than fits (`crowd`) for as many measurements as a birth asks for; none if
-    there is no such return."""
+def _doubted(state: WindowState) -> list[Integers]:
+    """Rows of the log of the latest components of each return over one wall that is heard still and has scattered by
+    more than fits (`crowd`) for as many measurements as a birth asks for."""
     log = state.log
     rows = _over_one_wall(log).nonzero()[0]
-    scatter, wall, most, doubted = log.scatter(rows), log.form[rows, 0, 3], CONSTANTS.crowd, rows[:0]
+    scatter, wall, doubted = log.scatter(rows), log.form[rows, 0, 3], []
     for each in np.unique(wall[log.cycle[rows] >= state.cycle - 1]):
         own = (wall == each).nonzero()[0][-2 * MEASURED :]
         fits = (scatter[own] <= CONSTANTS.crowd).nonzero()[0]
         late = own[fits[-1] + 1 :] if len(fits) else own
-        if len(late) >= MEASURED and scatter[late[-1]] > most:
-            most, doubted = scatter[late[-1]], rows[late]
+        if len(late) >= MEASURED:
+            doubted.append(rows[late])
     return doubted
 
 

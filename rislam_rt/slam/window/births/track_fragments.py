@@ -10,6 +10,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.divergence import motion_agreement
@@ -36,29 +37,52 @@ def with_fragments(state: WindowState) -> WindowState:
     """State in which tracks that ended are associated with the paths of the map that they are of: their component next
     to what was heard of the path is likelier to be of it than new (as `tracks.match` has it), and all of theirs fit."""
     log = state.log
-    loose = (~log.explained & (log.track >= 0) & ~np.isin(log.track, state.tracks.ident)).nonzero()[0]
+    over_panel = np.unique(log.track[log.side >= PANEL])
+    ended = ~np.isin(log.track, np.concatenate([state.tracks.ident, over_panel]))
+    loose = (~log.explained & (log.track >= 0) & ended).nonzero()[0]
     which = np.unique(log.track[loose], return_inverse=True)[1]
     pairs = _pairs(state, loose, which)
     if not len(pairs.row):
         return state
     log_odds = _log_same(state, pairs)
-    trial, taken, total = log, dict[int, Integers](), 0.0
+    trial, taken, total = log, list[_Fragment](), 0.0
     for at in np.argsort(-log_odds):
-        fragment = int(pairs.fragment[at])
-        if log_odds[at] <= 0.0 or fragment in taken:
+        rows, known = loose[which == pairs.fragment[at]], int(pairs.known[at])
+        if log_odds[at] <= 0.0 or trial.explained[rows[0]]:
             continue
-        rows, known = loose[which == fragment], pairs.known[at]
-        same = (trial.form[:, 0] == log.form[known, 0]).all(axis=1)
-        if not np.isin(trial.cycle[rows], trial.cycle[same]).any():  # else one that is likelier is heard there
-            trial, taken[fragment], total = _joined(trial, rows, known), rows, total + log_odds[at]
+        same = (trial.form == log.form[known, 0]).all(axis=2).any(axis=1)
+        if not np.isin(trial.cycle[rows], trial.cycle[same]).any():  # else it is heard there as another component
+            trial, total = _joined(trial, rows, known), total + float(log_odds[at])
+            taken.append(_Fragment(rows, known, float(log_odds[at])))
     if not taken:
         return state
-    grown, left = resolve(state._replace(log=trial), 3)
+    grown, fits = _solved(state, trial, taken)
+    if not all(fits):  # what does not fit is no reason against what does
+        trial, total = log, 0.0
+        taken = [each for each, fine in zip(taken, fits, strict=True) if fine]
+        for each in taken:
+            trial, total = _joined(trial, each.rows, each.known), total + each.log_odds
+        grown, fits = _solved(state, trial, taken)
+    agrees = taken and all(fits) and total + motion_agreement.log_agreement(state, grown.window) > 0.0
+    return grown if agrees else state
+
+
+class _Fragment(NamedTuple):
+    """A track fragment that is likelier to be of a path than new."""
+
+    rows: Integers
+    """(A,) of the log."""
+    known: int
+    """Row of a component of the path."""
+    log_odds: float
+
+
+def _solved(state: WindowState, log: Log, taken: list[_Fragment]) -> tuple[WindowState, list[bool]]:
+    """State solved with fragments associated as the measurement log has them, and whether each fits."""
+    grown, left = resolve(state._replace(log=log), 3)
     square = np.vecdot(left.left, left.left)
-    fits = all(square[np.isin(left.row, rows)].mean() <= 3.0 * CONSTANTS.fit for rows in taken.values())
-    if not fits or not np.isfinite(grown.window.head).all():
-        return state
-    return grown if total + motion_agreement.log_agreement(state, grown.window) > 0.0 else state
+    finite = bool(np.isfinite(grown.window.head).all())
+    return grown, [finite and square[np.isin(left.row, each.rows)].mean() <= 3.0 * CONSTANTS.fit for each in taken]
 
 
 def _pairs(state: WindowState, loose: Integers, which: Integers) -> _Pairs:
@@ -85,7 +109,7 @@ def _pairs(state: WindowState, loose: Integers, which: Integers) -> _Pairs:
     return _Pairs(*np.array(found, dtype=np.int64).reshape(-1, 3).T)
 
 
-def _joined(log: Log, rows: Integers, known: Integers) -> Log:
+def _joined(log: Log, rows: Integers, known: Integers | int) -> Log:
     """Measurement log in which the components `rows` (A,) are associated with the path of the component `known` (A,) or
     one for all, and scatter as it does."""
     known = np.broadcast_to(known, rows.shape)

@@ -5,6 +5,7 @@ import pytest
 
 from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births.doubted_returns import with_other_cause
+from rislam_rt.slam.window.cycle_explanation import remove_or_add_features
 from rislam_rt.slam.window.measurement_log import scatter_variance
 
 LATE = 12
@@ -13,7 +14,7 @@ LATE = 12
 @pytest.fixture
 def ceiling(walked):
     """State, true places, association, the ceiling's ident and the rows of its return's last 12 components."""
-    state, place, view = walked
+    state, place, view, _ = walked
     walls = state.landmarks.ident[state.landmarks.is_wall]
     span = (state.window.features - state.landmarks.anchor)[state.landmarks.is_wall]
     level = int(walls[np.argmax(span[:, 2])])
@@ -42,19 +43,34 @@ def over_slope(state, place, normal, at):
     return np.column_stack([length, (way @ turn)[:, :2] / length[:, None]])
 
 
+NORMAL = np.array([0.15, -0.05, 1.0]) / np.linalg.norm([0.15, -0.05, 1.0])
+
+
+def under_the_other_slope(state, place, rows, rng):
+    """State in which the ceiling's last components are those of another slope, held for its own."""
+    at = place[-LATE - 1] + [0.0, 0.0, 0.5 * state.log.seen[rows[0], 0]]
+    exact = over_slope(state, place[state.log.cycle[rows]], NORMAL, at)
+    return scattering(state, rows, exact + state.log.std[rows] * rng.standard_normal(exact.shape))
+
+
+def test_a_cycle_without_a_birth_asks(ceiling, walked, rng):
+    state, place, view, _, rows = ceiling
+    doubted = under_the_other_slope(state, place, rows, rng)
+    after = remove_or_add_features(doubted, walked[3], view)
+    assert (after.log.form[rows, 0, 3] >= state.landmarks.next_ident).all()
+
+
 def test_the_other_slope_of_a_ceiling_is_a_wall_of_its_own(ceiling, rng):
     state, place, view, level, rows = ceiling
-    normal = np.array([0.15, -0.05, 1.0]) / np.linalg.norm([0.15, -0.05, 1.0])
-    at = place[-LATE - 1] + [0.0, 0.0, 0.5 * state.log.seen[rows[0], 0]]
-    exact = over_slope(state, place[state.log.cycle[rows]], normal, at)
-    seen = exact + state.log.std[rows] * rng.standard_normal(exact.shape)
-    after = with_other_cause(scattering(state, rows, seen), view)
+    after = with_other_cause(under_the_other_slope(state, place, rows, rng), view)
     new = np.unique(after.log.form[rows, 0, 3])
     assert len(new) == 1
     assert new[0] not in state.landmarks.ident
     row = int(np.flatnonzero(after.landmarks.ident == new[0])[0])
     span = after.window.features[row] - after.landmarks.anchor[row]
-    assert np.degrees(np.arccos(abs(span @ normal) / np.linalg.norm(span))) < 1.0
+    assert np.degrees(np.arccos(abs(span @ NORMAL) / np.linalg.norm(span))) < 1.0
+    kept = np.isin(state.tracks.ident, after.tracks.ident)
+    np.testing.assert_array_equal(after.tracks.looked, state.tracks.looked[kept])  # births ask them when they would
     # the first slope keeps what was heard over it before
     assert (after.log.form[:, 0, 3] == level).any()
 
