@@ -24,7 +24,7 @@ def without(heard, rows):
 
 
 def walk(silent=()):
-    """State, true positions (K, 3), association and residuals after 25 cycles of a level walk over 1.5 m, before births;
+    """State, true positions (K, 3), association and residuals after 25 cycles of a level walk, before births, in which
     the path heard with the most amplitude of all but the direct one is not heard in the cycles `silent`."""
     scene, rng = load_scene(ROOM), np.random.default_rng(0)
     place = np.array([1.2, 2.4, 0.8]) + np.arange(COUNT)[:, None] * [0.06, 0.02, 0.0]
