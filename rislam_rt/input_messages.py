@@ -29,7 +29,7 @@ KINDS = {
 
 
 def unit_of(name: str) -> str:
-    """Unit of a setting by its name; empty if the name does not say it."""
+    """Unit of a setting by its name, for messages about input; empty if the name does not say it."""
     return next((unit for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
 
 

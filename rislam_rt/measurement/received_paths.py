@@ -79,7 +79,7 @@ class Clutter(NamedTuple):
 
 
 def direct_gain(paths: Paths, cycle: int) -> complex:
-    """Complex gain of the received direct path (leakage) in a cycle before cancellation; 0 where hidden."""
+    """Complex gain of the received paths' direct one (leakage) in a cycle before cancellation; 0 where hidden."""
     return complex(np.sum(paths.gain[cycle, paths.kind == PathKind.LOS]))
 
 

@@ -31,7 +31,8 @@ def code_signs(order: str, panels: int) -> Floats:
 
 @lru_cache(maxsize=64)
 def codes_in_turn(panels: int) -> Floats:
-    """Hadamard matrix (C, C) of the signs of the codes in a slot: two codes for one panel, four for two."""
+    """Hadamard matrix (C, C) of the signs of the codes in a slot, against motion within it: two codes for one
+    panel, four for two."""
     signs = scipy.linalg.hadamard(2 ** int(np.ceil(np.log2(1 + panels)))).astype(np.float64)
     signs.flags.writeable = False
     return signs

@@ -146,7 +146,7 @@ def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
 
 
 def _write_staged(files: Mapping[str, bytes], staged: Path) -> None:
-    """Write files into a temporary folder, each synchronised with the disk."""
+    """Write a scene's files into a temporary folder, each synchronised with the disk."""
     for name, content in files.items():
         target = staged / name
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -168,8 +168,8 @@ class _Fitted(NamedTuple):
 
 
 def _fit_turns(seen: Floats, weight: Floats, level: Floats, by_turn: Floats) -> _Fitted:
-    """Feature of tracks: least-squares turns of their directions; `level` (T, W, 2, 2) brings free mean cosines to the
-    body frame."""
+    """Sighting feature of tracks: least-squares turns of their directions; `level` (T, W, 2, 2) brings free mean
+    cosines to the body frame."""
     root = np.sqrt(weight)
     columns = np.concatenate([level, by_turn, seen[..., None]], axis=-1) * root[..., None]
     gram = np.einsum("tkia,tkib->tab", columns, columns)

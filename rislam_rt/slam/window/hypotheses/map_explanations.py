@@ -119,8 +119,9 @@ def _predicted(
 
 
 def _log_evidence(history: _Predicted, share: Floats, extra: Floats) -> float:
-    """Log evidence of a history as returns of weights `share` (R,), which company moves by a variance of up to `extra`
-    (3,): its logarithm is anything alike from nothing to that, as for any neighbour (`expected_scatter`)."""
+    """Log evidence of an explanation by the map: of a history as returns of weights `share` (R,), which company moves
+    by a variance of up to `extra` (3,); its logarithm is anything alike from nothing to that, as for any neighbour
+    (`expected_scatter`)."""
     whole = np.log1p(extra / history.reported**2)
     strength = np.linspace(0.0, 1.0, STRENGTHS) if extra.any() else np.zeros(1)
     factor = np.exp(0.5 * strength[:, None, None] * whole)  # on the reported deviations
