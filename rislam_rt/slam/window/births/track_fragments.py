@@ -82,7 +82,7 @@ def _solved(state: WindowState, log: Log, taken: list[_Fragment]) -> tuple[Windo
     grown, left = resolve(state._replace(log=log), 3)
     square = np.vecdot(left.left, left.left)
     finite = bool(np.isfinite(grown.window.head).all())
-    return grown, [finite and square[np.isin(left.row, each.rows)].mean() <= 3.0 * CONSTANTS.fit for each in taken]
+    return grown, [finite and square[np.isin(left.row, each.rows)].mean() <= CONSTANTS.crowd for each in taken]
 
 
 def _pairs(state: WindowState, loose: Integers, which: Integers) -> _Pairs:

@@ -92,11 +92,10 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
             first = cost.copy()
         now = _Equations(*(field[closer] for field in now))
         step[back] *= 0.25  # one that led away from what is heard, as near the horizon, most often went too far
-        back = back[cost[back] == first[back]]
-        if turn == 2 and len(back):
+        if turn == 2 and (stuck := back[cost[back] == first[back]]).size:
             # where all measurements pull need not be where most of them lie
-            again = _equations(trials, summary, back, place[back], error[back], robust=True)
-            some, now = np.append(some, back), _Equations(*map(np.concatenate, zip(now, again, strict=True)))
+            again = _equations(trials, summary, stuck, place[stuck], error[stuck], robust=True)
+            some, now = np.append(some, stuck), _Equations(*map(np.concatenate, zip(now, again, strict=True)))
         normal[some] = now.normal
         if turn == STEPS:
             break

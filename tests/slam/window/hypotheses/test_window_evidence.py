@@ -236,17 +236,22 @@ def test_near_the_horizon_no_step_leads_the_fit_astray():
         np.testing.assert_allclose(fits.place[0], [-1.6, 0.0, 0.09], atol=0.15)
 
 
-def test_outliers_do_not_swing_the_fit():
-    """A point heard well but for two of eight components, which are 50 deviations off: weights by the residuals of the
-    step before swing between two places. Iterated to the end, it is where all but those two put it."""
-    rng = np.random.default_rng(5)
-    summary = _digest(8, std=0.001, rng=rng)._replace(uncertainty=np.zeros((1, 8, 3, 6)))
+def _of_a_point(std, rng):
+    """A track of 8 components of a point, heard from poses that are known, the trial that begins at its place, and
+    exact lengths and cosines (8, 3)."""
+    summary = _digest(8, std=std, rng=rng)._replace(uncertainty=np.zeros((1, 8, 3, 6)))
     trials = _trials("point", summary, rng)._replace(
         turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), uncertainty=np.zeros((1, 2, 3, 3))
     )
     poses = Poses(summary.tx[0], summary.rx[0], np.zeros(8))
     form = compile_forms(np.array([(0, NONE, NONE, NONE, NONE)]))
-    seen = linearise(form, trials.start, np.zeros((1, 3)), poses).seen[:, 0]
+    return summary, trials, linearise(form, trials.start, np.zeros((1, 3)), poses).seen[:, 0]
+
+
+def test_outliers_do_not_swing_the_fit():
+    """A point heard well but for two of eight components, which are 50 deviations off: weights by the residuals of the
+    step before swing between two places. Iterated to the end, it is where all but those two put it."""
+    summary, trials, seen = _of_a_point(0.001, np.random.default_rng(5))
     seen[[2, 6], 0] += 0.05
     fits = try_all(trials._replace(start=trials.start + 0.02), summary._replace(seen=seen[None]))
     least = 7.0 * 2.0 * np.log1p(50.0**2 / 4.0)  # the cost of the two, where all others fit
@@ -260,13 +265,7 @@ def test_a_fit_that_begins_at_its_place_is_not_left_with_the_weights_of_an_outli
     worse = []
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        summary = _digest(8, std=0.005, rng=rng)._replace(uncertainty=np.zeros((1, 8, 3, 6)))
-        trials = _trials("point", summary, rng)._replace(
-            turn=np.tile(AXES, (1, 2, 1, 1)), shift=np.zeros((1, 2, 3)), uncertainty=np.zeros((1, 2, 3, 3))
-        )
-        poses = Poses(summary.tx[0], summary.rx[0], np.zeros(8))
-        form = compile_forms(np.array([(0, NONE, NONE, NONE, NONE)]))
-        seen = linearise(form, trials.start, np.zeros((1, 3)), poses).seen[:, 0]
+        summary, trials, seen = _of_a_point(0.005, rng)
         seen += 0.005 * rng.standard_normal(seen.shape)
         seen[rng.integers(8)] += 0.15 * rng.standard_normal(3)
         summary = summary._replace(seen=seen[None])
