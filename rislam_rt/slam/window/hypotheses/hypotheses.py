@@ -13,6 +13,7 @@ from rislam_rt.slam.sampling import square_roots
 from rislam_rt.slam.window.hypotheses.hypothesis_fits import Trials
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.solver_limits import STEPS
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
@@ -157,14 +158,20 @@ def _square_to(alone: Floats, across: Floats, middle: Floats) -> Floats:
     return np.asarray(alone - along[..., None] * normal[:, None])
 
 
-def _acute(rx: Floats, ray: Floats, length: Floats, out: Floats, middle: Floats) -> Floats:
+def _acute(rx: Floats, heard: Floats, length: Floats, out: Floats, middle: Floats) -> Floats:
     """Images (W, T, 3) of `middle` in new walls that meet known ones, whose images lie at `out` (W, 3) from it, at an
-    acute angle along the edge at which rays (T, 3) from `rx` (T, 3) point: the paths' `length` (T,) is twice the edge's
-    distance times the sine of the angle."""
+    acute angle, along the edge towards which rays (T, 3) are `heard` at `rx` (T, 3): the paths' `length` (T,) is twice
+    the edge's distance times the sine of the angle, and the mean of their directions is as much shorter than one."""
     reach = np.maximum(np.linalg.norm(out, axis=1), 1e-6)
     normal = out / reach[:, None]
-    toward = np.maximum(normal @ ray.T, CONSTANTS.dip)
-    edge = np.maximum(0.5 * reach[:, None] - normal @ (rx - middle).T, CONSTANTS.depth) / toward
+    depth = np.maximum(0.5 * reach[:, None] - normal @ (rx - middle).T, CONSTANTS.depth)
+    flat = np.linalg.norm(heard[:, :2], axis=1)
+    sine = np.ones(depth.shape)
+    for _ in range(STEPS):
+        ray = np.concatenate([heard[:, :2] / sine[..., None], np.sqrt(1.0 - (flat / sine) ** 2)[..., None]], axis=-1)
+        toward = np.maximum((ray @ normal[..., None])[..., 0], CONSTANTS.dip)
+        sine = np.clip(np.sqrt(sine * length * toward / (2.0 * depth)), flat, 1.0)
+    edge = depth / toward
     cos = np.sqrt(np.clip(1.0 - (length / (2.0 * edge)) ** 2, CONSTANTS.dip**2, 0.5))[..., None]
     along = ray - toward[..., None] * normal[:, None]
     along /= np.maximum(np.linalg.norm(along, axis=-1), 1e-6)[..., None]

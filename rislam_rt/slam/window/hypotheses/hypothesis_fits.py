@@ -101,7 +101,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
             break
         stiff = now.normal.copy()
         # a length alone leaves a ring of places, along which a straight step leads astray
-        stiff[trials.far[some], common:, common:] += AXES / ASTRAY**2
+        stiff[(trials.far | trials.even)[some], common:, common:] += AXES / ASTRAY**2
         step[some] = np.linalg.solve(stiff, now.slope[..., None])[..., 0]
         length = np.sqrt(np.vecdot(step[some, common:], step[some, common:]))[:, None]
         step[some] *= np.minimum(1.0, 1.5 / np.maximum(length, 1e-12))
