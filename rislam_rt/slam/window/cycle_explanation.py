@@ -15,6 +15,7 @@ from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.doubted_returns import with_other_cause
+from rislam_rt.slam.window.births.reclassification import reclassified
 from rislam_rt.slam.window.births.explained_walls import explained_walls
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
 from rislam_rt.slam.window.births.track_fragments import with_fragments
@@ -297,6 +298,8 @@ def remove_or_add_features(state: WindowState, left: Residuals, view: CycleAssoc
     calm = after.landmarks.next_ident == state.landmarks.next_ident and state.cycle % STRIDE == 0
     if calm and state.scene.use_vt:
         after = with_other_cause(after, view)
+        if after.landmarks.next_ident == state.landmarks.next_ident:
+            after = reclassified(after, view)
     return with_fragments(after) if state.cycle % REFRESH == 2 else after
 
 
