@@ -59,6 +59,6 @@ def _due(state: WindowState) -> list[tuple[int, Integers]]:
         forms, count = np.unique(log.form[at].reshape(-1, 10), axis=0), len(at)
         grown = np.floor(np.log(np.maximum([count, count - STRIDE], 1) / MEASURED) / np.log(1.5))
         late = count > CONSTANTS.window - STRIDE and state.cycle % (CONSTANTS.window // 2) < STRIDE
-        if len(forms) == 1 and forms[0, 5] == UNKNOWN and count > MEASURED and (grown[0] > grown[1] or late):
+        if len(forms) == 1 and forms[0, 5] == UNKNOWN and (grown[0] > max(grown[1], 0.0) or late):
             found.append((int(row), at))
     return found

@@ -102,18 +102,40 @@ def test_the_slopes_of_the_mean_of_both_orders_are_those_of_finite_differences()
     np.testing.assert_allclose(np.linalg.inv(fits.held[0]), information, rtol=2e-3, atol=1e-3 * information.max())
 
 
-def test_at_rest_the_first_guess_is_the_ceiling_itself():
-    slope = 0.08
-    summary, known, landmarks = _case(_ceiling(slope, aside=0.0), move=(0.0, 0.0, 0.0), baseline=(0.0, 0.0, 0.0))
-    # of the mean of two cosines the ray is nearly that to the edge, which is as far up as the ceiling is there
-    edge = np.array([WALL_AT[0], 0.0, 1.6 + slope * WALL_AT[0]])
-    summary.seen[..., 1:] = edge[:2] / np.linalg.norm(edge)
+NEW = {
+    "ceiling": _ceiling(0.08, aside=0.0),
+    "steep ceiling": _ceiling(0.35, aside=0.0),
+    "ceiling that rises along the wall": _ceiling(0.08, aside=0.2),
+    "upright": 2.4 * np.array([np.sin(-0.2), np.cos(-0.2), 0.0]),
+    "upright, sharper": 1.5 * np.array([np.sin(-0.5), np.cos(-0.5), 0.0]),
+}
+"""Ways to walls that meet the known one at an acute angle."""
+
+
+@pytest.mark.parametrize("new", NEW)
+def test_at_rest_the_first_guess_is_the_wall_itself(new):
+    """The mean of two directions is shorter than one, so that of upright walls it seems to come from above."""
+    summary, known, landmarks = _case(NEW[new], move=(0.0, 0.0, 0.0), baseline=(0.0, 0.0, 0.0))
     table = hypotheses(summary, known, landmarks)
     start = table.trials.start[table.kind == BOTH_WAYS]
-    np.testing.assert_allclose(start[0], _image(_ceiling(slope, aside=0.0)), atol=1e-9)
+    np.testing.assert_allclose(start[0], _image(NEW[new]), atol=1e-6)
     alone = hypotheses(summary, known, landmarks, both_ways=False)
     assert (alone.kind != BOTH_WAYS).all()
     assert len(alone.kind) == len(table.kind) - 1
+
+
+@pytest.mark.parametrize("new", NEW)
+@pytest.mark.parametrize("known", [(3.5, 0.0, 0.0), (0.56, -0.02, 0.0)])
+def test_walls_at_an_acute_angle_are_found(new, known):
+    """By fits of at most `STEPS` steps, while the agent goes a short way; the ends of its link are 0.1 m apart. How far
+    an upright wall leans is told by the angle's square alone: cost 0.1 leaves 0.15 m of its image's height open."""
+    summary, features, landmarks = _case(NEW[new], known=np.array(known), move=(0.1, 0.2, 0.0))
+    table = hypotheses(summary, features, landmarks)
+    table = table.take(table.kind == BOTH_WAYS)
+    fits = try_all(table.trials, summary)
+    assert fits.cost[0] < 0.1
+    off = np.abs(fits.place[0] - _image(NEW[new]))
+    assert (off < [0.01, 0.01, 0.15]).all()
 
 
 @pytest.mark.parametrize("slope", [0.05, 0.08, -0.08, 0.0, 0.3])
@@ -181,7 +203,7 @@ def test_an_upright_wall_under_a_known_ceiling_that_slopes_is_found_too():
 
 
 def test_both_orders_enter_the_log_as_partners():
-    decision = track_classification.TrackDecision(BOTH_WAYS, 1.0, 4, -1, *7 * [None])
+    decision = track_classification.TrackDecision(BOTH_WAYS, 1.0, 4, -1, *8 * [None])
     assert decision.is_wall
     assert decision.is_return
     assert decision.form == (-1, -1, -1, 4, track_classification.NEW)
