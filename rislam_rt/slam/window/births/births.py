@@ -13,7 +13,7 @@ from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.hypotheses.hypotheses import BESIDE, BOTH_WAYS, known_features
-from rislam_rt.slam.window.hypotheses.map_explanations import MapExplanation, explanations
+from rislam_rt.slam.window.hypotheses.map_explanations import explanations
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary, summarise_tracks
 from rislam_rt.slam.window.hypotheses.unheard_returns import bearings, missing_legs
 from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
@@ -38,8 +38,19 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
     if not full:
         return context
     rows, track_rows = rows[full], [track_rows[place] for place in full]
+    mean, covariance = window_gaussian.now(context.window)
+    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
+    histories, owner = summarise_tracks(context, track_rows)
+    told = explanations(context, rows, histories, owner, view, mean, covariance)
     panels = context.landmarks.panels
-    decisions, told, shares, histories = classify(context, rows, track_rows, view)
+    lonely = missing_legs(context, rows, mean)
+    beside = (
+        np.zeros(len(rows)) if context.scene.use_vt else _log_same_direction(context, rows, track_rows, histories, mean)
+    )
+    bases = [int(one.forms[0, 0]) for one in told]
+    over = [(one.track, one.log_evidence, panels.index(base) if base >= 0 and base in panels else -1)
+            for one, base in zip(told, bases, strict=True)]  # fmt: skip
+    decisions, shares = decide_tracks(context, track_rows, histories, owner, known, over, lonely, beside)
     gone = np.zeros(len(context.tracks.ident), dtype=np.bool_)
     looked, returns = context.tracks.looked.copy(), context.scene.use_vt
     for (row, _, forms, part), share in zip(told, shares, strict=True):
@@ -68,27 +79,6 @@ def births(context: WindowState, view: CycleAssociation) -> WindowState:
         looked[rows[row]] = context.tracks.hits[rows[row]]
     context = context._replace(tracks=context.tracks._replace(looked=looked).keep(~gone))
     return context if born < 0 else _without_rival(context, decisions[born].identity, panels)
-
-
-def classify(
-    context: WindowState, rows: Integers, track_rows: list[Integers], view: CycleAssociation
-) -> tuple[list[TrackDecision], list[MapExplanation], Floats, TrackSummary]:
-    """Decisions (T) on what caused tracks `rows` (T,), of `track_rows` of the log, explanations of some by the map with
-    their posteriors (E,), and the tracks' summaries."""
-    mean, covariance = window_gaussian.now(context.window)
-    known = known_features(mean[HEAD:].reshape(-1, 3), covariance[HEAD:, HEAD:], context.landmarks, mean[:3])
-    histories, owner = summarise_tracks(context, track_rows)
-    told = explanations(context, rows, histories, owner, view, mean, covariance)
-    panels = context.landmarks.panels
-    lonely = missing_legs(context, rows, mean)
-    beside = (
-        np.zeros(len(rows)) if context.scene.use_vt else _log_same_direction(context, rows, track_rows, histories, mean)
-    )
-    bases = [int(one.forms[0, 0]) for one in told]
-    over = [(one.track, one.log_evidence, panels.index(base) if base >= 0 and base in panels else -1)
-            for one, base in zip(told, bases, strict=True)]  # fmt: skip
-    decisions, shares = decide_tracks(context, track_rows, histories, owner, known, over, lonely, beside)
-    return decisions, told, shares, histories
 
 
 def _log_same_direction(

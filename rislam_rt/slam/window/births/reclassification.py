@@ -6,48 +6,32 @@ one moves the agent to where it fits, and scatters no more than a right one.
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Integers
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.predicted_returns import reflect
-from rislam_rt.slam.window.births.births import births, classify
+from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import remove_from_map
-from rislam_rt.slam.window.births.track_classification import WallPosterior
 from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.divergence.length_rates import MEASURED
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
-from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.motion_basis import HEAD
-from rislam_rt.slam.window.solver_limits import GATE, STRIDE
+from rislam_rt.slam.window.solver_limits import STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
 def reclassified(state: WindowState, view: CycleAssociation) -> WindowState:
-    """State without the wall that one path alone tells of, if that path's whole history says that it is none: as
-    classified in a trial without the wall, in which its track may at once be what is clear then."""
+    """State in which the path of a wall that nothing else tells of is what its whole history says it is, if that is
+    clearly something else: in a trial without the wall its track is the only one that is due for a birth."""
     nothing = view._replace(groups=view.groups._replace(leader=view.groups.leader[:0]))
     for row, at in _due(state):
         every = state._replace(tracks=state.tracks._replace(looked=state.tracks.hits))
-        trial = remove_from_map(every, np.arange(len(state.landmarks.ident)) != row)
-        track = (trial.tracks.ident == trial.log.track[at[-1]]).nonzero()[0]
-        if not len(track):
-            continue
-        decision = classify(trial, track, [at], nothing)[0][0]
-        place = window_gaussian.now(state.window)[0][HEAD:].reshape(-1, 3)[row]
-        image = reflect(window_gaussian.now(trial.window)[0][:3], place, state.landmarks.anchor[row])
-        if _probability(decision.walls, image) < 1.0 - CONSTANTS.born:
-            after = births(trial, nothing)
+        after = births(remove_from_map(every, np.arange(len(state.landmarks.ident)) != row), nothing)
+        found, new = after.log.form[at, 0], state.landmarks.next_ident
+        again = np.where(found == new, state.landmarks.ident[row], found) == state.log.form[at, 0]
+        if after.landmarks.next_ident > new and not again.all():
             looked = after.tracks.looked.copy()
             kept = np.isin(after.tracks.ident, state.tracks.ident)
             looked[kept] = state.tracks.looked[np.isin(state.tracks.ident, after.tracks.ident)]
             return after._replace(tracks=after.tracks._replace(looked=looked))
     return state
-
-
-def _probability(walls: WallPosterior, image: Floats) -> float:
-    """Posterior probability that a track is of a new wall in which the agent has the image (3,) [m]."""
-    gap = walls.place - image
-    near = np.vecdot(gap, np.linalg.solve(walls.covariance, gap[..., None])[..., 0]) < GATE
-    return float(walls.probability[near].sum())
 
 
 def _due(state: WindowState) -> list[tuple[int, Integers]]:

@@ -48,17 +48,6 @@ from rislam_rt.slam.window.solver_limits import CERTAIN
 from rislam_rt.slam.window.state import WindowState
 
 
-class WallPosterior(NamedTuple):
-    """Posterior of the new walls that a track may be of, of N hypotheses, to classify it."""
-
-    probability: Floats
-    """(N,) posterior probabilities."""
-    place: Floats
-    """(N, 3) [m] images of the agent in these walls."""
-    covariance: Floats
-    """(N, 3, 3) [m^2] of these."""
-
-
 class TrackDecision(NamedTuple):
     """Decision on what caused a track: the best hypothesis, its probability, and the new feature that it asks for."""
 
@@ -84,8 +73,6 @@ class TrackDecision(NamedTuple):
     """(1,) panel identity, if it is a point."""
     length: float
     """[m] of its path."""
-    walls: WallPosterior
-    """Of all walls that it may be of."""
 
     @property
     def form(self) -> tuple[int, int, int, int, int]:
@@ -234,11 +221,9 @@ def decide_tracks(
         same = _alike(table, fits, own, own[best - 1]) if best else np.zeros(0, dtype=np.bool_)
         weighed = np.append(weight[best], weight[1 : 1 + len(own)][same])
         probability = float(np.exp(np.logaddexp.reduce(weighed) - total))
-        new = own[table.trials.is_wall[own]]
-        walls = WallPosterior(np.exp(evidence[new] - total), fits.place[new], fits.covariance[new])
         if best == 0:
             decisions.append(
-                TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody, 0.0, walls)
+                TrackDecision(-1, probability, -1, -1, np.zeros(3), AXES, no_holds(), 0.0, 0.0, nobody, 0.0)
             )
             continue
         at = _cautious(oblique, own, evidence, same, own[best - 1])
@@ -250,7 +235,7 @@ def decide_tracks(
                 int(table.kind[at]), probability, int(table.known[at]), int(table.over[at]), fits.place[at],
                 fits.held[at],
                 _holds(table, fits.place[at], summary.middle, known, landmarks, at),
-                float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]), walls,
+                float(fits.share[at]), float(misfit), over.identity.take(np.array([at])), float(length[at]),
             )
         )  # fmt: skip
     return decisions, shares

@@ -239,7 +239,7 @@ def test_tracks_speak_against_a_birth_that_turns_the_motion(turned, clear):
     )  # fmt: skip
     ratio = motion_agreement.log_agreement(state, _moving(velocity + turned * np.eye(3)[0], 0.002, count))
     at_length = TrackDecision(
-        0, 0.98, -1, -1, np.ones(3), 1e-6 * np.eye(3), no_holds(), 0.0, 0.0, unknown(1, 1), 5.0, None
+        0, 0.98, -1, -1, np.ones(3), 1e-6 * np.eye(3), no_holds(), 0.0, 0.0, unknown(1, 1), 5.0
     )  # fmt: skip
     assert is_clear(at_length)
     assert is_clear(at_length, ratio) == clear

@@ -203,7 +203,7 @@ def test_an_upright_wall_under_a_known_ceiling_that_slopes_is_found_too():
 
 
 def test_both_orders_enter_the_log_as_partners():
-    decision = track_classification.TrackDecision(BOTH_WAYS, 1.0, 4, -1, *8 * [None])
+    decision = track_classification.TrackDecision(BOTH_WAYS, 1.0, 4, -1, *7 * [None])
     assert decision.is_wall
     assert decision.is_return
     assert decision.form == (-1, -1, -1, 4, track_classification.NEW)
