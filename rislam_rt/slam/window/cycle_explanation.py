@@ -15,9 +15,9 @@ from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.doubted_returns import with_other_cause
-from rislam_rt.slam.window.births.reclassification import reclassified
 from rislam_rt.slam.window.births.explained_walls import explained_walls
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, remove_from_map
+from rislam_rt.slam.window.births.reclassification import reclassified
 from rislam_rt.slam.window.births.track_fragments import with_fragments
 from rislam_rt.slam.window.cycle_association import CycleAssociation, echoes
 from rislam_rt.slam.window.divergence import divergence_monitor

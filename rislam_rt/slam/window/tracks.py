@@ -237,3 +237,10 @@ def due(tracks: WindowTracks, cycle: int) -> Integers:
     grown = tracks.hits >= np.maximum(6, np.minimum(3 * tracks.looked // 2, tracks.looked + CONSTANTS.window // 2))
     rows = (grown & (cycle - tracks.last <= 1)).nonzero()[0]
     return rows[np.argsort(tracks.mean[rows, 0, 0])]
+
+
+def looked_as_before(tracks: WindowTracks, before: WindowTracks) -> WindowTracks:
+    """Tracks after a trial in which others than they were due: examined for a birth when they were `before`."""
+    looked = tracks.looked.copy()
+    looked[np.isin(tracks.ident, before.ident)] = before.looked[np.isin(before.ident, tracks.ident)]
+    return tracks._replace(looked=looked)

@@ -17,6 +17,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.solver_limits import STRIDE
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.tracks import looked_as_before
 
 
 def with_other_cause(state: WindowState, view: CycleAssociation) -> WindowState:
@@ -33,8 +34,7 @@ def with_other_cause(state: WindowState, view: CycleAssociation) -> WindowState:
     of_one_wall = _over_one_wall(after.log)[at] & (after.log.form[at, 0, 3] >= state.landmarks.next_ident)
     if not of_one_wall.all():
         return state
-    kept = np.isin(before.ident, after.tracks.ident)
-    return after._replace(tracks=after.tracks._replace(looked=before.looked[kept]))
+    return after._replace(tracks=looked_as_before(after.tracks, before))
 
 
 def _doubted(state: WindowState) -> list[Integers]:

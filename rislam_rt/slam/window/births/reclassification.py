@@ -15,6 +15,7 @@ from rislam_rt.slam.window.divergence.length_rates import MEASURED
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.solver_limits import STRIDE
 from rislam_rt.slam.window.state import WindowState
+from rislam_rt.slam.window.tracks import looked_as_before
 
 
 def reclassified(state: WindowState, view: CycleAssociation) -> WindowState:
@@ -27,10 +28,7 @@ def reclassified(state: WindowState, view: CycleAssociation) -> WindowState:
         found, new = after.log.form[at, 0], state.landmarks.next_ident
         again = np.where(found == new, state.landmarks.ident[row], found) == state.log.form[at, 0]
         if after.landmarks.next_ident > new and not again.all():
-            looked = after.tracks.looked.copy()
-            kept = np.isin(after.tracks.ident, state.tracks.ident)
-            looked[kept] = state.tracks.looked[np.isin(state.tracks.ident, after.tracks.ident)]
-            return after._replace(tracks=after.tracks._replace(looked=looked))
+            return after._replace(tracks=looked_as_before(after.tracks, state.tracks))
     return state
 
 

@@ -43,7 +43,9 @@ def mistaken(walked):
     state, at = alone(state, row)
     place, anchor = state.window.features, state.landmarks.anchor
     span = place - anchor
-    known = next(k for k in other if abs(span[k] @ span[row]) < 0.1 * np.linalg.norm(span[k]) * np.linalg.norm(span[row]))
+    known = next(
+        k for k in other if abs(span[k] @ span[row]) < 0.1 * np.linalg.norm(span[k]) * np.linalg.norm(span[row])
+    )
     agent = window_gaussian.poses(state.window)[-1, :3]
     image, over = reflect(agent, place[row], anchor[row]), reflect(agent, place[known], anchor[known])
     normal = (image - over) / np.linalg.norm(image - over)
