@@ -53,7 +53,7 @@ STILL = 1e-5
 TOLD = 1e-4
 """[m] standard deviation of a start's position that is held exactly, as far as rounding of the solution lets it."""
 ASTRAY = 0.3
-"""[m] by which a step of a fit may go along directions in which a length alone tells nothing."""
+"""[m] by which a step of a fit may go along directions of which a length alone, or an angle's square, tells nothing."""
 BEARINGS = 8
 """Number of initial bearings, all around, of an upright wall of which only a path length tells."""
 REACH = 5.0

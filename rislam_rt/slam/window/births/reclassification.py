@@ -1,7 +1,7 @@
-"""Reclassification: walls that one path alone tells of are asked anew what they are, as that path's history grows.
+"""Reclassification: walls that one path alone tells of are asked anew what they are.
 
-A birth is one decision on six cycles and on the walls that were known then. The return over two walls that was born as
-one moves the agent to where it fits, and scatters no more than a right one.
+A birth is one decision on six cycles and on the walls that were known then. A return over two walls that was born as
+one wall moves the agent to where that fits, and scatters no more than a right one.
 """
 
 import numpy as np
@@ -19,28 +19,30 @@ from rislam_rt.slam.window.tracks import looked_as_before
 
 
 def reclassified(state: WindowState, view: CycleAssociation) -> WindowState:
-    """State in which the path of a wall that nothing else tells of is what its whole history says it is, if that is
-    clearly something else: in a trial without the wall its track is the only one that is due for a birth."""
+    """State in which the path of a wall that nothing else tells of is over other walls, if what the window holds of it
+    is clearly that of another new wall: in a trial without the wall its track is the only one due for a birth.
+
+    Another order of the same walls, or a partner beside them, is no other wall.
+    """
     nothing = view._replace(groups=view.groups._replace(leader=view.groups.leader[:0]))
     for row, at in _due(state):
         every = state._replace(tracks=state.tracks._replace(looked=state.tracks.hits))
         after = births(remove_from_map(every, np.arange(len(state.landmarks.ident)) != row), nothing)
         found, new = after.log.form[at, 0], state.landmarks.next_ident
-        again = np.where(found == new, state.landmarks.ident[row], found) == state.log.form[at, 0]
+        again = np.sort(np.where(found == new, state.landmarks.ident[row], found)) == np.sort(state.log.form[at, 0])
         if after.landmarks.next_ident > new and not again.all():
             return after._replace(tracks=looked_as_before(after.tracks, state.tracks))
     return state
 
 
 def _due(state: WindowState) -> list[tuple[int, Integers]]:
-    """Rows of the walls that one path alone tells of and whose histories have grown by a half since they were asked
-    last, and the rows (A,) of the log of these paths."""
+    """Rows of the walls that one path alone tells of, each in its turn once in half a window, as soon as the path has
+    half as many measurements again as a birth asks for; and the rows (A,) of the log of these paths."""
     log, landmarks, found = state.log, state.landmarks, []
-    for row in landmarks.walls:
+    turns = CONSTANTS.window // (2 * STRIDE)
+    for row in landmarks.walls[(landmarks.ident[landmarks.walls] - state.cycle // STRIDE) % turns == 0]:
         at = (log.form == landmarks.ident[row]).any(axis=(1, 2)).nonzero()[0]
-        forms, count = np.unique(log.form[at].reshape(-1, 10), axis=0), len(at)
-        grown = np.floor(np.log(np.maximum([count, count - STRIDE], 1) / MEASURED) / np.log(1.5))
-        late = count > CONSTANTS.window - STRIDE and state.cycle % (CONSTANTS.window // 2) < STRIDE
-        if len(forms) == 1 and forms[0, 5] == UNKNOWN and (grown[0] > max(grown[1], 0.0) or late):
+        forms = np.unique(log.form[at].reshape(-1, 10), axis=0)
+        if len(forms) == 1 and forms[0, 5] == UNKNOWN and len(at) >= 1.5 * MEASURED:
             found.append((int(row), at))
     return found

@@ -13,7 +13,6 @@ from rislam_rt.slam.sampling import square_roots
 from rislam_rt.slam.window.hypotheses.hypothesis_fits import Trials
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
-from rislam_rt.slam.window.solver_limits import STEPS
 
 KINDS = (
     "wall", "known, wall", "wall, known", "point", "point over rx wall", "point over tx wall", "point over same",
@@ -161,16 +160,21 @@ def _square_to(alone: Floats, across: Floats, middle: Floats) -> Floats:
 def _acute(rx: Floats, heard: Floats, length: Floats, out: Floats, middle: Floats) -> Floats:
     """Images (W, T, 3) of `middle` in new walls that meet known ones, whose images lie at `out` (W, 3) from it, at an
     acute angle, along the edge towards which rays (T, 3) are `heard` at `rx` (T, 3): the paths' `length` (T,) is twice
-    the edge's distance times the sine of the angle, and the mean of their directions is as much shorter than one."""
+    the edge's distance times the sine of the angle, and the mean of their directions is as much shorter than one.
+
+    So that mean lies on the sphere whose diameter is the known wall's normal times `length` over twice its distance. Of
+    the two points there above what is heard, the higher one counts, if it is within the unit sphere.
+    """
     reach = np.maximum(np.linalg.norm(out, axis=1), 1e-6)
     normal = out / reach[:, None]
     depth = np.maximum(0.5 * reach[:, None] - normal @ (rx - middle).T, CONSTANTS.depth)
-    flat = np.linalg.norm(heard[:, :2], axis=1)
-    sine = np.ones(depth.shape)
-    for _ in range(STEPS):
-        ray = np.concatenate([heard[:, :2] / sine[..., None], np.sqrt(1.0 - (flat / sine) ** 2)[..., None]], axis=-1)
-        toward = np.maximum((ray @ normal[..., None])[..., 0], CONSTANTS.dip)
-        sine = np.clip(np.sqrt(sine * length * toward / (2.0 * depth)), flat, 1.0)
+    diameter, flat = length / (2.0 * depth), np.vecdot(heard[:, :2], heard[:, :2])
+    half, top = 0.5 * diameter * normal[:, 2:], np.sqrt(np.maximum(1.0 - flat, 0.0))
+    root = np.sqrt(np.maximum(half**2 + diameter * (normal[:, :2] @ heard[:, :2].T) - flat, 0.0))
+    rise = np.clip(np.where(half + root <= top, half + root, half - root), 0.0, top)
+    ray = np.concatenate([np.broadcast_to(heard[:, :2], (*rise.shape, 2)), rise[..., None]], axis=-1)
+    ray /= np.maximum(np.linalg.norm(ray, axis=-1, keepdims=True), 1e-6)
+    toward = np.maximum((ray @ normal[..., None])[..., 0], CONSTANTS.dip)
     edge = depth / toward
     cos = np.sqrt(np.clip(1.0 - (length / (2.0 * edge)) ** 2, CONSTANTS.dip**2, 0.5))[..., None]
     along = ray - toward[..., None] * normal[:, None]

@@ -100,7 +100,7 @@ def try_all(trials: Trials, summary: TrackSummary) -> Fits:
         if turn == STEPS:
             break
         stiff = now.normal.copy()
-        # a length alone leaves a ring of places, along which a straight step leads astray
+        # a length alone leaves a ring of places, and an angle's square a flat ridge, along which steps lead astray
         stiff[(trials.far | trials.even)[some], common:, common:] += AXES / ASTRAY**2
         step[some] = np.linalg.solve(stiff, now.slope[..., None])[..., 0]
         length = np.sqrt(np.vecdot(step[some, common:], step[some, common:]))[:, None]

@@ -1,9 +1,10 @@
-"""Reclassification: a wall that one path alone tells of is asked again as the path's history grows."""
+"""Reclassification: a wall that one path alone tells of is asked again what it is."""
 
 import numpy as np
 import pytest
 
 from rislam_rt.slam.predicted_returns import NONE, TX, reflect
+from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births import reclassification
 from rislam_rt.slam.window.births.feature_removal import resolve
 from rislam_rt.slam.window.births.reclassification import reclassified
@@ -11,6 +12,7 @@ from rislam_rt.slam.window.cycle_explanation import remove_or_add_features
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
+from rislam_rt.slam.window.solver_limits import STRIDE
 
 
 def told_by(state, row):
@@ -85,6 +87,22 @@ def test_a_cycle_asks(mistaken, walked, monkeypatch):
     assert state.landmarks.ident[row] not in after.landmarks.ident
 
 
+def test_only_its_track_is_due_and_the_map_of_before_says_nothing(mistaken, monkeypatch):
+    """The association's returns are numbered by the rows of a map that has the wall."""
+    state, view, _, row = mistaken
+    always(monkeypatch, row)
+    asked = []
+    monkeypatch.setattr(reclassification, "births", lambda trial, returns: asked.append((trial, returns)) or trial)
+    fresh = state.tracks._replace(looked=np.zeros_like(state.tracks.looked))
+    assert len(tracks.due(fresh, state.cycle))
+    reclassified(state._replace(tracks=fresh), view)
+    ((trial, returns),) = asked
+    due = trial.tracks.ident[tracks.due(trial.tracks, trial.cycle)]
+    assert due.tolist() == np.unique(trial.log.track[told_by(state, row)[0]]).tolist()
+    assert not len(returns.groups.leader)
+    assert len(view.groups.leader)
+
+
 def test_right_walls_stay(walked, monkeypatch):
     state, _, view, _ = walked
     for row in state.landmarks.walls:
@@ -94,24 +112,59 @@ def test_right_walls_stay(walked, monkeypatch):
         assert reclassified(lonely, view) is lonely
 
 
-def test_a_wall_is_asked_as_its_history_grows_by_half(walked):
-    row = upright(walked[0])
-    state, at = alone(walked[0], row)
-    asked = []
-    for count in range(1, len(at) + 1):
-        form = state.log.form.copy()
-        form[at[count:]] = UNKNOWN
-        due = reclassification._due(state._replace(log=state.log._replace(form=form)))
-        asked += [count] if row in [each for each, _ in due] else []
-    # 9, 13.5 and 20.25 measurements, each in the cycles of one stride
-    assert asked == [9, 10, 11, 14, 15, 16, 21, 22, 23]
+def test_what_is_nothing_clear_stays(mistaken, monkeypatch):
+    """A wall is not taken back for being unlikely: neighbours make any unlikely in the long run."""
+    state, view, _, row = mistaken
+    always(monkeypatch, row)
+    monkeypatch.setattr(reclassification, "births", lambda trial, returns: trial)
+    assert reclassified(state, view) is state
 
 
-def test_a_wall_that_two_paths_tell_of_is_not_asked(walked):
+@pytest.mark.parametrize("partner", [False, True])
+def test_the_same_walls_in_another_order_are_no_other_wall(mistaken, monkeypatch, partner):
+    """Nor are they with a partner: where two walls stand at right angles one path has both orders."""
+    state, view, _, row = mistaken
+    always(monkeypatch, row)
+    at = told_by(state, row)[0]
+
+    def born(trial, returns):
+        form, new = trial.log.form.copy(), state.landmarks.next_ident
+        first, second = state.log.form[at[0], 0, 3], new
+        form[at, 0] = [TX, NONE, NONE, *([first, second] if partner else [second, first])]
+        form[at, 1] = [TX, NONE, NONE, second, first] if partner else UNKNOWN
+        return trial._replace(
+            log=trial.log._replace(form=form), landmarks=trial.landmarks._replace(next_ident=new + 1)
+        )  # fmt: skip
+
+    monkeypatch.setattr(reclassification, "births", born)
+    assert reclassified(state, view) is state
+
+
+def test_each_wall_is_asked_in_its_turn_once_in_half_a_window(walked):
     row = upright(walked[0])
     state, at = alone(walked[0], row)
+    due = [cycle for cycle in range(60, 120, STRIDE) if row in rows_due(state._replace(cycle=cycle))]
+    assert np.diff(due).tolist() == [18] * (len(due) - 1)
+    assert len(due) >= 3
+    lonely = state._replace(cycle=due[0])
     form = state.log.form.copy()
     form[at[9:]] = UNKNOWN
-    form[at[5], 0, 4] = state.landmarks.ident[next(each for each in state.landmarks.walls if each != row)]
-    due = reclassification._due(state._replace(log=state.log._replace(form=form)))
-    assert row not in [each for each, _ in due]
+    assert row in rows_due(lonely._replace(log=state.log._replace(form=form)))
+    form[at[8]] = UNKNOWN  # half as many again as a birth asks for are 9
+    assert row not in rows_due(lonely._replace(log=state.log._replace(form=form)))
+
+
+def rows_due(state):
+    """Rows of the walls that are due."""
+    return [row for row, _ in reclassification._due(state)]
+
+
+@pytest.mark.parametrize(("slot", "some"), [(0, slice(5, 6)), (1, slice(5, 6)), (1, slice(None))])
+def test_a_wall_that_two_paths_tell_of_is_not_asked(walked, slot, some):
+    """The second one by itself, or as a partner, once or always."""
+    row = upright(walked[0])
+    state, at = alone(walked[0], row)
+    state = next(each for each in (state._replace(cycle=60 + more) for more in range(18)) if row in rows_due(each))
+    form, other = state.log.form.copy(), next(each for each in state.landmarks.walls if each != row)
+    form[at[some], slot] = [TX, NONE, NONE, state.landmarks.ident[row], state.landmarks.ident[other]]
+    assert row not in rows_due(state._replace(log=state.log._replace(form=form)))
