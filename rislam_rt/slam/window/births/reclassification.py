@@ -19,10 +19,11 @@ from rislam_rt.slam.window.tracks import looked_as_before
 
 
 def reclassified(state: WindowState, view: CycleAssociation) -> WindowState:
-    """State in which the path of a wall that nothing else tells of is over other walls, if what the window holds of it
-    is clearly that of another new wall: in a trial without the wall its track is the only one due for a birth.
+    """State in which the path of a wall that nothing else tells of is over another new feature, if what the window
+    holds of it clearly is: in a trial without the wall its track is the only one due for a birth.
 
-    Another order of the same walls, or a partner beside them, is no other wall.
+    Another order of the same walls, or a partner beside them, is no other feature. The map's own returns are not among
+    the path's causes.
     """
     nothing = view._replace(groups=view.groups._replace(leader=view.groups.leader[:0]))
     for row, at in _due(state):

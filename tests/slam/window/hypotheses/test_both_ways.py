@@ -148,7 +148,7 @@ def test_walls_at_an_acute_angle_are_found(new, known):
 
 def test_noise_leads_no_fit_astray():
     """It ends at no more than the truth costs. A wall at 76 degrees to one beside which the agent goes: next to nothing
-    tells how far it leans, and steps that are not damped go half a metre that way."""
+    tells how far it leans, and steps that are not damped go far that way."""
     new, tail = 3.8 * np.array([np.sin(-0.24), np.cos(-0.24), 0.0]), CONSTANTS.tail
     summary, features, landmarks = _case(new, known=np.array([0.56, -0.02, 0.0]), move=(0.1, 0.2, 0.0))
     for seed in range(40):
