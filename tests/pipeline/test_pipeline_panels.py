@@ -12,7 +12,7 @@ from rislam_rt.pipeline.design_at_position import design_at, design_table
 from rislam_rt.pipeline.long.slices import join_schemes, subsampled_scheme
 from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
 from rislam_rt.pipeline.run_datasets import dataset_to_paths, dataset_to_scheme, paths_to_dataset, scheme_to_dataset
-from rislam_rt.pipeline.scores.summary import landmark_scores, landmark_track
+from rislam_rt.pipeline.scores.summary import landmark_track, summarise_scheme
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import panel_found_at
 from rislam_rt.report.map_from_above import draw_above
@@ -43,7 +43,7 @@ def result():
 
 def test_both_panels_are_found_and_told_apart(result):
     scheme = result.schemes["optimized"]
-    scores = landmark_scores(result.scene, scheme)
+    scores = summarise_scheme(result, scheme)["landmarks"]
     track = landmark_track(result.scene, scheme)
     for panel, name in enumerate(("above", "beside")):
         assert panel_found_at(result, scheme, panel) is not None
@@ -52,6 +52,7 @@ def test_both_panels_are_found_and_told_apart(result):
         assert off @ np.linalg.solve(spread, off) < 16.3  # chi^2, 3 dof: 0.999
         assert np.sqrt(np.trace(spread)) < 0.2  # it claims 0.02 m above, 0.18 m beside
         assert scores[name]["cycles_identified"] > 5
+        assert 0.0 <= scores[name]["audible_from_s"] < scores[name]["identified_from_s"] < 2.5
         named = np.argwhere(scheme.named(panel))
         assert (track.column[named[:, 0], 1 + panel] == named[:, 1]).all()  # never another landmark
     assert panel_found_at(result, scheme, 2) is None

@@ -82,12 +82,13 @@ def test_the_panel_is_found_though_a_ghost_lies_nearer_to_it(result):
     assert panel_found_at(result, there) == 0.0
     entry = landmark_scores(result.scene, there)["ris"]
     assert entry["final_m"] == pytest.approx(0.016)
-    assert (entry["cycles_identified"], entry["identified_last"]) == (6, True)
+    assert (entry["cycles_identified"], entry["identified_last"], entry["identified_from_s"]) == (6, True, 0.0)
     away = replace(there, landmark_position=place + np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
     assert panel_found_at(result, away) is None
     off = {**result.schemes, "random": replace(away, outcome=scheme.outcome)}
     summary = summarise(replace(result, schemes=off))
-    assert summary["schemes"]["random"]["landmarks"]["ris"]["identified_last"] is False
+    unfound = summary["schemes"]["random"]["landmarks"]["ris"]
+    assert (unfound["identified_last"], unfound["identified_from_s"]) == (False, None)
     said = judge_run(replace(result, schemes=off), summary)
     assert "panel not found" in said.schemes["random"]
     assert "ris: a landmark lies there, which the map does not take for the panel" in said.missing["random"]

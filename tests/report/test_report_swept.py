@@ -32,7 +32,10 @@ def scores(rmse, bound, *, diverged=False, panel=0.05):
         "diverged": diverged, "nees_per_dof": 1.1, "association": {"accuracy": 0.97}, "map": {"gospa_m": 0.3},
         "landmarks": {
             "sphere": {"final_m": 0.04, "rmse_m": 0.05, "cycles_held": 9, "bound_m": 0.03},
-            "ris": {"final_m": panel, "rmse_m": panel, "cycles_held": 9, "cycles_identified": 8, "bound_m": 0.01},
+            "ris": {
+                "final_m": panel, "rmse_m": panel, "cycles_held": 9, "cycles_identified": 8, "bound_m": 0.01,
+                "audible_from_s": 0.1, "identified_from_s": 0.7,
+            },
         },
         "walls": {
             name: dict(zip(WALL_SCORES, values, strict=True))
@@ -164,6 +167,7 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     page = write_swept(rows(points, lambda p, f: 0.02 * f), spec, RECORD, tmp_path).read_text()
     assert "| office | optimized |" in page
     assert "1.00, bound 0.50 (50%)" in page
+    assert "| 0.7 (0.1) |" in page  # the panel is held from 0.7 s on, audible from 0.1 s on
     entry = scheme_entry(group_rows(rows(points, lambda p, f: 0.02 * f))[0], "optimized")
     assert missed_aims(entry) == []
     assert missed_aims({**entry, "ris_m": None, "wall_deg": 2.1, "diverged": 1}) == ["ris_m", "wall_deg", "diverged"]

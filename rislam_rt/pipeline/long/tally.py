@@ -16,6 +16,7 @@ from rislam_rt.pipeline.long.slices import SlicePart
 from rislam_rt.pipeline.scores.component_sources import path_sources, true_planes
 from rislam_rt.pipeline.scores.loss_causes import LossTally
 from rislam_rt.pipeline.scores.summary import (
+    first_time,
     has_diverged,
     landmark_track,
     map_score,
@@ -47,6 +48,7 @@ class Tally:
         count = len(scene.landmarks)
         self.landmark_square, self.held, self.identified = np.zeros(count), np.zeros(count, int), np.zeros(count, int)
         self.landmark_final, self.identified_last = np.full(count, np.nan), np.zeros(count, bool)
+        self.identified_from: dict[int, float] = {}
         self.overlap = _Overlap()
         self.map: Any = None
         self.panel = False
@@ -125,6 +127,9 @@ class Tally:
             number = len(self.scene.scatterers) + panel
             self.identified[number] += int(np.sum(panels[:, panel] >= 0))
             self.identified_last[number] = panels[-1, panel] >= 0
+            first = first_time(panels[:, panel] >= 0, part.scheme.time)
+            if first is not None:
+                self.identified_from.setdefault(number, part.scheme.time[0] + first - self.start)
 
     def _landmarks(self) -> dict[str, dict[str, Any]]:
         """Scores of each true landmark from the tally of a long run, by name."""
@@ -140,6 +145,7 @@ class Tally:
             if self.scene.panel_number(number) >= 0:
                 found[name]["cycles_identified"] = int(self.identified[number])
                 found[name]["identified_last"] = bool(self.identified_last[number]) if self.panel else None
+                found[name]["identified_from_s"], found[name]["audible_from_s"] = self.identified_from.get(number), None
         return found
 
     def _count_components(self, part: SlicePart) -> None:

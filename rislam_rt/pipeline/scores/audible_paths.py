@@ -3,7 +3,7 @@
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.model import PathKind, Paths
+from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 HEARD = 2.0
@@ -31,6 +31,12 @@ def audible_planes(paths: Paths, audible: Booleans, group: Integers) -> Booleans
         _, _, tx, rx = paths.identity(path)
         over[path, group[[*tx, *rx]]] = True
     return np.asarray((audible.astype(np.int64) @ over) > 0)
+
+
+def landmarks_audible(scene: Scene, paths: Paths, audible: Booleans) -> Booleans:
+    """Whether an `audible` path (K, P) goes over each landmark of the scene, (K, N)."""
+    of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
+    return np.asarray((audible.astype(np.int64) @ of) > 0)
 
 
 def audible_seconds(audible: Booleans, time: Floats) -> Floats:

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt import evaluate
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.model import STEPS, MapEstimate, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.schemes import SCHEMES
+from rislam_rt.pipeline.scores.audible_paths import audible_paths, landmarks_audible
 from rislam_rt.pipeline.scores.component_sources import component_labels, uses_wall_returns
 from rislam_rt.pipeline.scores.loss_causes import loss_scores, unnoticed_lines
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound, scheme_bound
@@ -64,8 +65,8 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     settings = build_settings(PipelineSpec.model_validate(dict(result.config)), panels)
     use_vt = uses_wall_returns(scheme.scheme, settings)
     score = evaluate.association_score(*component_labels(scene, result.paths, scheme, use_vt=use_vt))
-    audible = seconds_audible(scene, result.paths, settings, scheme.gain, use_vt=use_vt)
-    walls = wall_scores(scene, scheme.map, least, audible)
+    audible = audible_paths(result.paths.with_gain(scheme.gain), settings, use_vt=use_vt)
+    walls = wall_scores(scene, scheme.map, least, seconds_audible(scene, result.paths, audible))
     seconds = dict(zip(STEPS, scheme.seconds.mean(axis=0).tolist(), strict=True))
     return {
         "rmse_m": error,
@@ -81,7 +82,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "outcomes": {name: scheme.outcome.count(name) for name in sorted(set(scheme.outcome))},
         "lost": loss_scores(scheme),
         "true_loss": true_loss(scheme, relative, least),
-        "landmarks": landmark_scores(scene, scheme, least),
+        "landmarks": landmark_scores(scene, scheme, least, landmarks_audible(scene, result.paths, audible)),
         "walls": walls,
         "ghost_walls": count_ghosts(scene, scheme.map),
         "map": map_score(scene, scheme.map, panel=bool(scheme.levels)),
@@ -186,8 +187,11 @@ def landmark_track(scene: Scene, scheme: SchemeResult, begin: Floats | None = No
     return LandmarkTrack(error, column)
 
 
-def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | None = None) -> dict[str, dict[str, Any]]:
-    """Scores of each true landmark: position RMSE [m] over the cycles in which it is mapped, last error and bound.
+def landmark_scores(
+    scene: Scene, scheme: SchemeResult, least: SchemeBound | None = None, audible: Booleans | None = None
+) -> dict[str, dict[str, Any]]:
+    """Scores of each true landmark: position RMSE [m] over the cycles in which it is mapped, last error and bound; of a
+    panel also when it was first `audible` (K, N), and when the map first held it, since the run's begin.
 
     Null where it was never mapped; the bound is null where no path from it was detectable.
     """
@@ -205,5 +209,14 @@ def landmark_scores(scene: Scene, scheme: SchemeResult, least: SchemeBound | Non
         if (panel := scene.panel_number(number)) >= 0:
             entry["cycles_identified"] = int(np.sum(panels[:, panel] >= 0))
             entry["identified_last"] = bool(panels[-1, panel] >= 0) if scheme.levels else None
+            entry["identified_from_s"] = first_time(panels[:, panel] >= 0, scheme.time)
+            if audible is not None:
+                heard = audible[:, number] & bool(scheme.levels)
+                entry["audible_from_s"] = first_time(heard, scheme.time)
         scores[name] = entry
     return scores
+
+
+def first_time(true: Booleans, time: Floats) -> float | None:
+    """Time [s] since a run's begin of the first cycle (K,) in which what is scored was true; None if it never was."""
+    return float(time[np.argmax(true)] - time[0]) if true.any() else None

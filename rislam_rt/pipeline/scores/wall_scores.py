@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import COPLANAR_ANGLE, COPLANAR_OFFSET
 from rislam_rt.evaluate import Surfaces, ghost_planes, match_planes, plane_angle, plane_distance
 from rislam_rt.model import MapEstimate, Paths, Scene
-from rislam_rt.pipeline.scores.audible_paths import HEARD, audible_paths, audible_planes, audible_seconds
+from rislam_rt.pipeline.scores.audible_paths import HEARD, audible_planes, audible_seconds
 from rislam_rt.pipeline.scores.posterior_bound import SchemeBound
-from rislam_rt.pipeline.specification.pipeline_spec import Settings
 
 
 def wall_scores(
@@ -89,14 +88,10 @@ def found_of_heard(walls: Mapping[str, Mapping[str, Any]]) -> str:
     return f"{found} of {sum(bool(plane.heard) for plane in planes)}"
 
 
-def seconds_audible(scene: Scene, paths: Paths, settings: Settings, gain: Any, *, use_vt: bool) -> Floats:
-    """Total time (W,) [s] for which a path over each wall's plane was above the detection threshold, for its score.
-
-    `gain` (K, P) are the paths' gains under the applied codes; wall returns count with `use_vt`.
-    """
+def seconds_audible(scene: Scene, paths: Paths, audible: Booleans) -> Floats:
+    """Total time (W,) [s] for which an `audible` path (K, P) went over each wall's plane, for its score."""
     group = coplanar(build_walls(scene))
-    audible = audible_planes(paths, audible_paths(paths.with_gain(gain), settings, use_vt=use_vt), group)
-    return audible_seconds(audible, scene.agent.time)[group]
+    return audible_seconds(audible_planes(paths, audible, group), scene.agent.time)[group]
 
 
 def count_ghosts(scene: Scene, estimate: MapEstimate) -> int:

@@ -101,7 +101,8 @@ def panels_of(group: Group, scheme: str) -> list[str]:
 
 
 def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
-    """Entry of panel and scatterers: RMS errors and bounds at the runs' end, and the share mapped; None of nothing."""
+    """Entry of panel and scatterers: RMS errors and bounds at the runs' end, and the share mapped; of panels the median
+    times from which they were audible and identified; None of nothing."""
     panels = panels_of(group, scheme)
     names = group.parts(scheme, "landmarks")
     own = panels if SCHEMES[scheme].panel else []
@@ -110,6 +111,10 @@ def _landmarks(group: Group, scheme: str) -> dict[str, float | None]:
         error, bound = (_pooled(group, scheme, "landmarks", members, part) for part in ("final_m", "bound_m"))
         found |= {f"{kind}_m": _rms(error), f"{kind}_bound_m": bound_beside(bound, error)}
         found[f"{kind}_found"] = _share(error)
+    for name in ("audible", "identified"):
+        since = _pooled(group, scheme, "landmarks", own, f"{name}_from_s")
+        known = since[~np.isnan(since)]
+        found[f"ris_{name}_s"] = float(np.median(known)) if len(known) else None
     return found
 
 

@@ -105,27 +105,28 @@ def rooms_body(content: Mapping[str, Any], spec: RoomsSpec, figure: str | None) 
     aims = content["aims"]
     text = f"""Aims: agent's RMSE at most {aims["rmse_m"]:g} m and {aims["over_bound"]:g} times its posterior bound,
     panel at most {aims["ris_m"]:g} m, scatterers {aims["scatterer_m"]:g} m, walls {aims["wall_deg"]:g} degrees and
-    {aims["wall_m"]:g} m, no divergence. Landmarks and walls are scored at the end of a run, RMS over those found, each
-    with the posterior bound of the same ones; a share in brackets says how many were, of walls among those over which
-    a path is above the detection threshold for {HEARD:g} s in all. A plane of the map stands for a wall within
-    {NEAR_WALL:g} m of it (RMS over its surface) and {NEAR_ANGLE:g} degrees, one to one, walls in one plane being one;
-    those that stand for none, heard or not, are ghosts, a mean number a run. The distance of a wall is that at the
-    middle of its surface. "Own" is the deviation of the angle that the map itself reckons with. GOSPA is of the map's
-    points, cut off at 1 m, order 2."""
+    {aims["wall_m"]:g} m, no divergence. Landmarks and walls are scored at the end of a run, RMS over those found,
+    each with the posterior bound of the same ones; a share in brackets says how many were, of walls among those
+    over which a path is above the detection threshold for {HEARD:g} s in all. A plane of the map stands for a wall
+    within {NEAR_WALL:g} m of it (RMS over its surface) and {NEAR_ANGLE:g} degrees, one to one, walls in one plane
+    being one; those that stand for none, heard or not, are ghosts, a mean number a run. The distance of a wall is
+    that at the middle of its surface. "From" is when the map first held the panel, and in brackets when a path over
+    it was first audible, both since the run's begin, in the median of the runs in which they were. "Own" is the
+    deviation of the angle that the map itself reckons with. GOSPA is of the map's points, cut off at 1 m, order 2."""
     lines = [*paragraph(text), ""]
     text = """The error budget: each aim that is missed, with what limits it. That is the bound where the error is
     within 1.5 of it, else association where fewer than 95 % of the components are taken for what they are, else the
     filter. The bounds know the association and hold all paths as resolved."""
     lines += [*paragraph(text), "", *picture(figure, "RMSE of the agent in every room")]
     head = [
-        "room", "scheme", "agent RMSE [m]", "bound [m]", "RMSE / bound", "NEES", "panel [m]", "scatterers [m]",
-        "walls [deg]", "own [deg]", "walls [m]", "ghosts", "GOSPA [m]", "association", "diverged", "failed",
-        "aims missed: limit",
+        "room", "scheme", "agent RMSE [m]", "bound [m]", "RMSE / bound", "NEES", "panel [m]", "from [s]",
+        "scatterers [m]", "walls [deg]", "own [deg]", "walls [m]", "ghosts", "GOSPA [m]", "association", "diverged",
+        "failed", "aims missed: limit",
     ]  # fmt: skip
     rows = [
         [
             entry["room"], entry["series"], metres_between(entry), metres(entry["bound_m"]), ratio(entry["over_bound"]),
-            ratio(entry["nees_per_dof"]), _found(entry, "ris_m", "ris_found"),
+            ratio(entry["nees_per_dof"]), _found(entry, "ris_m", "ris_found"), _since(entry),
             _found(entry, "scatterer_m", "scatterer_found"), _found(entry, "wall_deg", "wall_found", 2),
             ratio(entry["wall_own_deg"]), _found(entry, "wall_m", "wall_found"), ratio(entry["ghost_walls"]),
             ratio(entry["gospa_m"]), ratio(entry["association"]), f"{entry['diverged']} of {entry['runs']}",
@@ -151,3 +152,9 @@ def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> 
     if entry[name] is None:
         return "-" if entry[share] is None else ", ".join(part for part in ("none found", known) if part)
     return ", ".join(part for part in (f"{entry[name]:.{digits}f}", known) if part) + f" ({share_text(entry[share])})"
+
+
+def _since(entry: Mapping[str, Any]) -> str:
+    """Table cell of the study in many rooms: when the map first held the panel, and when a path over it was audible."""
+    held, audible = (entry.get(f"ris_{name}_s") for name in ("identified", "audible"))
+    return "-" if audible is None else f"{'never' if held is None else f'{held:.1f}'} ({audible:.1f})"

@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.evaluate import Surfaces, root_mean_square
 from rislam_rt.model import Paths, Scene, SchemeResult
-from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes
+from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes, landmarks_audible
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.posterior_bound import bound_problem, bounds_of_motion
 from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
@@ -62,11 +62,10 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
     audible = audible_paths(paths.with_gain(result.gain), settings, use_vt=uses_wall_returns(result.scheme, settings))
     group = coplanar(walls)
     surfaces = wall_surfaces(walls, group)
-    of = paths.landmark[:, None] == np.arange(len(scene.landmarks))
     bound, relative = run_bounds(scene, paths, result, spec)
     return Truth(
         scene.agent.position, scene.agent.velocity, scene.landmark_positions, len(scene.panels),
-        (audible[:, :, None] & of).any(axis=1), *surfaces, audible_planes(paths, audible, group), paths.kind,
+        landmarks_audible(scene, paths, audible), *surfaces, audible_planes(paths, audible, group), paths.kind,
         paths.landmark, result.component_path, bound, relative,
     )  # fmt: skip
 
