@@ -81,13 +81,9 @@ def own_estimator(name: str) -> Estimator:
         return state, OwnDiagnostics(np.full(len(measurement), -1))
 
     return Estimator(
-        init,
-        predict,
-        step,
-        estimate,
-        lambda settings: None,
+        init, predict, step, estimate, lambda settings: None,
         use_vt=lambda settings: bool(getattr(own, "use_vt", False)),
-    )
+    )  # fmt: skip
 
 
 class Estimators(dict[str, Estimator]):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError, StoreError
-from rislam_rt.model import SchemeResult, SlamResult, Trajectory
+from rislam_rt.model import Paths, Scene, SchemeResult, SlamResult, Trajectory
 from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
@@ -270,20 +270,27 @@ def read_run(folder: Path) -> SlamResult:
         check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
         run_datasets.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
-        paths, scene = run_datasets.dataset_to_paths(data), load_scene(folder / "scene")
-        agent = Trajectory(
-            data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
-            data["true_heading"].to_numpy(), scene.agent.body,
-        )  # fmt: skip
+        paths, scene = run_datasets.dataset_to_paths(data), read_room(folder, about)
+        time, position, velocity, heading = (data[name].to_numpy() for name in run_datasets.TRAJECTORY)
+        agent = Trajectory(time, position, velocity, heading, scene.agent.body)
         schemes = {
             name: _read_scheme(scheme_file(folder, name), name, about["identity"], about["cycles"])
             for name in about["schemes"]
         }
-        return SlamResult(
-            name=about["name"], scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]), paths=paths,
-            schemes=schemes, config=about["config"], seed=about["seed"], versions=about["versions"],
-            seconds=about["seconds"], warnings=tuple(about["warnings"]),
-        )  # fmt: skip
+        return result_of_marker(about, replace(scene, agent=agent), paths, schemes)
+
+
+def read_room(folder: Path, about: Mapping[str, Any]) -> Scene:
+    """Read the room of a run from its folder, with the SHA-256 of the files that it was made from."""
+    return replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
+
+
+def result_of_marker(
+    about: Mapping[str, Any], scene: Scene, paths: Paths, schemes: Mapping[str, SchemeResult]
+) -> SlamResult:
+    """Result of a run from what its folder's marker says, and what the other files hold."""
+    told: dict[str, Any] = {name: about[name] for name in ("name", "seed", "config", "versions", "seconds")}
+    return SlamResult(scene=scene, paths=paths, schemes=schemes, warnings=tuple(about["warnings"]), **told)
 
 
 @contextmanager

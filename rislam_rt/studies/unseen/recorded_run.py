@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.model import SchemeResult, SlamResult
 from rislam_rt.model.result import NOTHING, STEPS
 from rislam_rt.pipeline import PipelineSpec
-from rislam_rt.pipeline.long.whole_run import read_given, read_whole
+from rislam_rt.pipeline.long.run import read_given, read_whole
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, answers_from_arrays, replay
 from rislam_rt.progress import Tell, tell_nobody
