@@ -1,14 +1,19 @@
-"""Advice on a room before a run: link budgets of its landmarks, remedies, and the cost of tracing."""
+"""Advice on a room before a run: link budgets of landmarks, remedies, the cost of tracing, and warnings of returns."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from rislam_rt.adviser.cancelled_returns import cancelled_return_warnings
 from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink, Survey, link_budget, survey
+from rislam_rt.adviser.merged_returns import merged_return_warnings
+from rislam_rt.adviser.parallel_fronts import parallel_front_warnings
 from rislam_rt.adviser.remedies import detection_label, remedies
 from rislam_rt.adviser.tracing_cost import TraceCost, trace_cost
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
+from rislam_rt.scene.findings import Finding
 
 
 class Advice(NamedTuple):
@@ -25,10 +30,11 @@ class Advice(NamedTuple):
         """Advice on a room as tables for JSON; a margin of None stands for no path."""
         links = []
         for link in self.links:
+            margins = [float(margin) if margin > NOTHING_DB else None for margin in link.margin_db]
             places = [
-                {"margin_db": _finite(link.margin_db[at]), "probability": float(link.probability[at]),
-                 "reason": link.reason[at]} for at in link.three
-            ]  # fmt: skip
+                {"margin_db": margins[at], "probability": float(link.probability[at]), "reason": link.reason[at]}
+                for at in link.three
+            ]
             words = {
                 "landmark": link.landmark, "code": link.code, "share": link.share, "verdict": detection_label(link),
             }  # fmt: skip
@@ -47,6 +53,9 @@ def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator, looked
     return Advice(links, remedies(looked, links), trace_cost(scene, settings.radio, len(looked.paths.walls)), threshold)
 
 
-def _finite(margin: float) -> float | None:
-    """Margin of a link budget [dB] as a number, None where it stands for no path."""
-    return float(margin) if margin > NOTHING_DB else None
+def return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
+    """All warnings of wall returns, along a way that was looked at, that a filter may take for others: cancelled,
+    merged, of parallel fronts; `file` is what they name as their place."""
+    yield from cancelled_return_warnings(looked, file)
+    yield from merged_return_warnings(looked, file)
+    yield from parallel_front_warnings(looked, file)

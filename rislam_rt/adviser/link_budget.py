@@ -134,12 +134,12 @@ def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLin
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[LandmarkLink] = []
     spec = scene.ris.spec
-    for codes in codes_of(paths, spec, settings.radio, rng=rng):
-        heard = [_all_places(rephase(paths, RisCode(levels, spec.levels)), looked) for levels in codes.levels]
-        if codes.name == "aimed":
+    for kind, codes in codes_of(paths, spec, settings.radio, rng=rng).items():
+        heard = [_all_places(rephase(paths, RisCode(levels, spec.levels)), looked) for levels in codes]
+        if kind == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
         links += [
-            _link(panel.name, codes.name, heard, reasons, len(scene.scatterers) + number)
+            _link(panel.name, kind, heard, reasons, len(scene.scatterers) + number)
             for number, panel in enumerate(scene.panels)
         ]
     return links

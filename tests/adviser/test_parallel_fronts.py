@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rislam_rt.adviser.advice import return_warnings
 from rislam_rt.adviser.link_budget import survey
 from rislam_rt.adviser.parallel_fronts import LEAST, SWERVE, parallel_front_warnings
-from rislam_rt.adviser.return_warnings import return_warnings
 from rislam_rt.model import Reflector
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings

@@ -14,6 +14,7 @@ from rislam_rt.errors import ConfigError, RislamError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.input_messages import parse_number
 from rislam_rt.model import Body, Measurement, RadioConfig
+from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.measurement_columns import (
     BACK_TO_HORIZON,
@@ -185,7 +186,7 @@ def inputs_of(
 def input_warnings(inputs: Inputs) -> list[str]:
     """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
     component with a time of its own, or components that are there twice."""
-    step = _median_step(inputs.time)
+    step = usual_step(inputs.time)
     counts, lines = {len(one) for one in inputs.measurements}, []
     if step > LONGEST_STEP:
         lines.append(f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds")
@@ -213,15 +214,10 @@ def _copies(inputs: Inputs) -> list[str]:
     return [f"{total} {what} of another in the same cycle, the first in {first}; leave copies out"]
 
 
-def _median_step(time: Floats) -> float:
-    """Median time [s] between cycles at times (K,) [s]; 0 for one cycle."""
-    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-
-
 def _check_stride(time: Floats, start: StartPrior, place: str) -> None:
     """Raise an error where cycles at times (K,) [s] are so far apart that the agent of a start prior crosses a room
     from one to the next."""
-    step, speed = _median_step(time), float(np.linalg.norm(start.velocity))
+    step, speed = usual_step(time), float(np.linalg.norm(start.velocity))
     if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
         raise ConfigError(
             f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
