@@ -16,8 +16,8 @@ RANDOM_CODES = 16
 
 def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.random.Generator) -> dict[str, Integers]:
     """RIS codes to forecast detection with, at K cycles of a room's paths, by kind: phase levels (C, K, N, M) of C
-    codes that are equally likely. `aimed`, for each panel the best code for its strongest path; `swept`, the beams of the
-    search for a panel that is not known yet, in turn, all panels at once; `random`."""
+    codes that are equally likely. `aimed`, for each panel the best code for its strongest path; `swept`, the beams of
+    the search for a panel that is not known yet, in turn, all panels at once; `random`."""
     count = paths.num_cycles
     beams = [sweep_codes(panel, radio.wavelength) for panel in spec.panels]
     turns = np.arange(max(map(len, beams)))

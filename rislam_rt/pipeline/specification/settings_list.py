@@ -76,17 +76,11 @@ def _near(key: str, keys: list[str]) -> str:
 
 def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:
     """Default, range, unit and meaning of one field of a typed model."""
-    owner, record = _owner(model, name)
-    meaning = _meanings(record or owner).get(name, "")
+    owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
+    meaning = _meanings(RECORDS.get(owner, owner)).get(name, "")  # a record's fields, of a table that was made from one
     default = None if field.is_required() else field.get_default(call_default_factory=True)
     kind, allowed = _kind(field.annotation), _of_constraints(field)
     return Setting(f"{prefix}{name}", default, field.is_required(), kind, allowed, unit_of(name), meaning)
-
-
-def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
-    """The class that declares a listed setting, and the configuration record whose fields it takes over, if any."""
-    owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
-    return owner, RECORDS.get(owner)
 
 
 @cache

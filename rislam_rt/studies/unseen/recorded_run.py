@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,7 +77,8 @@ def recorded_schemes(
         answers, apart, cycle_s = answers_of(scheme, inputs), None, None
         if replayed:
             again = replay(inputs, result.config, name, rng=rng, progress=progress)
-            apart = _apart(answers, again)
+            places = np.array([[one.position for one in each.estimates] for each in (answers, again)])
+            apart = float(np.linalg.norm(places[0] - places[1], axis=1).max())
             cycle_s = again.seconds
             answers = again if apart <= APART else answers
         scores = {"ran": name, **score_run(truth, inputs, answers)}
@@ -96,9 +97,3 @@ def replay_seconds(result: SlamResult) -> float:
     """Time [s] that localising took in a recorded run, all schemes together: about that of replaying them."""
     step = STEPS.index("localise")
     return float(sum(scheme.seconds[:, step].sum() for scheme in result.schemes.values()))
-
-
-def _apart(one: Answers, other: Answers) -> float:
-    """Largest distance [m] between the estimated positions of a recorded run and of its replay."""
-    places: list[Any] = [np.array([each.position for each in answers.estimates]) for answers in (one, other)]
-    return float(np.linalg.norm(places[0] - places[1], axis=1).max())

@@ -74,7 +74,12 @@ def read_recording(path: str | Path) -> Recording:
     """
     data = read_dataset(Path(path))
     try:
-        return dataset_to_recording(data)
+        marks, values = data.attrs, {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
+        for name in ("landmark_audible", "wall_audible"):
+            values[name] = values[name].astype(np.bool_)
+        truth = Truth(**values, panel=int(marks["true_panel"]))
+        config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
+        return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)
     except (KeyError, ValueError, TypeError, RislamError) as error:
         raise StoreError(
             f"{path}: not a recorded run ({type(error).__name__}: {str(error)[:80]}); write it again"
@@ -92,14 +97,3 @@ def recording_to_dataset(recording: Recording) -> "xr.Dataset":
     plain = {name: v.astype(np.int8) if v.dtype == np.bool_ else v for name, v in values.items()}
     content = variables(plain, TRUTH)
     return data.assign({f"true_{name}": content[name] for name in content})
-
-
-def dataset_to_recording(data: "xr.Dataset") -> Recording:
-    """Recorded run from a NetCDF data set that `recording_to_dataset` made."""
-    marks = data.attrs
-    values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
-    for name in ("landmark_audible", "wall_audible"):
-        values[name] = values[name].astype(np.bool_)
-    truth = Truth(**values, panel=int(marks["true_panel"]))
-    config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
-    return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)
