@@ -164,12 +164,8 @@ def inputs_of(
     check_heading(columns, cycle, place)
     check_amplitude(columns, heard, radio, place)
     filled = _filled({name: column[heard] for name, column in columns.items()}, radio)
-    probability = filled.get("panel_probability")
-    measurements = []
-    for number in range(len(cycles)):
-        rows = cycle[heard] == number
-        parts = {name: filled[name][rows] for name in PARTS}
-        measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
+    rows = [cycle[heard] == number for number in range(len(cycles))]
+    measurements = tuple(Measurement(**{name: values[own] for name, values in filled.items()}) for own in rows)
     heading = columns.get("heading_rad", np.zeros(len(time)))[np.searchsorted(cycle, np.arange(len(cycles)))]
     if "heading_rad" in columns:  # the compass shows the first heading, too
         start = replace(start, heading=float(heading[0]))
@@ -177,9 +173,7 @@ def inputs_of(
         heading = np.full(len(cycles), np.nan)
     _check_stride(cycles, start, place)
     nothing = (None,) * len(cycles)
-    made = Inputs(
-        start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing, float(cycles[0])
-    )
+    made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, measurements, nothing, float(cycles[0]))
     return _check_inputs(made, place)
 
 
@@ -294,7 +288,7 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig) -> dict[str, Floa
         "amplitude_std": columns.get("amplitude_std", np.full(len(snr), amplitude_std(radio))),
     }
     if "panel_probability" in columns:
-        found["panel_probability"] = columns["panel_probability"]
+        found["from_panel"] = columns["panel_probability"]
     return found
 
 

@@ -258,8 +258,22 @@ class PipelineSpec(Section):
     @model_validator(mode="before")
     @classmethod
     def _tell_all_estimators(cls, content: Any) -> Any:
-        """Copy a pipeline's process noise, `height`, `use_vt` to estimators for which the file gives none."""
-        return share_settings(content) if isinstance(content, dict) else content
+        """Copy a pipeline's process noise, `height`, `use_vt` to every estimator for which the file gives none.
+
+        The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for
+        the validation to refuse.
+        """
+        tables = [content, *(content.get(name, {}) for name in ("motion", "slam"))] if isinstance(content, dict) else []
+        if not tables or not all(isinstance(table, dict) for table in tables):
+            return content
+        _, motion, slam = tables
+        slam = {"sigma_a": motion.get("sigma_a_m_s2") or SlamSection.model_fields["sigma_a"].default, **slam}
+        shared = {key: slam.get(key, SlamSection.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
+        found = {**content, "slam": slam}
+        for name, keys in ESTIMATOR_SECTIONS.items():
+            section = content.get(name, {})
+            found[name] = {key: shared[key] for key in keys} | section if isinstance(section, dict) else section
+        return found
 
     @model_validator(mode="after")
     def _each_scheme_once(self) -> "PipelineSpec":
@@ -285,25 +299,6 @@ ESTIMATOR_SECTIONS = {
     "channel_slam": ("sigma_a", "height"),
 }
 """Tables of the other published estimators, and the settings that they take over from `[slam]` unless given."""
-
-
-def share_settings(content: dict[str, Any]) -> dict[str, Any]:
-    """Copy `sigma_a`, `height` and `use_vt` in a pipeline's content to every estimator for which they are not given.
-
-    The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for the
-    validation to refuse.
-    """
-    motion, slam = content.get("motion", {}), content.get("slam", {})
-    if not isinstance(motion, dict) or not isinstance(slam, dict):
-        return content
-    told = {"sigma_a": motion.get("sigma_a_m_s2") or SlamSection.model_fields["sigma_a"].default}
-    slam = {**told, **slam}
-    shared = {key: slam.get(key, SlamSection.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
-    found = {**content, "slam": slam}
-    for name, keys in ESTIMATOR_SECTIONS.items():
-        section = content.get(name, {})
-        found[name] = {key: shared[key] for key in keys} | section if isinstance(section, dict) else section
-    return found
 
 
 class Settings(NamedTuple):
@@ -376,5 +371,4 @@ def build_design(section: DesignerSection) -> DesignConfig:
     ConfigError
         A value is out of range.
     """
-    names = [field.name for field in fields(DesignConfig) if field.name != "certify"]
-    return DesignConfig(**{name: getattr(section, name) for name in names}, certify=False)
+    return DesignConfig(**section.model_dump(include={field.name for field in fields(DesignConfig)}), certify=False)

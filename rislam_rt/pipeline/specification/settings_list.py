@@ -54,9 +54,10 @@ def explain(settings: list[Setting], key: str) -> Setting:
     ConfigError
         There is none, or several.
     """
-    found = [one for one in settings if one.key == key or one.key.endswith(f".{key}")]
-    if len(found) == 1 or any(one.key == key for one in found):
-        return next((one for one in found if one.key == key), found[0])
+    exact = [one for one in settings if one.key == key]
+    found = exact or [one for one in settings if one.key.endswith(f".{key}")]
+    if len(found) == 1:
+        return found[0]
     if found:
         raise ConfigError(
             f"--explain {key}: several settings end so; give one of {', '.join(one.key for one in found)}"
@@ -122,7 +123,10 @@ def _kind(annotation: Any) -> str:
 
 def _of_constraints(field: FieldInfo) -> str:
     """Range or choices of a setting in words, from the constraints of its type; empty without any."""
-    metadata = [*field.metadata, *_inner_metadata(field.annotation)]
+    metadata = list(field.metadata)
+    for part in get_args(field.annotation):  # inside an optional or a list
+        for item in getattr(part, "__metadata__", ()):
+            metadata += item.metadata if isinstance(item, FieldInfo) else (item,)
     choices = list(_choices(field.annotation)) + [name for m in metadata if isinstance(m, Choices) for name in m.names]
     if choices:
         return "one of " + ", ".join(map(str, choices))
@@ -142,13 +146,6 @@ def _choices(annotation: Any) -> Iterator[Any]:
     else:
         for part in get_args(annotation):
             yield from _choices(part)
-
-
-def _inner_metadata(annotation: Any) -> Iterator[Any]:
-    """Constraints of a listed setting's type inside an optional or a list."""
-    for part in get_args(annotation):
-        for item in getattr(part, "__metadata__", ()):
-            yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
 
 
 def _short(value: float) -> str:

@@ -8,7 +8,7 @@ One process at a time writes there.
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,14 +41,10 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     def __getitem__(self, name: str) -> SchemeResult:
         file = scheme_file(self.folder, name)
-        if file.name not in self.files:
-            raise KeyError(name)
-        try:
-            if file_digest(file) != self.files[file.name]:
-                raise KeyError(name)
-            return _read_scheme(file, name, self.identity.digest)
-        except RislamError:
-            raise KeyError(name) from None
+        if self.holds([file.name]):
+            with suppress(RislamError):
+                return _read_scheme(file, name, self.identity.digest)
+        raise KeyError(name)
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
         data = run_datasets.seal_dataset(run_datasets.scheme_to_dataset(result), **self._stamp())
@@ -64,17 +60,11 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         self.files.pop(file.name, None)
 
     def __iter__(self) -> Iterator[str]:
-        names = (file.removesuffix(".nc") for file in sorted(self.files) if file.startswith("scheme_"))
-        return (name.removeprefix("scheme_") for name in names)
+        schemes = (file for file in sorted(self.files) if file.startswith("scheme_"))
+        return (file.removeprefix("scheme_").removesuffix(".nc") for file in schemes)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
-
-    def __contains__(self, name: object) -> bool:
-        try:
-            return isinstance(name, str) and self[name] is not None
-        except KeyError:
-            return False
 
     @property
     def spoiled(self) -> list[str]:
