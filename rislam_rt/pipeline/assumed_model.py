@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RisSpec, Trajectory, join_sheets
+from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, Trajectory, join_sheets
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
@@ -86,21 +86,20 @@ def tell_start(
 
 def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:
     """Assumed data sheet of the RIS panel, or of each of several, with the errors of orientation, spacing and gain."""
-    return join_sheets(tuple(_tell_one(one, told) for one in panel.panels))
-
-
-def _tell_one(panel: RisSpec, told: AssumedSection) -> RisSpec:
-    """Assumed data sheet of one RIS panel."""
     tilt, turn = np.radians(told.panel_tilt_deg), np.radians(told.panel_turn_deg)
-    normal, up = panel.normal, panel.up
-    if turn:
-        up = np.cos(turn) * up + np.sin(turn) * panel.right
-    if tilt:
-        normal, up = np.cos(tilt) * normal + np.sin(tilt) * up, np.cos(tilt) * up - np.sin(tilt) * normal
-    return replace(
-        panel, normal=normal, up=up, spacing=panel.spacing * told.panel_spacing_scale,
-        element=told.panel_element or panel.element, amplitude=panel.amplitude * _amplitude(told.panel_gain_db),
-    )  # fmt: skip
+    sheets = []
+    for one in panel.panels:
+        normal, up = one.normal, one.up
+        if turn:
+            up = np.cos(turn) * up + np.sin(turn) * one.right
+        if tilt:
+            normal, up = np.cos(tilt) * normal + np.sin(tilt) * up, np.cos(tilt) * up - np.sin(tilt) * normal
+        sheet = replace(
+            one, normal=normal, up=up, spacing=one.spacing * told.panel_spacing_scale,
+            element=told.panel_element or one.element, amplitude=one.amplitude * _amplitude(told.panel_gain_db),
+        )  # fmt: skip
+        sheets.append(sheet)
+    return join_sheets(tuple(sheets))
 
 
 def tell_settings(settings: Settings, told: AssumedSection) -> Settings:

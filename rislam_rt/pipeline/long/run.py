@@ -3,7 +3,7 @@
 Completed runs, in slices or not, are read here: their results, and the inputs that each scheme's estimator was given.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -197,7 +197,14 @@ def read_given(folder: Path, scheme: str) -> tuple[Inputs, np.random.Generator]:
             f"{folder / name}: no such file, as another version wrote the run; run again with another --out"
         )
     try:
-        data = _joined([read_dataset(file) for file in files])
+        data, *more = (read_dataset(file) for file in files)
+        if more:
+            import xarray as xr
+
+            parts = [data, *more]
+            data = xr.concat(
+                parts, "time", data_vars="minimal", combine_attrs="override", join="outer", fill_value=PADDING
+            )
         rng = marked_rng(data)
         if rng is None:
             raise ResultError(f"{files[0]}: does not say which random numbers were drawn; run again with another --out")
@@ -206,15 +213,6 @@ def read_given(folder: Path, scheme: str) -> tuple[Inputs, np.random.Generator]:
         cause = f"{type(error).__name__}: {error}"[:120]
         raise ResultError(f"{files[0]}: damaged ({cause}); run again with another --out") from None
     return inputs._replace(time=inputs.time - inputs.time[0], since=float(inputs.time[0])), rng
-
-
-def _joined(parts: Sequence[Any]) -> Any:
-    """One NetCDF data set of the slices' of a whole run, with the attributes of the first."""
-    if len(parts) == 1:
-        return parts[0]
-    import xarray as xr
-
-    return xr.concat(parts, "time", data_vars="minimal", combine_attrs="override", join="outer", fill_value=PADDING)
 
 
 def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:

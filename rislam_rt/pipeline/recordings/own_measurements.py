@@ -171,7 +171,12 @@ def inputs_of(
         start = replace(start, heading=float(heading[0]))
     else:
         heading = np.full(len(cycles), np.nan)
-    _check_stride(cycles, start, place)
+    step, speed = usual_step(cycles), float(np.linalg.norm(start.velocity))
+    if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
+        raise ConfigError(
+            f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
+            f"{step * speed:.3g} m; give seconds (were these milliseconds?), or mend the velocity"
+        )
     nothing = (None,) * len(cycles)
     made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, measurements, nothing, float(cycles[0]))
     return _check_inputs(made, place)
@@ -181,42 +186,25 @@ def input_warnings(inputs: Inputs) -> list[str]:
     """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
     component with a time of its own, or components that are there twice."""
     step = usual_step(inputs.time)
-    counts, lines = {len(one) for one in inputs.measurements}, []
+    counts, lines, row = {len(one) for one in inputs.measurements}, [], 0
+    copies: list[str] = []
     if step > LONGEST_STEP:
         lines.append(f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds")
     if counts == {1} and 0.0 < step < SHORTEST_STEP:
         lines.append(
             f"time_s: every cycle holds one component, {step:g} s apart; rows of one time are one cycle: round them"
         )
-    return lines + _copies(inputs)
-
-
-def _copies(inputs: Inputs) -> list[str]:
-    """Warning of components that are exact copies of another one in their cycle, none or one: noise never draws two."""
-    total, first, row = 0, "", 0
     for time, one in zip(inputs.time + inputs.since, inputs.measurements, strict=True):
-        seen: set[bytes] = set()
+        seen: set[bytes] = set()  # noise never draws two that are alike
         for number, values in enumerate(np.column_stack([getattr(one, name) for name in PARTS])):
             if values.tobytes() in seen:
-                total += 1
-                first = first or f"row {row + number + 1} of the data, at {time:.10g} s"
+                copies.append(f"row {row + number + 1} of the data, at {time:.10g} s")
             seen.add(values.tobytes())
         row += max(len(one), 1)  # a cycle in which nothing was heard is a row, too
-    if not total:
-        return []
-    what = "component is an exact copy" if total == 1 else "components are exact copies"
-    return [f"{total} {what} of another in the same cycle, the first in {first}; leave copies out"]
-
-
-def _check_stride(time: Floats, start: StartPrior, place: str) -> None:
-    """Raise an error where cycles at times (K,) [s] are so far apart that the agent of a start prior crosses a room
-    from one to the next."""
-    step, speed = usual_step(time), float(np.linalg.norm(start.velocity))
-    if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
-        raise ConfigError(
-            f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
-            f"{step * speed:.3g} m; give seconds (were these milliseconds?), or mend the velocity"
-        )
+    if copies:
+        what = "component is an exact copy" if len(copies) == 1 else "components are exact copies"
+        lines.append(f"{len(copies)} {what} of another in the same cycle, the first in {copies[0]}; leave copies out")
+    return lines
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:

@@ -340,26 +340,20 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
     Raises
     ------
     ConfigError
-        A value is out of range.
+        A value is out of range, or the front end has impairments and the receiver simulates no signal.
     """
     radio, receiver = build_radio(spec.radio), build_receiver(spec.receiver, panels, slot=spec.budget.measure_s)
-    return Settings(
-        radio, receiver, SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
-        build_design(spec.design), BpSlamConfig(**spec.bp_slam.model_dump()),
-        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()), ChannelSlamConfig(**spec.channel_slam.model_dump()),
-        build_sensor(radio, receiver), _build_hardware(spec.hardware, receiver),
-    )  # fmt: skip
-
-
-def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
-    """Impairments of the front end from the table `[hardware]` of a pipeline's specification; an error if the receiver
-    simulates no signal."""
-    hardware = HardwareConfig(**section.model_dump())
+    hardware = HardwareConfig(**spec.hardware.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
             f"hardware: set, with receiver.estimator '{receiver.estimator}', which has no front end; give 'waveform'"
         )
-    return hardware
+    return Settings(
+        radio, receiver, SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
+        build_design(spec.design), BpSlamConfig(**spec.bp_slam.model_dump()),
+        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()), ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver), hardware,
+    )  # fmt: skip
 
 
 def build_design(section: DesignerSection) -> DesignConfig:

@@ -41,8 +41,12 @@ def list_settings(model: type[BaseModel], prefix: str = "") -> list[Setting]:
         below = field.annotation
         if isinstance(below, type) and issubclass(below, BaseModel):
             tables += list_settings(below, f"{prefix}{name}.")
-        else:
-            plain.append(_setting(model, name, field, prefix))
+            continue
+        owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
+        meaning = _meanings(RECORDS.get(owner, owner)).get(name, "")  # a record's fields, of a table made from one
+        default = None if field.is_required() else field.get_default(call_default_factory=True)
+        kind, allowed = _kind(below), _of_constraints(field)
+        plain.append(Setting(f"{prefix}{name}", default, field.is_required(), kind, allowed, unit_of(name), meaning))
     return plain + tables
 
 
@@ -73,15 +77,6 @@ def _near(key: str, keys: list[str]) -> str:
         return f"there are {', '.join(inside[:6])}{more}"
     ends = [one for one in keys if nearest(key.rpartition(".")[2], [one.rpartition(".")[2]])]
     return did_you_mean(nearest(key, keys, 3) or ends[:3]) or "`rislam-rt config` lists them all"
-
-
-def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:
-    """Default, range, unit and meaning of one field of a typed model."""
-    owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
-    meaning = _meanings(RECORDS.get(owner, owner)).get(name, "")  # a record's fields, of a table that was made from one
-    default = None if field.is_required() else field.get_default(call_default_factory=True)
-    kind, allowed = _kind(field.annotation), _of_constraints(field)
-    return Setting(f"{prefix}{name}", default, field.is_required(), kind, allowed, unit_of(name), meaning)
 
 
 @cache

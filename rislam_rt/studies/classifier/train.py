@@ -103,7 +103,8 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
     starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
     networks = [_fit(sets.train, spec, rng=child) for child in starts]
     tested = sets.tested
-    restarts = [(right_by_class(sets.validation, rules(net)["network"]), _f1_of(tested, net)) for net in networks]
+    paths, keepers = take_rows(tested, tested.labelled), [rules(net)["network"] for net in networks]
+    restarts = [(right_by_class(sets.validation, keeper), f1(paths.keep, keeper(paths))) for keeper in keepers]
     network = networks[int(np.argmax([chosen for chosen, _ in restarts]))]
     places = {**sets.test, ALL: tested, DRAWN: sets.all_drawn, RANDOM: sets.validation}
     judges = rules(network)
@@ -144,9 +145,3 @@ def balance(examples: Examples) -> Floats:
             own = examples.kind == kind
             weight[own] *= 0.5 / (len(kinds) * weight[own].sum())
     return np.asarray(weight)
-
-
-def _f1_of(examples: Examples, network: Network) -> float:
-    """F1 of a network on the examples that are paths."""
-    known = take_rows(examples, examples.labelled)
-    return f1(known.keep, rules(network)["network"](known))

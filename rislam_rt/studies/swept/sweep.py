@@ -39,7 +39,14 @@ def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> S
     ConfigError
         No scene is named.
     """
-    beside, axes, function = pipeline.parent, _axes(spec), FUNCTION
+    values = {
+        "scene": spec.scenes if isinstance(spec, RoomsSpec) else (),
+        "size": spec.sizes if isinstance(spec, Fig4cSpec) else (),
+        "variant": [variant.name for variant in spec.all_variants],
+        SNR: spec.snr_db if isinstance(spec, Fig4bSpec) else (),
+    }
+    axes = tuple(Axis(key, tuple(own)) for key, own in values.items() if own)
+    beside, function = pipeline.parent, FUNCTION
     base: dict[str, Any] = {"run": dict(spec.run)}
     if isinstance(spec, RoomsSpec):
         if scene is not None:
@@ -72,18 +79,6 @@ def check_swept(spec: SweptSpec) -> None:
         except ConfigError as error:
             place = f"run, with variant '{name}'" if name else "run"
             raise ConfigError(f"{place}: {str(error).removeprefix('run: ')}") from None
-
-
-def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
-    """Axes of a swept study by its kind: SNR, panel size, scenes, variants."""
-    variants = tuple(variant.name for variant in spec.all_variants)
-    own = {
-        "scene": spec.scenes if isinstance(spec, RoomsSpec) else (),
-        "size": spec.sizes if isinstance(spec, Fig4cSpec) else (),
-        "variant": variants,
-        SNR: spec.snr_db if isinstance(spec, Fig4bSpec) else (),
-    }
-    return tuple(Axis(key, tuple(values)) for key, values in own.items() if values)
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
