@@ -1,19 +1,14 @@
-"""Advice on a room before a run: link budgets of landmarks, remedies, the cost of tracing, and warnings of returns."""
+"""Advice on a room before a run: link budgets of its landmarks, remedies, and the cost of tracing."""
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rislam_rt.adviser.cancelled_returns import cancelled_return_warnings
 from rislam_rt.adviser.link_budget import NOTHING_DB, LandmarkLink, Survey, link_budget, survey
-from rislam_rt.adviser.merged_returns import merged_return_warnings
-from rislam_rt.adviser.parallel_fronts import parallel_front_warnings
 from rislam_rt.adviser.remedies import detection_label, remedies
 from rislam_rt.adviser.tracing_cost import TraceCost, trace_cost
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
-from rislam_rt.scene.findings import Finding
 
 
 class Advice(NamedTuple):
@@ -51,11 +46,3 @@ def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator, looked
     links = link_budget(looked, rng=rng)
     threshold = 10.0 * float(np.log10(settings.sensor.threshold))
     return Advice(links, remedies(looked, links), trace_cost(scene, settings.radio, len(looked.paths.walls)), threshold)
-
-
-def return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
-    """All warnings of wall returns, along a way that was looked at, that a filter may take for others: cancelled,
-    merged, of parallel fronts; `file` is what they name as their place."""
-    yield from cancelled_return_warnings(looked, file)
-    yield from merged_return_warnings(looked, file)
-    yield from parallel_front_warnings(looked, file)

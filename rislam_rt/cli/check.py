@@ -49,8 +49,8 @@ def command(
     """
     from dataclasses import asdict
 
-    from rislam_rt.adviser.advice import return_warnings
     from rislam_rt.adviser.link_budget import survey
+    from rislam_rt.adviser.return_warnings import return_warnings
     from rislam_rt.cli.run import names_schemes
     from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.room.late_paths import late_path_warnings
