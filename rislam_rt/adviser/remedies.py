@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.adviser.link_budget import LandmarkLink, Survey
-from rislam_rt.adviser.reasons import OUTSIDE, WEAK
+from rislam_rt.adviser.link_budget import OUTSIDE, WEAK, LandmarkLink, Survey
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.antennas import amplitude
 from rislam_rt.design import exact_code

@@ -30,7 +30,6 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.time_budget import changed_steps, fills_cycle, fitted_steps, total_seconds
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
@@ -194,12 +193,11 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")
-    total = total_seconds(budget)
-    step = usual_step(motion.time) or total
-    if not fills_cycle(budget, step):
+    step = usual_step(motion.time) or budget.total
+    if not budget.fills(step):
         raise ConfigError(
-            f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s "
-            f"({changed_steps(budget, fitted_steps(budget, step))}), or give agent.cycle_s = {total:g} in the scene, "
+            f"budget: the four steps sum to {budget.total:g} s; make them the scene's cycle of {step:g} s "
+            f"({budget.options(budget.fitted(step))}), or give agent.cycle_s = {budget.total:g} in the scene, "
             "to which a recording is interpolated"
         )
     if scene.ris is None:

@@ -131,6 +131,12 @@ class DesignSection(DesignerSection):
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
+SAME_CYCLE = 0.01
+"""Largest relative difference between the scene's cycle time and the sum of the time budget: clocks are inexact."""
+DIGITS = 4
+"""Significant digits of a proposed step: its rounding is a hundredth of what the sum may differ by."""
+
+
 class BudgetSection(Section):
     """Time budget [s] of the cycle's four steps; their sum is the scene's cycle time."""
 
@@ -142,6 +148,29 @@ class BudgetSection(Section):
     """Time budget of sounding the channel."""
     localise_s: NotNegative = 0.04
     """Time budget of localising and mapping."""
+
+    @property
+    def total(self) -> float:
+        """Sum [s] of the four steps of the time budget."""
+        return self.optimise_s + self.communicate_s + self.measure_s + self.localise_s
+
+    def fills(self, cycle: float) -> bool:
+        """Whether the steps of the time budget sum to a scene's cycle time [s], but for `SAME_CYCLE` of it."""
+        return abs(self.total - cycle) <= SAME_CYCLE * cycle
+
+    def fitted(self, cycle: float, measure_s: float | None = None) -> dict[str, float]:
+        """Steps [s], by name, that sum to a scene's cycle time [s]: those of the time budget, scaled alike if they do
+        not sum to it. `measure_s` [s], if given, is the measurement's; what is left goes to the localisation."""
+        scale = 1.0 if self.fills(cycle) else cycle / (self.total or 1.0)
+        steps = {name: float(f"{scale * value:.{DIGITS}g}") for name, value in self.model_dump().items()}
+        steps["measure_s"] = steps["measure_s"] if measure_s is None else measure_s
+        rest = round(cycle - steps["optimise_s"] - steps["communicate_s"] - steps["measure_s"], 12)
+        return steps | {"localise_s": max(float(f"{rest:.{DIGITS}g}"), 0.0)}
+
+    def options(self, steps: dict[str, float]) -> str:
+        """Options of the command line that change the time budget to other steps [s]: `--set budget.measure_s=0.004
+        ...`."""
+        return " ".join(f"--set budget.{name}={s:g}" for name, s in steps.items() if s != getattr(self, name))
 
 
 class ControlSection(Section):
