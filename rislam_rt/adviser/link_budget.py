@@ -127,16 +127,6 @@ class Reasons(NamedTuple):
         return ""
 
 
-def build_reasons(scene: Scene, paths: Paths, settings: Settings) -> Reasons:
-    """Collect a room's walls and occluders, which may hide a landmark, for the reasons why it is not detected."""
-    meshes = [(r.name, r.triangles) for r in scene.reflectors]
-    meshes += [(shade.name, shade.triangles) for shade in scene.occluders]
-    meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
-    triangles = np.concatenate([triangles for _, triangles in meshes])
-    owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))
-    return Reasons(scene, paths, settings, triangles, owner)
-
-
 PLACES = 15
 """Number of positions of a link budget, evenly along the trajectory; first, middle and last are its columns."""
 DEPTHS = ((500, 2), (5000, 1))
@@ -197,7 +187,10 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
 def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:
     """Link budgets of scatterers, and of each RIS panel under each kind of codes (`rng` draws the random ones)."""
     scene, paths, settings = looked.scene, looked.paths, looked.settings
-    reasons = build_reasons(scene, paths, settings)
+    meshes = [(r.name, r.triangles) for r in scene.reflectors] + [(o.name, o.triangles) for o in scene.occluders]
+    meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
+    owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))
+    reasons = Reasons(scene, paths, settings, np.concatenate([triangles for _, triangles in meshes]), owner)
     if scene.ris is None:
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[LandmarkLink] = []

@@ -110,16 +110,13 @@ def coplanar(walls: Walls) -> Integers:
     """Number of the plane of each true wall (W,) for its score, from 0; coplanar walls, which no agent can tell apart,
     have one."""
     group = np.full(len(walls), -1)
-    count = 0
-    for wall in range(len(walls)):
-        if group[wall] >= 0:
-            continue
+    while (group < 0).any():
+        wall = int(np.argmax(group < 0))
         cosine = walls.normal @ walls.normal[wall]
         same = (np.abs(cosine) >= np.cos(COPLANAR_ANGLE)) & (group < 0)
         same &= np.abs(walls.offset * np.sign(cosine) - walls.offset[wall]) <= COPLANAR_OFFSET
         same[wall] = True
-        group[same] = count
-        count += 1
+        group[same] = group.max() + 1
     return group
 
 

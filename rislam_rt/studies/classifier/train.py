@@ -1,5 +1,6 @@
 """Training of the component classifier: fits networks by L-BFGS from several starts, keeps the best and scores it."""
 
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -100,9 +101,12 @@ class Training(NamedTuple):
 
 def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
     """Train the classifier from several random starts, keep the best on the validation rooms, score it on all sets."""
-    starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
-    networks = [_fit(sets.train, spec, rng=child) for child in starts]
-    tested = sets.tested
+    section, tested = spec.network, sets.tested
+    known = take_rows(sets.train, sets.train.labelled & ~sets.train.near)
+    fit = partial(
+        train_network, known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations
+    )
+    networks = [fit(rng=child) for child in np.random.default_rng(spec.seed).spawn(section.restarts)]
     paths, keepers = take_rows(tested, tested.labelled), [rules(net)["network"] for net in networks]
     restarts = [(right_by_class(sets.validation, keeper), f1(paths.keep, keeper(paths))) for keeper in keepers]
     network = networks[int(np.argmax([chosen for chosen, _ in restarts]))]
@@ -122,14 +126,6 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
     }
     lost = importance(tested, network, rng=np.random.default_rng(spec.seed))
     return Training(network, sets, scores, mean, restarts, lost)
-
-
-def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """Train one network of the classifier from one random start."""
-    known, section = take_rows(examples, examples.labelled & ~examples.near), spec.network
-    return train_network(
-        known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
-    )
 
 
 def balance(examples: Examples) -> Floats:
