@@ -98,12 +98,8 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
 
     Files of its own package that it imports are part of it: a run's numbers depend on them.
     """
-    found = {}
-    for name in sorted(set(names)):
-        if is_own(name):
-            file = _file(load_own(name))
-            found[name] = own_digest(Path(file)) if file else ""
-    return found
+    files = {name: _file(load_own(name)) for name in sorted(set(names)) if is_own(name)}
+    return {name: own_digest(Path(file)) if file else "" for name, file in files.items()}
 
 
 def own_code(

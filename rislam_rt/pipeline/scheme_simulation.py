@@ -112,8 +112,7 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
     held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
     landmark = np.zeros((len(cycles), len(ident), 3))
     ris_probability = np.zeros((len(cycles), len(ident)))
-    several = any(m.panel is not None for m in maps)
-    panel = np.zeros(held.shape, dtype=np.int64) if several else None
+    panel = np.zeros(held.shape, dtype=np.int64) if any(m.panel is not None for m in maps) else None
     for row, m in enumerate(maps):
         column = np.searchsorted(ident, m.ident)
         held[row, column], landmark[row, column] = True, m.position

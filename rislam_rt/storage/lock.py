@@ -53,9 +53,7 @@ def _take(file: Path) -> int:
         handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         try:
             _lock(handle)
-            here = os.fstat(handle)
-            there = os.stat(file) if file.exists() else None
-            if there is not None and (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino):
+            if os.path.samestat(os.fstat(handle), os.stat(file)):
                 with suppress(OSError):  # a full disk: the lock holds without a name
                     os.ftruncate(handle, 0)
                     os.pwrite(handle, json.dumps({"pid": os.getpid(), "host": os.uname().nodename}).encode(), 0)
