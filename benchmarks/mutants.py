@@ -222,8 +222,8 @@ MUTANTS = (
     ),
     Mutant(
         "a damaged file passes", "storage/checksums.py",
-        '    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):',
-        '    if not content["checksum"]:',
+        'if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):',
+        'if not content["checksum"]:',
         (
             "corpus/test_corpus_results.py",
             "pipeline/store/test_run_folder.py",

@@ -25,10 +25,11 @@ class Advice(NamedTuple):
         """Advice on a room as tables for JSON; a margin of None stands for no path."""
         links = []
         for link in self.links:
+            margins = [float(margin) if margin > NOTHING_DB else None for margin in link.margin_db]
             places = [
-                {"margin_db": _finite(link.margin_db[at]), "probability": float(link.probability[at]),
-                 "reason": link.reason[at]} for at in link.three
-            ]  # fmt: skip
+                {"margin_db": margins[at], "probability": float(link.probability[at]), "reason": link.reason[at]}
+                for at in link.three
+            ]
             words = {
                 "landmark": link.landmark, "code": link.code, "share": link.share, "verdict": detection_label(link),
             }  # fmt: skip
@@ -45,8 +46,3 @@ def advise(scene: Scene, settings: Settings, *, rng: np.random.Generator, looked
     links = link_budget(looked, rng=rng)
     threshold = 10.0 * float(np.log10(settings.sensor.threshold))
     return Advice(links, remedies(looked, links), trace_cost(scene, settings.radio, len(looked.paths.walls)), threshold)
-
-
-def _finite(margin: float) -> float | None:
-    """Margin of a link budget [dB] as a number, None where it stands for no path."""
-    return float(margin) if margin > NOTHING_DB else None

@@ -44,6 +44,7 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
     """Coverage maps of a scene's RIS panels, one for each; none in a room without a panel."""
     if scene.ris is None:
         return []
+    radio = settings.radio
     low, high = scene.bounds
     size = np.maximum(high - low, 4.0 * INSIDE)[:2]
     most = min(POINTS, ELEMENTS // scene.ris.spec.num_elements)
@@ -53,25 +54,14 @@ def panel_coverage(scene: Scene, settings: Settings) -> list[Coverage]:
     height = float(np.median(scene.agent.position[:, 2]))
     xx, yy = np.meshgrid(x, y)
     points = np.column_stack([xx.ravel(), yy.ravel(), np.full(xx.size, height)])
-    margins = _direct_margins(scene, points, settings)
-    return [
-        Coverage(panel.name, x, y, height, margin.reshape(xx.shape))
-        for panel, margin in zip(scene.panels, margins, strict=True)
-    ]
-
-
-def _direct_margins(scene: Scene, points: Floats, settings: Settings) -> Floats:
-    """Coverage (panels, N): margin [dB] of each RIS panel's direct path under the best code, at places (N, 3) [m]."""
-    assert scene.ris is not None
-    count = len(points)
-    time = np.arange(count, dtype=np.float64)
-    still = Trajectory(time, points, np.zeros((count, 3)), np.zeros(count), scene.agent.body)
+    time = np.arange(xx.size, dtype=np.float64)
+    still = Trajectory(time, points, np.zeros((xx.size, 3)), np.zeros(xx.size), scene.agent.body)
     alone = replace(scene, scatterers=tuple(s for s in scene.scatterers if s.shade is not None), agent=still)
-    paths = ImageSourceChannel(alone, settings.radio, 0).paths(still)
-    paths = aimed_paths(paths, scene.ris.spec, settings.radio)
-    margin = np.full((len(scene.panels), count), np.nan)
+    paths = aimed_paths(ImageSourceChannel(alone, radio, 0).paths(still), scene.ris.spec, radio)
+    margin = np.full((len(scene.panels), xx.size), np.nan)
     for path in np.flatnonzero(paths.kind == PathKind.RIS):
-        heard = paths.valid[:, path] & settings.radio.array.receives(paths.arrival[:, path, 2], HORIZON_MARGIN)
-        snr = settings.radio.integrated_snr(paths.gain[:, path]) / settings.sensor.threshold
+        heard = paths.valid[:, path] & radio.array.receives(paths.arrival[:, path, 2], HORIZON_MARGIN)
+        snr = radio.integrated_snr(paths.gain[:, path]) / settings.sensor.threshold
         margin[paths.panel[path], heard] = np.maximum(10.0 * np.log10(np.maximum(snr[heard], 1e-40)), NOTHING_DB)
-    return margin
+    margins = margin.reshape(-1, *xx.shape)
+    return [Coverage(panel.name, x, y, height, own) for panel, own in zip(scene.panels, margins, strict=True)]

@@ -1,7 +1,5 @@
 """RIS codes under which the adviser forecasts detection: aimed at the agent, swept in search of it, and random."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Integers
@@ -16,29 +14,20 @@ RANDOM_CODES = 16
 """Number of random RIS codes over which detection is averaged: a share of one half is known to an eighth."""
 
 
-class Codes(NamedTuple):
-    """C equally likely RIS codes for each of K positions along the trajectory."""
-
-    name: str
-    """Kind of the codes: `aimed`, `swept` or `random`."""
-    levels: Integers
-    """(C, K, N, M) phase levels of the panel's elements."""
-
-
-def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.random.Generator) -> list[Codes]:
-    """RIS codes to forecast detection with, at K cycles of a room's paths: `aimed`, for each panel the best code for
-    its strongest path; `swept`, the beams of the search for a panel that is not known yet, in turn, all panels at once;
-    `random`."""
+def codes_of(paths: Paths, spec: DataSheet, radio: RadioConfig, *, rng: np.random.Generator) -> dict[str, Integers]:
+    """RIS codes to forecast detection with, at K cycles of a room's paths, by kind: phase levels (C, K, N, M) of C
+    codes that are equally likely. `aimed`, for each panel the best code for its strongest path; `swept`, the beams of
+    the search for a panel that is not known yet, in turn, all panels at once; `random`."""
     count = paths.num_cycles
     beams = [sweep_codes(panel, radio.wavelength) for panel in spec.panels]
     turns = np.arange(max(map(len, beams)))
     swept = join_codes(tuple(RisCode(sweep[turns % len(sweep)], spec.levels) for sweep in beams)).index
     chance = rng.integers(spec.levels, size=(RANDOM_CODES, count, spec.rows, spec.cols))
-    return [
-        Codes("aimed", aimed_codes(paths, spec, radio)[None]),
-        Codes("swept", np.broadcast_to(swept[:, None], (len(swept), count, spec.rows, spec.cols))),
-        Codes("random", chance),
-    ]
+    return {
+        "aimed": aimed_codes(paths, spec, radio)[None],
+        "swept": np.broadcast_to(swept[:, None], (len(swept), count, spec.rows, spec.cols)),
+        "random": chance,
+    }
 
 
 def aimed_codes(paths: Paths, spec: DataSheet, radio: RadioConfig) -> Integers:

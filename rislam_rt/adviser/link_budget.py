@@ -1,4 +1,7 @@
-"""Link budget of each landmark along the trajectory: SNR margin, detection probability, why it is not detected."""
+"""Link budget of each landmark along the trajectory: SNR margin, detection probability, why it is not detected.
+
+Reasons are: occluded, behind the panel, below the array, not resolved, outside the receiver's window, too weak.
+"""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -6,16 +9,24 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.adviser.forecast_codes import codes_of
-from rislam_rt.adviser.reasons import Reasons, build_reasons
 from rislam_rt.arrays import Floats, Integers, take_rows
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import Received, receive
 from rislam_rt.measurement.bound_receiver import NEGLIGIBLE
 from rislam_rt.measurement.components import NoiselessComponents, merge, single
+from rislam_rt.measurement.received_paths import HORIZON_MARGIN
 from rislam_rt.measurement.slot_motion import split_by_code
 from rislam_rt.model import Paths, RisCode, Scene, SensorModel
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.ris import rephase
+from rislam_rt.scene.check.mesh_queries import crossings
+
+WEAK = "too weak"
+"""Reason where a path comes in that is below the detection threshold."""
+OUTSIDE = "beyond the receiver's delays"
+"""Reason where all paths arrive outside of the window of delays that the receiver looks at."""
+CLEARANCE = 1e-6
+"""Share of a line of sight left out at the landmark's end, where a panel lies on its own wall."""
 
 
 class DetectionForecast(NamedTuple):
@@ -67,6 +78,53 @@ def _cover(loud: Received, path: int, parts: NoiselessComponents, sensor: Sensor
     points = np.column_stack([loud.tau, loud.direction[:, :2]])
     near = leaders[sensor.may_merge(points[leaders] - points[row])]
     return int(loud.path[near[np.argmax(np.abs(loud.gain[near]))]]) if len(near) else -1
+
+
+class Reasons(NamedTuple):
+    """Room with its paths at K positions and all surfaces that hide, to find why landmarks are not detected."""
+
+    scene: Scene
+    paths: Paths
+    settings: Settings
+    triangles: Floats
+    """(T, 3, 3) [m] of all reflectors and occluders."""
+    owner: tuple[str, ...]
+    """(T,) name of the reflector or occluder of each triangle."""
+
+    def why(self, number: int, place: int, margin_db: float, covered: int) -> str:
+        """Reason, in a few words, why a landmark is not detected at a position of the agent; empty if none is found."""
+        point, agent = self.scene.landmark_positions[number], self.scene.agent
+        panel = self.scene.panel_number(number)
+        front = self.scene.panels[panel] if panel >= 0 else None
+        if front is not None and (agent.position[place] - front.center) @ front.spec.normal <= 0.0:
+            return "the agent is behind the panel"
+        blocker = self._blocker(point, place, number)
+        weak = margin_db < 0.0
+        own = (self.paths.landmark == number) & self.paths.valid[place]
+        if blocker and weak:
+            return f"shaded by '{blocker}'"
+        array = self.settings.radio.array
+        if own.any() and not array.receives(self.paths.arrival[place, own, 2], HORIZON_MARGIN).any():
+            return "below the array, which hears from above only"
+        if not weak and covered >= 0:
+            return f"not to be told from {self.paths.label(covered)}"
+        if not own.any():
+            return "no path"
+        if not self.settings.sensor.in_window(self.paths.tau[place, own]).any():
+            return OUTSIDE
+        return WEAK if weak else ""
+
+    def _blocker(self, point: Floats, place: int, number: int) -> str:
+        """Reason why a landmark is not detected: the mesh, not its own, that hides it from Tx or Rx; empty if none."""
+        scatterers = self.scene.scatterers
+        own = scatterers[number].name if number < len(scatterers) and scatterers[number].shade is not None else ""
+        for end in (self.scene.agent.tx[place], self.scene.agent.rx[place]):
+            last = point + CLEARANCE * (end - point)
+            _, hit = crossings(end[None], last[None], self.triangles)
+            names = [self.owner[t] for t in hit if self.owner[t] != own]
+            if names:
+                return names[0]
+        return ""
 
 
 PLACES = 15
@@ -129,17 +187,20 @@ def survey(scene: Scene, settings: Settings, places: int = PLACES) -> Survey:
 def link_budget(looked: Survey, *, rng: np.random.Generator) -> list[LandmarkLink]:
     """Link budgets of scatterers, and of each RIS panel under each kind of codes (`rng` draws the random ones)."""
     scene, paths, settings = looked.scene, looked.paths, looked.settings
-    reasons = build_reasons(scene, paths, settings)
+    meshes = [(r.name, r.triangles) for r in scene.reflectors] + [(o.name, o.triangles) for o in scene.occluders]
+    meshes += [(s.name, s.shade.triangles) for s in scene.scatterers if s.shade is not None]
+    owner = tuple(name for name, triangles in meshes for _ in range(len(triangles)))
+    reasons = Reasons(scene, paths, settings, np.concatenate([triangles for _, triangles in meshes]), owner)
     if scene.ris is None:
         return [_link(name, "", [_all_places(paths, looked)], reasons, n) for n, name in enumerate(scene.landmarks)]
     links: list[LandmarkLink] = []
     spec = scene.ris.spec
-    for codes in codes_of(paths, spec, settings.radio, rng=rng):
-        heard = [_all_places(rephase(paths, RisCode(levels, spec.levels)), looked) for levels in codes.levels]
-        if codes.name == "aimed":
+    for kind, codes in codes_of(paths, spec, settings.radio, rng=rng).items():
+        heard = [_all_places(rephase(paths, RisCode(levels, spec.levels)), looked) for levels in codes]
+        if kind == "aimed":
             links += [_link(s.name, "", heard, reasons, n) for n, s in enumerate(scene.scatterers)]
         links += [
-            _link(panel.name, codes.name, heard, reasons, len(scene.scatterers) + number)
+            _link(panel.name, kind, heard, reasons, len(scene.scatterers) + number)
             for number, panel in enumerate(scene.panels)
         ]
     return links

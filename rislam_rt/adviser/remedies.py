@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.adviser.link_budget import LandmarkLink, Survey
-from rislam_rt.adviser.reasons import OUTSIDE, WEAK
+from rislam_rt.adviser.link_budget import OUTSIDE, WEAK, LandmarkLink, Survey
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.antennas import amplitude
 from rislam_rt.design import exact_code
@@ -35,7 +34,13 @@ def remedies(looked: Survey, links: Sequence[LandmarkLink]) -> list[str]:
         if link.code in ("", "aimed") and link.share < HEARD:
             heard = f"{detection_label(link)} (on {link.share:.0%} of the way)"
             lines.append(f"{link.landmark}: {heard}: {_what_helps(looked, link)}")
-    lines += [line for link in links if link.code == "swept" for line in _on_search(link, links)]
+    for link in links:
+        known = any(one.share >= HEARD for one in links if (one.landmark, one.code) == (link.landmark, "aimed"))
+        if link.code == "swept" and link.share < SELDOM and known:
+            lines.append(
+                f"{link.landmark}: heard once it is known, but the beams that look for it are heard in "
+                f"{link.share:.1%} of the cycles only: it may be found late or never"
+            )
     return lines
 
 
@@ -67,9 +72,13 @@ def enough_elements(looked: Survey, panel: RisPanel, link: LandmarkLink) -> RisS
 
 
 def _what_helps(looked: Survey, link: LandmarkLink) -> str:
-    """Text on a landmark that is not detected: reasons, remedies, the SNR it lacks, and what makes up for it."""
-    scene, lack = looked.scene, lack_db(link)
-    parts = list(_why_where(link, panel_held=bool(link.code) and not looked.settings.receiver.alternation))
+    """Text on a landmark that is not detected: reasons, the commonest first, remedies, the SNR it lacks, and what makes
+    up for it."""
+    scene, lack, parts = looked.scene, lack_db(link), []
+    held = bool(link.code) and not looked.settings.receiver.alternation
+    for reason, count in Counter(reason for reason in link.reason if reason).most_common():
+        share = f"{reason} on {count / len(link.reason):.0%} of it"
+        parts.append(share if reason == WEAK else f"{share} ({_way_round(reason, panel_held=held)})")
     if lack:
         parts.append(f"{lack:.1f} dB lack where it is too weak: as much less noise (radio.reference_snr_db) would do")
         parts += _larger(looked, link, lack)
@@ -78,13 +87,6 @@ def _what_helps(looked: Survey, link: LandmarkLink) -> str:
         far = float(np.median(np.linalg.norm(weak - point, axis=1)))
         parts.append(f"or a way within {far * 10.0 ** (-lack / 40.0):.1f} m (there it is {far:.1f} m away)")
     return "; ".join(parts)
-
-
-def _why_where(link: LandmarkLink, *, panel_held: bool) -> Iterator[str]:
-    """Reasons why a landmark is not detected, the commonest first, with share of the trajectory and remedy."""
-    for reason, count in Counter(reason for reason in link.reason if reason).most_common():
-        share = f"{reason} on {count / len(link.reason):.0%} of it"
-        yield share if reason == WEAK else f"{share} ({_way_round(reason, panel_held=panel_held)})"
 
 
 def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
@@ -100,16 +102,6 @@ def _larger(looked: Survey, link: LandmarkLink, lack: float) -> Iterator[str]:
         yield f"or a panel of {grown.rows} x {grown.cols} elements {now}"
     else:
         yield f"no panel of up to {LARGEST} elements a side would do {now}"
-
-
-def _on_search(link: LandmarkLink, links: Sequence[LandmarkLink]) -> Iterator[str]:
-    """Remedy for a search: warning of a panel that is detected under an aimed code, but hardly ever by the sweep."""
-    aimed = next(one for one in links if one.landmark == link.landmark and one.code == "aimed")
-    if aimed.share >= HEARD and link.share < SELDOM:
-        yield (
-            f"{link.landmark}: heard once it is known, but the beams that look for it are heard in {link.share:.1%} of "
-            "the cycles only: it may be found late or never"
-        )
 
 
 def _way_round(why: str, *, panel_held: bool) -> str:

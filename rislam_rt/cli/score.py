@@ -45,7 +45,7 @@ def command(
 
     Example: rislam-rt score runs/trace_then_slam-office-7-0123abcd --save recordings
     """
-    from rislam_rt.pipeline.long.whole_run import read_whole
+    from rislam_rt.pipeline.long.run import read_whole
     from rislam_rt.report.unseen.run_card import print_run_card
     from rislam_rt.studies.unseen.recording_file import write_recording
     from rislam_rt.sweeps.cell_work import plain_result

@@ -40,9 +40,8 @@ class MapEstimate:
 
     def __post_init__(self) -> None:
         count, walls = len(np.asarray(self.ident)), len(np.asarray(self.wall_offset))
-        freeze(self, np.int64, ident=(count,))
+        freeze(self, np.int64, ident=(count,), parent=(count,))
         freeze(self, np.float64, position=(count, 3), covariance=(count, 3, 3))
-        freeze(self, np.int64, parent=(count,))
         freeze(self, np.float64, ris_probability=(count,), strength=(count,))
         freeze(self, np.float64, wall_normal=(walls, 3), wall_offset=(walls,), wall_std=(walls, 2))
         if self.panel is not None:

@@ -37,9 +37,8 @@ def itu_parameters(name: str, carrier: float) -> tuple[float, float, float, floa
     if name not in ITU_MATERIALS:
         raise SceneError(f"material.itu: '{name}' received; give one of {', '.join(ITU_MATERIALS)}")
     ghz = carrier / 1e9
-    for low, high, *parameters in ITU_MATERIALS[name]:
+    for low, high, a, b, c, d in ITU_MATERIALS[name]:
         if low <= ghz <= high:
-            a, b, c, d = parameters
             return a, b, c, d
     ranges = " or ".join(f"{row[0]:g} to {row[1]:g} GHz" for row in ITU_MATERIALS[name])
     raise SceneError(f"material.itu: '{name}' at {ghz:g} GHz received; it is specified from {ranges}")

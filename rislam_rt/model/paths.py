@@ -24,6 +24,10 @@ class PathKind(IntEnum):
     VRIS = 5
 
 
+COURSE = ("valid", "tau", "departure", "arrival", "gain", "vertices")
+"""Fields of `Paths` that have a row for each cycle."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RisLegs:
     """Response of each RIS element on the legs of paths over a panel, from the Tx and to the Rx; 0 at elements of other
@@ -149,7 +153,7 @@ class Paths:
     def of_cycle(self, cycle: int) -> "Paths":
         """Propagation paths of one cycle alone, as views: nothing is copied and checked again."""
         one, paths = slice(cycle, cycle + 1), copy(self)
-        for name in ("valid", "tau", "departure", "arrival", "gain", "vertices"):
+        for name in COURSE:
             object.__setattr__(paths, name, getattr(self, name)[one])
         if self.ris is not None:
             legs = copy(self.ris)

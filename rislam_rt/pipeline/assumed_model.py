@@ -12,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, RadioConfig, RisSpec, RisSpecs, Trajectory
+from rislam_rt.model import Antennas, Body, DataSheet, Measurement, Paths, Trajectory, join_sheets
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.pipeline_spec import ESTIMATOR_SECTIONS, PipelineSpec, Settings, StartSection
 from rislam_rt.slam import StartPrior
@@ -86,29 +86,31 @@ def tell_start(
 
 def tell_panel(panel: DataSheet, told: AssumedSection) -> DataSheet:
     """Assumed data sheet of the RIS panel, or of each of several, with the errors of orientation, spacing and gain."""
-    if isinstance(panel, RisSpecs):
-        return RisSpecs(tuple(_tell_one(one, told) for one in panel.panels))
-    return _tell_one(panel, told)
-
-
-def _tell_one(panel: RisSpec, told: AssumedSection) -> RisSpec:
-    """Assumed data sheet of one RIS panel."""
     tilt, turn = np.radians(told.panel_tilt_deg), np.radians(told.panel_turn_deg)
-    normal, up = panel.normal, panel.up
-    if turn:
-        up = np.cos(turn) * up + np.sin(turn) * panel.right
-    if tilt:
-        normal, up = np.cos(tilt) * normal + np.sin(tilt) * up, np.cos(tilt) * up - np.sin(tilt) * normal
-    return replace(
-        panel, normal=normal, up=up, spacing=panel.spacing * told.panel_spacing_scale,
-        element=told.panel_element or panel.element, amplitude=panel.amplitude * _amplitude(told.panel_gain_db),
-    )  # fmt: skip
+    sheets = []
+    for one in panel.panels:
+        normal, up = one.normal, one.up
+        if turn:
+            up = np.cos(turn) * up + np.sin(turn) * one.right
+        if tilt:
+            normal, up = np.cos(tilt) * normal + np.sin(tilt) * up, np.cos(tilt) * up - np.sin(tilt) * normal
+        sheet = replace(
+            one, normal=normal, up=up, spacing=one.spacing * told.panel_spacing_scale,
+            element=told.panel_element or one.element, amplitude=one.amplitude * _amplitude(told.panel_gain_db),
+        )  # fmt: skip
+        sheets.append(sheet)
+    return join_sheets(tuple(sheets))
 
 
 def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
-    """Assumed settings of all estimators: true ones with errors of radio, process noise, threshold and clutter."""
+    """Assumed settings of all estimators: true ones with errors of radio (noise density, antenna gain and patterns),
+    process noise, threshold and clutter."""
     slam = replace(settings.slam, max_bounces=max(settings.slam.max_bounces - told.bounces_less, 0))
-    radio = tell_radio(settings.radio, told)
+    radio = replace(
+        settings.radio, noise_psd=settings.radio.noise_psd * _amplitude(told.noise_db) ** 2,
+        tx_gain=settings.radio.tx_gain * _amplitude(told.gain_db) ** 2,
+        antennas=Antennas() if told.antennas else settings.radio.antennas,
+    )  # fmt: skip
     sensor = replace(
         settings.sensor, radio=radio, threshold=settings.sensor.threshold * _amplitude(told.threshold_db) ** 2,
         false_alarms=settings.sensor.false_alarms * told.clutter_scale,
@@ -117,14 +119,6 @@ def tell_settings(settings: Settings, told: AssumedSection) -> Settings:
     configs: dict[str, Any] = {name: getattr(found, name) for name in ("slam", *ESTIMATOR_SECTIONS)}
     scale = told.process_noise_scale
     return found._replace(**{name: replace(one, sigma_a=one.sigma_a * scale) for name, one in configs.items()})
-
-
-def tell_radio(radio: RadioConfig, told: AssumedSection) -> RadioConfig:
-    """Assumed radio: true carrier, band and array, with the errors of noise density, antenna gain and patterns."""
-    return replace(
-        radio, noise_psd=radio.noise_psd * _amplitude(told.noise_db) ** 2,
-        tx_gain=radio.tx_gain * _amplitude(told.gain_db) ** 2, antennas=Antennas() if told.antennas else radio.antennas,
-    )  # fmt: skip
 
 
 def tell_measurement(measurement: Measurement, told: AssumedSection) -> Measurement:

@@ -17,21 +17,9 @@ from rislam_rt.model import DataSheet, Measurement, Paths, PathTruth, RisCode, S
 from rislam_rt.pipeline.assumed_model import AssumedModel, tell_measurement
 from rislam_rt.pipeline.control_link import ControlLink, message_seconds, send_code
 from rislam_rt.pipeline.estimators import Estimator
+from rislam_rt.pipeline.seeds import Seeds, child
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings
 from rislam_rt.ris import PanelErrors, rephase
-
-
-class CycleGenerators(NamedTuple):
-    """Random generators of one cycle, by purpose."""
-
-    design: np.random.Generator
-    """Of the code designer."""
-    control: np.random.Generator
-    """Of lost control messages and flipped bits."""
-    noise: np.random.Generator
-    """Of the receiver."""
-    filter: np.random.Generator
-    """Of the estimator."""
 
 
 class GroundTruth(NamedTuple):
@@ -101,6 +89,12 @@ class RunContext(NamedTuple):
     """True settings, for channel and receiver."""
     told: AssumedModel
     """Assumed model, for estimator and code design."""
+    seeds: Seeds
+    """Of the run; receiver and control messages draw from a child for each cycle."""
+    filter_rng: np.random.Generator
+    """Generator of the estimator, over all cycles."""
+    design_rng: np.random.Generator
+    """Generator of the code designer, over all cycles."""
     receptions: Receptions | None = None
     """Measurements of schemes that ran before with the same codes; None to keep none."""
 
@@ -138,9 +132,7 @@ class CodePolicy(Protocol):
         ...
 
 
-def run_cycle(
-    agent: Agent, room: GroundTruth, cycle: int, context: RunContext, *, rng: CycleGenerators
-) -> tuple[Agent, Cycle]:
+def run_cycle(agent: Agent, room: GroundTruth, cycle: int, context: RunContext) -> tuple[Agent, Cycle]:
     """Run one cycle of one scheme: design a code, send it, measure, update; return the agent and the cycle's record."""
     control, estimator, told = context.spec.control, context.estimator, context.told
     config = estimator.config(told.settings)
@@ -150,12 +142,14 @@ def run_cycle(
     link, sent = agent.link, None
     if link is not None and context.designer is not None:
         ahead = dt + control.delay_cycles * usual_step(told.time)
-        sent = context.designer(partial(estimator.predict, agent.state, ahead, config), cycle, room, rng=rng.design)
+        belief = partial(estimator.predict, agent.state, ahead, config)
+        sent = context.designer(belief, cycle, room, rng=context.design_rng)
     clock.append(perf_counter())
 
     air = 0.0
     if link is not None and sent is not None and context.panel is not None:
-        link = send_code(link, sent, control, rng=rng.control, bit_flip=context.spec.panel.bit_flip)
+        message_rng = child(context.seeds.control, cycle)
+        link = send_code(link, sent, control, rng=message_rng, bit_flip=context.spec.panel.bit_flip)
         air = message_seconds(context.panel, control)
     clock.append(perf_counter())
 
@@ -170,7 +164,7 @@ def run_cycle(
         cycle, b"" if applied is None else applied.index.tobytes(), agent.heard,
         lambda: measure(
             paths, 0, float(room.trajectory.heading[cycle]), context.settings.radio, context.settings.receiver,
-            agent.heard, room.doppler[row], room.front_end, clutter, rng=rng.noise,
+            agent.heard, room.doppler[row], room.front_end, clutter, rng=child(context.seeds.noise, cycle),
         ),
     )  # fmt: skip
     clock.append(perf_counter())
@@ -178,13 +172,13 @@ def run_cycle(
     believed = link.believed if link is not None else None
     reported = tell_measurement(measurement, context.spec.told)
     heading = float(told.heading[cycle])
-    state, info = estimator.step(agent.state, reported, believed, dt, heading, config, rng=rng.filter)
-    belief = estimator.estimate(state, config)
+    state, info = estimator.step(agent.state, reported, believed, dt, heading, config, rng=context.filter_rng)
+    found = estimator.estimate(state, config)
     clock.append(perf_counter())
 
     optimise, communicate, _, localise = np.diff(clock)
     outcome = Cycle(
-        belief, info, reported, truth, paths.gain[0], sent, applied,
+        found, info, reported, truth, paths.gain[0], sent, applied,
         (optimise, communicate + air, acquired, localise), believed,
     )  # fmt: skip
     return Agent(state, link, measurement), outcome

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.design import DESIGNERS, Design, DesignProblem, panel_columns, problem_from_paths
+from rislam_rt.design import DESIGNERS, Design, panel_columns, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import PathKind, RadioConfig, Scene, Trajectory
 from rislam_rt.pipeline.channels import build_channel
@@ -48,7 +48,12 @@ def design_at(
     designs = {
         name: design(problem, rng=child) for (name, design), child in zip(DESIGNERS.items(), children, strict=True)
     }
-    gains = {name: _panel_gains(scene, problem, design) for name, design in designs.items()}
+    gains: dict[str, dict[str, float]] = {name: {} for name in designs}
+    places = list(zip(scene.panels, problem.targets, problem.panels, strict=True))
+    for name, design in designs.items() if len(places) > 1 else ():
+        weight = np.exp(-1j * design.xi.ravel())
+        for panel, own, (_, span) in places:
+            gains[name][panel.name] = float(20.0 * np.log10(max(abs(own @ weight[span]), 1e-20)))
     return DesignsAt(designs, paths.label(int(target)), bool(paths.kind[target] == PathKind.RIS), gains)
 
 
@@ -67,14 +72,6 @@ def _check_off_panels(scene: Scene, points: Floats) -> None:
                 f"--at: {points[0].tolist()} lies on '{host.name}', which holds the panel '{panel.name}'; keep "
                 f"{1e3 * MIN_CLEARANCE:g} mm away"
             )
-
-
-def _panel_gains(scene: Scene, problem: DesignProblem, design: Design) -> dict[str, float]:
-    """Gain [dB] of the first path of each of several panels under a design at a position; empty for a single panel."""
-    weight, found = np.exp(-1j * design.xi.ravel()), {}
-    for panel, target, (_, span) in zip(scene.panels, problem.targets, problem.panels, strict=True):
-        found[panel.name] = float(20.0 * np.log10(max(abs(target @ weight[span]), 1e-20)))
-    return found if len(found) > 1 else {}
 
 
 def design_table(found: DesignsAt) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 published schemes, and a user's own."""
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,13 +82,9 @@ def own_estimator(name: str) -> Estimator:
         return state, OwnDiagnostics(np.full(len(measurement), -1))
 
     return Estimator(
-        init,
-        predict,
-        step,
-        estimate,
-        lambda settings: None,
+        init, predict, step, estimate, lambda settings: None,
         use_vt=lambda settings: bool(getattr(own, "use_vt", False)),
-    )
+    )  # fmt: skip
 
 
 class Estimators(dict[str, Estimator]):
@@ -97,22 +94,17 @@ class Estimators(dict[str, Estimator]):
         return own_estimator(name)
 
 
-ESTIMATORS = Estimators({
-    "slam": Estimator(
-        slam.init, slam.predict, slam.step, slam.estimate, lambda settings: settings.slam, smoothed=slam.smoothed
+def _built_in(home: Any, name: str, **traits: Any) -> Estimator:
+    """Estimator of that name whose functions are those of the module `home`."""
+    return Estimator(home.init, home.predict, home.step, home.estimate, attrgetter(name), **traits)
+
+
+ESTIMATORS = Estimators(
+    slam=_built_in(slam, "slam", smoothed=slam.smoothed),
+    bp_slam=_built_in(bp_slam, "bp_slam", angles=False, walls="images", use_vt=attrgetter("bp_slam.planes")),
+    bp_slam_aoa=_built_in(bp_slam_aoa, "bp_slam_aoa", use_vt=attrgetter("bp_slam_aoa.use_vt")),
+    channel_slam=_built_in(
+        channel_slam, "channel_slam", angles=False, walls="images", use_vt=attrgetter("channel_slam.planes")
     ),
-    "bp_slam": Estimator(
-        bp_slam.init, bp_slam.predict, bp_slam.step, bp_slam.estimate, lambda settings: settings.bp_slam,
-        angles=False, walls="images", use_vt=lambda settings: settings.bp_slam.planes,
-    ),
-    "bp_slam_aoa": Estimator(
-        bp_slam_aoa.init, bp_slam_aoa.predict, bp_slam_aoa.step, bp_slam_aoa.estimate,
-        lambda settings: settings.bp_slam_aoa, use_vt=lambda settings: settings.bp_slam_aoa.use_vt,
-    ),
-    "channel_slam": Estimator(
-        channel_slam.init, channel_slam.predict, channel_slam.step, channel_slam.estimate,
-        lambda settings: settings.channel_slam, angles=False, walls="images",
-        use_vt=lambda settings: settings.channel_slam.planes,
-    ),
-})  # fmt: skip
+)
 """Built-in SLAM estimators by name; a user's own are loaded when they are asked for."""

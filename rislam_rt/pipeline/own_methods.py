@@ -98,12 +98,8 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
 
     Files of its own package that it imports are part of it: a run's numbers depend on them.
     """
-    found = {}
-    for name in sorted(set(names)):
-        if is_own(name):
-            file = _file(load_own(name))
-            found[name] = own_digest(Path(file)) if file else ""
-    return found
+    files = {name: _file(load_own(name)) for name in sorted(set(names)) if is_own(name)}
+    return {name: own_digest(Path(file)) if file else "" for name, file in files.items()}
 
 
 def own_code(
@@ -213,22 +209,16 @@ def own_digest(file: Path) -> str:
     Of its bytes alone if there is nothing of that kind. Installed libraries are left out, as are imports by names that
     are computed at run time.
     """
-    files = sorted(_all_of(file))
+    files, left = {file}, [file]
+    while left:
+        fresh = set(_imported(left.pop())) - files
+        files |= fresh
+        left += fresh
     if len(files) == 1:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     root = _root(file)
-    parts = [f"{one.relative_to(root)}\0{hashlib.sha256(one.read_bytes()).hexdigest()}\n" for one in files]
+    parts = [f"{one.relative_to(root)}\0{hashlib.sha256(one.read_bytes()).hexdigest()}\n" for one in sorted(files)]
     return hashlib.sha256("".join(parts).encode()).hexdigest()
-
-
-def _all_of(file: Path) -> set[Path]:
-    """A Python file and all files that it imports, directly or not, from its own folder or package."""
-    found, left = {file}, [file]
-    while left:
-        fresh = set(_imported(left.pop())) - found
-        found |= fresh
-        left += fresh
-    return found
 
 
 def _imported(file: Path) -> Iterator[Path]:

@@ -30,7 +30,6 @@ from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.seeds import Seeds, spawn_seeds
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.radio import build_radio
-from rislam_rt.pipeline.specification.time_budget import changed_steps, fills_cycle, fitted_steps, total_seconds
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.ris import delay_spread_warnings
 from rislam_rt.scene.check import material_errors
@@ -151,7 +150,9 @@ def run_slam(
         if isinstance(scheme, RislamError):
             raise scheme
         done[name] = scheme
-    return result_of(setup, spec, {name: done[name] for name in spec.schemes}, seed=_seed_of(rng))
+    seed = getattr(rng.bit_generator.seed_seq, "entropy", None)  # of a generator that was made from a whole number
+    schemes = {name: done[name] for name in spec.schemes}
+    return result_of(setup, spec, schemes, seed=seed if isinstance(seed, int) else None)
 
 
 def result_of(
@@ -192,12 +193,11 @@ def check_run(scene: Scene, spec: PipelineSpec) -> None:
     motion, budget = scene.agent, spec.budget
     if spec.cycles is not None and spec.cycles > len(motion):
         raise ConfigError(f"cycles: {spec.cycles} received; the scene has {len(motion)}, give no more")
-    total = total_seconds(budget)
-    step = usual_step(motion.time) or total
-    if not fills_cycle(budget, step):
+    step = usual_step(motion.time) or budget.total
+    if not budget.fills(step):
         raise ConfigError(
-            f"budget: the four steps sum to {total:g} s; make them the scene's cycle of {step:g} s "
-            f"({changed_steps(budget, fitted_steps(budget, step))}), or give agent.cycle_s = {total:g} in the scene, "
+            f"budget: the four steps sum to {budget.total:g} s; make them the scene's cycle of {step:g} s "
+            f"({budget.options(budget.fitted(step))}), or give agent.cycle_s = {budget.total:g} in the scene, "
             "to which a recording is interpolated"
         )
     if scene.ris is None:
@@ -226,7 +226,10 @@ def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
     settings = build_settings(spec, panels)
     moving = motion_warnings(scene, settings.radio, settings.receiver, spec.budget, f"scene '{scene.name}'")
-    return (*(_large_panels(scene, spec) if panels else ()), *(finding.line for finding in moving))
+    bandwidth, agent = spec.radio.bandwidth_ghz * 1e9, scene.agent
+    used = scene.panels if panels else ()
+    large = (delay_spread_warnings(panel.spec, panel.center, agent.tx, agent.rx, bandwidth) for panel in used)
+    return (*(line for lines in large for line in lines), *(finding.line for finding in moving))
 
 
 def late_warnings(scene: Scene, paths: Paths, spec: PipelineSpec) -> tuple[str, ...]:
@@ -234,13 +237,6 @@ def late_warnings(scene: Scene, paths: Paths, spec: PipelineSpec) -> tuple[str, 
     panels = len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0
     found = late_path_warnings(paths, build_settings(spec, panels), f"scene '{scene.name}'")
     return tuple(finding.line for finding in found)
-
-
-def _large_panels(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings of a run about panels whose elements' delays the band resolves."""
-    bandwidth, agent = spec.radio.bandwidth_ghz * 1e9, scene.agent
-    each = (delay_spread_warnings(panel.spec, panel.center, agent.tx, agent.rx, bandwidth) for panel in scene.panels)
-    return tuple(line for lines in each for line in lines)
 
 
 def library_versions() -> dict[str, str]:
@@ -259,9 +255,3 @@ def _installed() -> dict[str, str]:
         with suppress(PackageNotFoundError):
             found[name] = version(name)
     return found
-
-
-def _seed_of(rng: np.random.Generator) -> int | None:
-    """The integer seed of a run, from which its generator was made; None if it was not made from one."""
-    entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
-    return entropy if isinstance(entropy, int) else None

@@ -14,7 +14,7 @@ from rislam_rt.model import NOTHING, Body, PathKind, Paths, RisCode, Scene, Sche
 from rislam_rt.pipeline.assumed_model import perceived_paths, tell_belief
 from rislam_rt.pipeline.code_policies import build_designer
 from rislam_rt.pipeline.control_link import open_link
-from rislam_rt.pipeline.cycle import Agent, Cycle, CycleGenerators, GroundTruth, Receptions, RunContext, run_cycle
+from rislam_rt.pipeline.cycle import Agent, Cycle, GroundTruth, Receptions, RunContext, run_cycle
 from rislam_rt.pipeline.estimators import ESTIMATORS, Estimator
 from rislam_rt.pipeline.recordings.inputs import RecordedInputs, given_of
 from rislam_rt.pipeline.room.front_end import prepare_front_end
@@ -37,7 +37,7 @@ class SchemeSimulation:
         self, name: str, scene: Scene, body: Body, spec: PipelineSpec, seeds: Seeds, estimator: Estimator | None = None,
         receptions: Receptions | None = None,
     ) -> None:  # fmt: skip
-        self.scheme, self.name, self.seeds = SCHEMES[name], name, seeds
+        self.scheme, self.name = SCHEMES[name], name
         self.motion, self.body = scene.agent, body
         self.front_end: FrontEnd | None = None
         panel = scene.ris.spec if scene.ris is not None and self.scheme.panel else None
@@ -50,12 +50,12 @@ class SchemeSimulation:
             self.faults = draw_panel(panel, spec.panel.tolerance, rng=np.random.default_rng(seeds.panel))
             designer = build_designer(self.scheme, panel, spec, settings, told)
         estimator = estimator or ESTIMATORS[self.scheme.estimator]
-        self.context = RunContext(panel, designer, estimator, spec, settings, told, receptions)
-        self.filter_rng, self.design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
+        filter_rng, design_rng = np.random.default_rng(seeds.filter), np.random.default_rng(seeds.design)
+        self.context = RunContext(
+            panel, designer, estimator, spec, settings, told, seeds, filter_rng, design_rng, receptions
+        )
         config = estimator.config(told.settings)
-        state = estimator.init(
-            told.start, told.body, told.panel, told.settings.sensor, config, rng=self.filter_rng
-        )  # fmt: skip
+        state = estimator.init(told.start, told.body, told.panel, told.settings.sensor, config, rng=filter_rng)
         self.agent = Agent(state, open_link(panel) if panel is not None else None)
 
     @property
@@ -71,26 +71,25 @@ class SchemeSimulation:
         """
         if self.context.panel is None:
             paths = without_panel(paths)
-        spec, motion = self.context.spec, self.motion[first : first + paths.num_cycles]
-        shift = doppler_shift(paths, motion, self.context.settings.radio.wavelength)
+        motion, wavelength = self.motion[first : first + paths.num_cycles], self.context.settings.radio.wavelength
+        told, since = self.context.spec.told, float(self.motion.time[0])
+        shift = doppler_shift(paths, motion, wavelength)
         clutter, twin = None, deepcopy(self.sway)  # one array hears both
         if extras is not None:
-            extras = perceived_paths(extras, motion, spec.told, rng=twin, since=float(self.motion.time[0]))
-            clutter = Clutter(extras, doppler_shift(extras, motion, self.context.settings.radio.wavelength))
-        heard = perceived_paths(paths, motion, spec.told, rng=self.sway, since=float(self.motion.time[0]))
+            extras = perceived_paths(extras, motion, told, rng=twin, since=since)
+            clutter = Clutter(extras, doppler_shift(extras, motion, wavelength))
+        heard = perceived_paths(paths, motion, told, rng=self.sway, since=since)
         if first == 0:
-            build = np.random.default_rng(self.seeds.hardware)
+            build = np.random.default_rng(self.context.seeds.hardware)
             self.front_end = prepare_front_end(heard, motion, self.body, self.context.settings, rng=build)
         room = GroundTruth(heard, self.motion, shift, self.faults, first, self.front_end, clutter)
         cycles: list[Cycle] = []
         tell(self.name, first, len(self.motion))
         for cycle in range(first, last):
-            control, noise = (child(seed, cycle) for seed in (self.seeds.control, self.seeds.noise))
-            rng = CycleGenerators(self.design_rng, control, noise, self.filter_rng)
-            self.agent, outcome = run_cycle(self.agent, room, cycle, self.context, rng=rng)
+            self.agent, outcome = run_cycle(self.agent, room, cycle, self.context)
             cycles.append(outcome)
             tell(self.name, cycle + 1, len(self.motion))
-        given = given_of(self.context.told, first, cycles, self.seeds.filter)
+        given = given_of(self.context.told, first, cycles, self.context.seeds.filter)
         levels = self.context.panel.levels if self.context.panel is not None else 0
         found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
         # a slice does not know what later ones tell of its end
@@ -113,8 +112,7 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
     held = np.zeros((len(cycles), len(ident)), dtype=np.bool_)
     landmark = np.zeros((len(cycles), len(ident), 3))
     ris_probability = np.zeros((len(cycles), len(ident)))
-    several = any(m.panel is not None for m in maps)
-    panel = np.zeros(held.shape, dtype=np.int64) if several else None
+    panel = np.zeros(held.shape, dtype=np.int64) if any(m.panel is not None for m in maps) else None
     for row, m in enumerate(maps):
         column = np.searchsorted(ident, m.ident)
         held[row, column], landmark[row, column] = True, m.position
@@ -123,18 +121,20 @@ def gather(scheme: str, time: Floats, cycles: Sequence[Cycle], levels: int, give
         ris_probability[row, column] = m.ris_probability
         if panel is not None and m.panel is not None:  # an empty map has none
             panel[row, column] = m.panel
+    names = ("position", "velocity", "heading", "covariance")
+    pose: dict[str, Any] = {name: np.array([getattr(estimate, name) for estimate in estimates]) for name in names}
+    infos = [cycle.info for cycle in cycles]
+    scalars = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
     return SchemeResult(
-        scheme=scheme, time=time, position=np.array([estimate.position for estimate in estimates]),
-        velocity=np.array([estimate.velocity for estimate in estimates]),
-        heading=np.array([estimate.heading for estimate in estimates]),
-        covariance=np.array([estimate.covariance for estimate in estimates]),
+        scheme=scheme, time=time, **pose,
         sent=_codes([cycle.sent for cycle in cycles]), applied=_codes([cycle.applied for cycle in cycles]),
         levels=levels, gain=np.array([cycle.gain for cycle in cycles]),
         component_path=padded([cycle.truth.path for cycle in cycles], NOTHING, np.int64),
-        component_landmark=padded([cycle.info.landmark for cycle in cycles], NOTHING, np.int64), ident=ident,
+        component_landmark=padded([info.landmark for info in infos], NOTHING, np.int64), ident=ident,
         parent=parent, held=held, landmark_position=landmark, ris_probability=ris_probability,
-        seconds=np.array([cycle.seconds for cycle in cycles]), info=_diagnostics([cycle.info for cycle in cycles]),
-        outcome=tuple(str(cycle.info.outcome) for cycle in cycles), map=maps[-1], panel=panel, given=given,
+        seconds=np.array([cycle.seconds for cycle in cycles]),
+        info={name: np.array([float(getattr(info, name)) for info in infos]) for name in scalars},
+        outcome=tuple(str(info.outcome) for info in infos), map=maps[-1], panel=panel, given=given,
         start_position=given.inputs.start.position,
     )  # fmt: skip
 
@@ -144,9 +144,3 @@ def _codes(codes: Sequence[RisCode | None]) -> Integers:
     if any(code is None for code in codes):
         return np.zeros((len(codes), 0, 0), dtype=np.int64)
     return np.array([code.index for code in codes if code is not None], dtype=np.int64)
-
-
-def _diagnostics(infos: Sequence[Any]) -> dict[str, Any]:
-    """Filter diagnostics of all simulated cycles, (K,) each: the fields of `infos` that are scalar numbers, by name."""
-    names = [name for name, value in infos[0]._asdict().items() if isinstance(value, bool | int | float | np.number)]
-    return {name: np.array([float(getattr(info, name)) for info in infos]) for name in names}

@@ -36,6 +36,8 @@ class Schemes(dict[str, Scheme]):
         return Scheme("random", estimator=name) if hasattr(thing, "step") else Scheme(name)
 
 
+PUBLISHED = ("bp_slam", "bp_slam_aoa", "channel_slam")
+"""Names of the other published estimators, each with random codes and without a panel."""
 SCHEMES = Schemes(
     {
         "optimized": Scheme("spec"),
@@ -43,12 +45,8 @@ SCHEMES = Schemes(
         "exact": Scheme("exact"),
         "genie": Scheme("spec", on_truth=True),
         "no_ris": Scheme(None),
-        "bp_slam": Scheme("random", estimator="bp_slam"),
-        "bp_slam_aoa": Scheme("random", estimator="bp_slam_aoa"),
-        "channel_slam": Scheme("random", estimator="channel_slam"),
-        "bp_slam_no_ris": Scheme(None, estimator="bp_slam"),
-        "bp_slam_aoa_no_ris": Scheme(None, estimator="bp_slam_aoa"),
-        "channel_slam_no_ris": Scheme(None, estimator="channel_slam"),
+        **{name: Scheme("random", estimator=name) for name in PUBLISHED},
+        **{f"{name}_no_ris": Scheme(None, estimator=name) for name in PUBLISHED},
     }
 )
 """Built-in schemes by name; a user's own are loaded when they are asked for."""

@@ -18,18 +18,6 @@ def seal(content: Mapping[str, Any]) -> dict[str, Any]:
     return {**found, "checksum": checksum(found)}
 
 
-def _check_seal(content: Any, file: Path) -> dict[str, Any]:
-    """Check schema version and checksum of data read from `file`, and return the data."""
-    if not isinstance(content, dict) or "schema" not in content or "checksum" not in content:
-        raise ResultError(f"{file}: no schema or no checksum, so not written by this version; give another folder")
-    if content["schema"] != SCHEMA:
-        text = repr(content["schema"])[:20]
-        raise ResultError(f"{file}: schema {text}, this version reads {SCHEMA}; give another folder")
-    if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):
-        raise ResultError(f"{file}: changed since it was written (its checksum does not fit); give another folder")
-    return content
-
-
 def read_sealed(file: Path) -> dict[str, Any]:
     """Read a JSON file, and check its schema version and checksum.
 
@@ -39,7 +27,15 @@ def read_sealed(file: Path) -> dict[str, Any]:
         It cannot be read, or is not as it was written.
     """
     try:
-        return _check_seal(json.loads(file.read_bytes()), file)
+        content = json.loads(file.read_bytes())
+        if not isinstance(content, dict) or "schema" not in content or "checksum" not in content:
+            raise ResultError(f"{file}: no schema or no checksum, so not written by this version; give another folder")
+        if content["schema"] != SCHEMA:
+            text = repr(content["schema"])[:20]
+            raise ResultError(f"{file}: schema {text}, this version reads {SCHEMA}; give another folder")
+        if content["checksum"] != checksum({key: value for key, value in content.items() if key != "checksum"}):
+            raise ResultError(f"{file}: changed since it was written (its checksum does not fit); give another folder")
+        return content
     except OSError as error:
         raise ResultError(f"{file}: cannot be read ({error.strerror}); give another folder") from None
     except (ValueError, RecursionError):

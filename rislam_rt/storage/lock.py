@@ -47,15 +47,16 @@ def hold(folder: Path, what: str) -> Iterator[None]:
 
 
 def _take(file: Path) -> int:
-    """Open and lock a lock file, and return its handle; a `BlockingIOError` names the process that holds it."""
+    """Open and lock a lock file, write number and machine of this process to it, and return its handle; a
+    `BlockingIOError` names the process that holds it."""
     while True:
         handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         try:
             _lock(handle)
-            here = os.fstat(handle)
-            there = os.stat(file) if file.exists() else None
-            if there is not None and (here.st_dev, here.st_ino) == (there.st_dev, there.st_ino):
-                _sign(handle)
+            if os.path.samestat(os.fstat(handle), os.stat(file)):
+                with suppress(OSError):  # a full disk: the lock holds without a name
+                    os.ftruncate(handle, 0)
+                    os.pwrite(handle, json.dumps({"pid": os.getpid(), "host": os.uname().nodename}).encode(), 0)
                 return handle
         except FileNotFoundError:
             pass
@@ -75,13 +76,6 @@ def _lock(handle: int) -> None:
         name, alive = _holder(handle)
         if alive:
             raise BlockingIOError(name) from None
-
-
-def _sign(handle: int) -> None:
-    """Write number and machine of this process to a lock file."""
-    with suppress(OSError):  # a full disk: the lock holds without a name
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, json.dumps({"pid": os.getpid(), "host": os.uname().nodename}).encode(), 0)
 
 
 def _holder(handle: int) -> tuple[str, bool]:

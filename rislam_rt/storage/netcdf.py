@@ -86,22 +86,18 @@ def read_dataset(
     StoreError
         The file does not exist, or cannot be read.
     """
-    try:
-        return _load(path)
-    except FileNotFoundError:
-        raise StoreError(f"{path}: no such file; {missing}") from None
-    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
-        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); {damaged}") from None
-
-
-def _load(path: Path) -> "xr.Dataset":
-    """Read a NetCDF file into memory."""
     import h5netcdf
     import xarray as xr
     from xarray.backends import H5NetCDFStore
 
-    with _opened_once()(path, "r") as file:
-        return xr.load_dataset(H5NetCDFStore(h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")))
+    try:
+        with _opened_once()(path, "r") as file:
+            content = h5netcdf.File(file, "r", decode_vlen_strings=True, phony_dims="access")
+            return xr.load_dataset(H5NetCDFStore(content))
+    except FileNotFoundError:
+        raise StoreError(f"{path}: no such file; {missing}") from None
+    except Exception as error:  # the HDF5 library raises nearly anything on a damaged file
+        raise StoreError(f"{path}: not a readable NetCDF file ({type(error).__name__}); {damaged}") from None
 
 
 @cache

@@ -102,7 +102,8 @@ def _lowest(case: str, gains: Sequence[Mapping[str, Any]]) -> Claim:
         f"lower, interval above 0, in {len(above)} of {len(known)} pairs of SNR and benchmark; higher in {len(below)}"
     )
     verdict = _judgement([len(above) == len(known)], bool(above)) if known else "not known"
-    reason = "" if len(above) == len(known) else f"No telling or worse: {_pairs(known, above)}. {_bounds(known, above)}"
+    rest = ", ".join(f"{gain['over']} at {gain['snr_db']:g} dB" for gain in known if gain not in above)
+    reason = "" if len(above) == len(known) else f"No telling or worse: {rest}. {_bounds(known, above)}"
     return Claim(f"lowest error of all schemes at every SNR ({case})", "Fig. 4(b)", text, verdict, reason)
 
 
@@ -184,11 +185,6 @@ def _by_snr(gains: Sequence[Mapping[str, Any]]) -> list[tuple[float, list[Mappin
     """Gains over the benchmarks that the paper claims, grouped by SNR [dB]."""
     known = [gain for gain in gains if gain["over"] in RIVALS and gain["gain"] is not None]
     return [(snr, [g for g in known if g["snr_db"] == snr]) for snr in dict.fromkeys(g["snr_db"] for g in known)]
-
-
-def _pairs(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any]]) -> str:
-    """Benchmarks and SNRs at which a claim does not hold, as text."""
-    return ", ".join(f"{gain['over']} at {gain['snr_db']:g} dB" for gain in known if gain not in above)
 
 
 def _bounds(known: Sequence[Mapping[str, Any]], above: Sequence[Mapping[str, Any]]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from rislam_rt.errors import ConfigError, RislamError
-from rislam_rt.evaluate import bootstrap, rms_over_runs
+from rislam_rt.evaluate import rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.channels import prepare_channel
 from rislam_rt.pipeline.own_methods import own_digests
@@ -24,7 +24,8 @@ from rislam_rt.scene import load_scene
 from rislam_rt.shipped import beside_of, room_beside
 from rislam_rt.storage.checksums import checksum, read_sealed
 from rislam_rt.storage.files import json_file, write_all
-from rislam_rt.sweeps.store import DONE, MISSING, SWEEP_FILE, Row, csv_bytes, rows_by_point
+from rislam_rt.studies.swept.collect import Group, group_rows, spread
+from rislam_rt.sweeps.store import SWEEP_FILE, Row, csv_bytes, rows_by_point
 from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
 
 FUNCTION = f"{__name__}:run_cell"
@@ -188,18 +189,8 @@ def run_cell(settings: Mapping[str, Any], seed: int) -> dict[str, Any]:
 
 def score_rows(rows: Sequence[Row]) -> list[SchemeScore]:
     """Scores of every scheme at every point of a pipeline's sweep; failures are counted, never dropped."""
-    scores = []
-    for group in rows_by_point(rows):
-        point = group[0].cell.point
-        missing = sum(row.state == MISSING for row in group)
-        for scheme in group[0].cell.settings["schemes"]:
-            ended = [row.result["schemes"][scheme] for row in group if row.state == DONE]
-            rmse = tuple(float(score["rmse_m"]) for score in ended)
-            diverged = sum(bool(score["diverged"]) for score in ended)
-            scores.append(
-                SchemeScore(point, scheme, rmse, _interval(rmse), diverged, len(group) - len(ended) - missing, missing)
-            )
-    return scores
+    schemes = [cells[0].cell.settings["schemes"] for cells in rows_by_point(rows)]
+    return [_score(group, scheme) for group, names in zip(group_rows(rows), schemes, strict=True) for scheme in names]
 
 
 def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
@@ -217,26 +208,22 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
     """Function that checks the settings of a pipeline sweep's cell, and returns the scene's hash and versions that its
     result depends on."""
-    load = cache(load_scene)
-    versions = library_versions()
+    load, versions = cache(load_scene), library_versions()
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
-        spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
-        room: Scene = load(room_beside(path.parent, str(spec.scene)))
-        check_run(room, spec)
-        own = own_digests([*spec.schemes, spec.channel])
-        return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
-
-    def named(settings: Mapping[str, Any]) -> dict[str, Any]:
         try:
-            return depends(settings)
+            spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
+            room: Scene = load(room_beside(path.parent, str(spec.scene)))
+            check_run(room, spec)
+            own = own_digests([*spec.schemes, spec.channel])
         except RislamError as error:
             if not keys:
                 raise
             text = str(error).removeprefix(f"{path}: ")
             raise type(error)(f"axes {', '.join(keys)}: {text}") from None
+        return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
 
-    return named
+    return depends
 
 
 def _kinds(annotation: Any) -> list[type]:
@@ -260,9 +247,10 @@ def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
     return kept
 
 
-def _interval(rmse: Sequence[float]) -> tuple[float, float] | None:
-    """Bootstrap interval of a pipeline sweep's RMSE over repetitions."""
-    if len(rmse) < 2:
-        return None
-    found = bootstrap(np.array(rmse), rng=np.random.default_rng(0), statistic=rms_over_runs)
-    return found.lower, found.upper
+def _score(group: Group, scheme: str) -> SchemeScore:
+    """Scores of one scheme at one point of a pipeline's sweep."""
+    found = group.column(scheme, "rmse_m")
+    rmse, known = tuple(found[~np.isnan(found)].tolist()), spread(found)
+    interval = (known.lower, known.upper) if known and len(rmse) > 1 else None
+    failed, diverged = group.failed(scheme), group.diverged(scheme)
+    return SchemeScore(group.point, scheme, rmse, interval, diverged, failed, group.missing)

@@ -1,5 +1,6 @@
 """Running a sweep: does the cells that have no file yet, estimates their cost, and keeps the table of results."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -36,11 +37,9 @@ def estimate_cost(left: Sequence[Cell], known: Sequence[Mapping[str, Any]], widt
         return SweepCost(0, None, 0.0)
     if not known:
         return SweepCost(len(left), None, None)
-    points: dict[str, tuple[Mapping[str, Any], int]] = {}
-    for cell in left:
-        key = repr(cell.point)
-        points[key] = cell.point, points.get(key, (cell.point, 0))[1] + 1
-    each = [(_similar(point, known), count) for point, count in points.values()]
+    points = {repr(cell.point): cell.point for cell in left}
+    counts = Counter(repr(cell.point) for cell in left)
+    each = [(_similar(points[key], known), count) for key, count in counts.items()]
     total = sum(seconds * count for seconds, count in each)
     return SweepCost(
         len(left), total / len(left), max(total / min(width, len(left)), max(seconds for seconds, _ in each))

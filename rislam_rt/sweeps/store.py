@@ -74,6 +74,11 @@ def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None
     ConfigError, ResultError
         It holds something else, or another sweep is at work there.
     """
+    about = {
+        "name": sweep.name, "function": sweep.function,
+        "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes], "base": dict(sweep.base),
+        "repetitions": sweep.repetitions, "seed": sweep.seed, "paired": list(sweep.paired),
+    }  # fmt: skip
     check_folder(folder)
     made = files.make_folders(folder)
     try:
@@ -81,20 +86,10 @@ def open_folder(folder: Path, sweep: Sweep, keep: bool = False) -> Iterator[None
             check_folder(folder)
             files.remove_temporaries((folder, folder / "cells"))
             if not keep:
-                _write_sweep(folder, sweep)
+                files.write_atomic(folder / SWEEP_FILE, files.json_file(seal(about), sort_keys=True))
             yield
     finally:
         files.remove_empty(made)
-
-
-def _write_sweep(folder: Path, sweep: Sweep) -> None:
-    """Write function, axes, base settings and seed of a sweep to `sweep.json`, by which the folder is recognised."""
-    about = {
-        "name": sweep.name, "function": sweep.function,
-        "axes": [{"key": axis.key, "values": list(axis.values)} for axis in sweep.axes], "base": dict(sweep.base),
-        "repetitions": sweep.repetitions, "seed": sweep.seed, "paired": list(sweep.paired),
-    }  # fmt: skip
-    files.write_atomic(folder / SWEEP_FILE, files.json_file(seal(about), sort_keys=True))
 
 
 def write_cell(folder: Path, cell: Cell, function: str, outcome: CellOutcome) -> Row:

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rislam_rt.adviser.cancelled_returns import cancelled_return_warnings
 from rislam_rt.adviser.link_budget import survey
+from rislam_rt.adviser.return_warnings import cancelled_return_warnings, return_warnings
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement import measure
 from rislam_rt.pipeline import load_spec
@@ -79,4 +79,6 @@ def test_the_shipped_rooms_have_none():
 
 
 def test_who_throws_wall_returns_away_is_not_warned():
-    assert lines(looked(0.0, 0.0, "slam.use_vt=false")) == []
+    found = looked(0.0, 0.0, "slam.use_vt=false")
+    assert len(lines(found)) == 1
+    assert [*return_warnings(found, "scene.toml")] == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.link_budget import Survey, survey
-from rislam_rt.adviser.merged_returns import lone_share, merged_return_warnings
+from rislam_rt.adviser.return_warnings import lone_share, merged_return_warnings, return_warnings
 from rislam_rt.measurement import measure, path_std
 from rislam_rt.model import PathKind
 from rislam_rt.pipeline import load_spec
@@ -89,4 +89,6 @@ def test_what_cannot_merge_comes_in_alone_and_what_cannot_be_parted_never_does()
 
 
 def test_who_throws_wall_returns_away_is_not_warned() -> None:
-    assert lines(looked(NARROW, "slam.use_vt=false")) == []
+    found = looked(NARROW, "slam.use_vt=false")
+    assert len(lines(found)) == 1
+    assert [*return_warnings(found, "scene.toml")] == []

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.adviser.link_budget import survey
-from rislam_rt.adviser.parallel_fronts import LEAST, SWERVE, parallel_front_warnings
-from rislam_rt.adviser.return_warnings import return_warnings
+from rislam_rt.adviser.return_warnings import LEAST, SWERVE, parallel_front_warnings, return_warnings
 from rislam_rt.model import Reflector
 from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
@@ -57,12 +56,17 @@ def test_a_board_before_a_wall_is_named(gap):
     [
         ([], {}), ([(1.3, 2.1, WALL - SWERVE - 0.01)], {}), ([(1.3, 2.1, WALL - LEAST + 0.001)], {}),
         ([(3.0, 3.8, WALL - 0.03)], {}), ([(1.3, 2.1, WALL - 0.03)], {"turned": 0.05}),
-        ([(1.3, 2.1, WALL - 0.03)], {"changed": ["slam.use_vt=false"]}),
     ],
-    ids=["none", "too far off", "too near", "not passed", "not parallel", "who throws wall returns away"],
+    ids=["none", "too far off", "too near", "not passed", "not parallel"],
 )  # fmt: skip
 def test_no_other_is(boards, options):
     assert lines(looked(*boards, **options)) == []
+
+
+def test_who_throws_wall_returns_away_is_not_warned():
+    found = looked((1.3, 2.1, WALL - 0.03), changed=["slam.use_vt=false"])
+    assert len(lines(found)) == 1
+    assert [*return_warnings(found, "scene.toml")] == []
 
 
 def test_the_farthest_of_several_is_named_and_how_many_there_are():

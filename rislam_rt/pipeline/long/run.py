@@ -1,4 +1,7 @@
-"""A long run in slices: simulates the schemes side by side, scores them slice by slice, completes the run folder."""
+"""A long run in slices: simulates the schemes side by side, scores them slice by slice, completes the run folder.
+
+Completed runs, in slices or not, are read here: their results, and the inputs that each scheme's estimator was given.
+"""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -9,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from rislam_rt.errors import ConfigError, ResultError, RislamError
-from rislam_rt.model import Scene, SlamResult
+from rislam_rt.errors import ConfigError, ResultError, RislamError, StoreError
+from rislam_rt.model import Paths, Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.own_methods import is_own
+from rislam_rt.pipeline.recordings.inputs import PADDING, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.run import late_warnings, library_versions, run_warnings, set_scene
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise, summary_table
@@ -21,9 +25,9 @@ from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_s
 from rislam_rt.pipeline.store import run_folder
 from rislam_rt.pipeline.store.exports import record_files
 from rislam_rt.progress import Tell
-from rislam_rt.scene import load_scene
 from rislam_rt.scene.write import tum_bytes
 from rislam_rt.storage.files import write_pieces
+from rislam_rt.storage.netcdf import read_dataset
 from rislam_rt.worker_pool import run_side_by_side
 
 
@@ -80,7 +84,8 @@ def run_long(
 def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
     """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in its marker."""
     schemes, scores, paths, motion = {}, {}, None, scene.agent
-    settings = build_settings(PipelineSpec.model_validate(dict(about["config"])))
+    spec = PipelineSpec.model_validate(dict(about["config"]))
+    settings = build_settings(spec)
     for name in about["schemes"]:
         tally = Tally(scene, about["config"]["budget"], use_vt=uses_wall_returns(name, settings))
         parts = tally.counting(slices.read_parts(folder, name, scene, run))
@@ -89,13 +94,9 @@ def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> L
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // slices.SHOWN)
-    late = late_warnings(scene, paths, PipelineSpec.model_validate(dict(about["config"])))
+    late = late_warnings(scene, paths, spec)
     lines = (*about["warnings"], *late, f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
-    names = ("name", "seed", "config", "versions", "seconds")
-    shown = SlamResult(
-        scene=replace(scene, agent=motion), paths=paths, schemes=schemes, warnings=lines,
-        **{name: about[name] for name in names},
-    )  # fmt: skip
+    shown = run_folder.result_of_marker({**about, "warnings": lines}, replace(scene, agent=motion), paths, schemes)
     return LongRun(summary_table(shown, scores, len(scene.agent)), shown)
 
 
@@ -114,8 +115,30 @@ def read_any(folder: Path) -> LongRun:
         result = run_folder.read_run(folder)
         return LongRun(summarise(result), result)
     with run_folder.reading_run(folder):
-        scene = replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
-        return _gather(folder, scene, about, about["identity"])
+        return _gather(folder, run_folder.read_room(folder, about), about, about["identity"])
+
+
+def read_whole(folder: Path) -> SlamResult:
+    """Read a completed run from its folder, all cycles of it, in slices or not.
+
+    Raises
+    ------
+    ResultError
+        One of its files is missing, damaged or changed; another version wrote it, with settings that this one lacks.
+    ConfigError
+        The folder is not a completed run.
+    """
+    about = checked_slices(folder)
+    if about is None:
+        return run_folder.read_run(folder)
+    with run_folder.reading_run(folder):
+        scene, paths = run_folder.read_room(folder, about), list[Paths]()
+        schemes: dict[str, SchemeResult] = {}
+        for name in about["schemes"]:
+            parts = list(slices.read_parts(folder, name, scene, about["identity"]))
+            paths = [part.paths for part in parts]
+            schemes[name] = slices.join_schemes([part.scheme for part in parts], paths)
+        return run_folder.result_of_marker(about, scene, slices.join_paths(paths), schemes)
 
 
 def checked_slices(folder: Path) -> dict[str, Any] | None:
@@ -156,6 +179,40 @@ def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
             f"{folder}: made by another version of the program, with settings that this one does not take ({strange}"
             f"{more}); report it with that version, or run again with another --out"
         ) from None
+
+
+def read_given(folder: Path, scheme: str) -> tuple[Inputs, np.random.Generator]:
+    """Read what a scheme's estimator was given over a whole run, from its measurements in the run folder: its inputs,
+    and its random generator as it got it.
+
+    Raises
+    ------
+    ResultError
+        There are none, or they are damaged.
+    """
+    name = f"measurements_{scheme}.nc"
+    files = [folder / name] if (folder / name).is_file() else sorted((folder / slices.FOLDER).glob(f"*/{name}"))
+    if not files:
+        raise ResultError(
+            f"{folder / name}: no such file, as another version wrote the run; run again with another --out"
+        )
+    try:
+        data, *more = (read_dataset(file) for file in files)
+        if more:
+            import xarray as xr
+
+            parts = [data, *more]
+            data = xr.concat(
+                parts, "time", data_vars="minimal", combine_attrs="override", join="outer", fill_value=PADDING
+            )
+        rng = marked_rng(data)
+        if rng is None:
+            raise ResultError(f"{files[0]}: does not say which random numbers were drawn; run again with another --out")
+        inputs = dataset_to_inputs(data)
+    except (KeyError, ValueError, TypeError, ConfigError, StoreError) as error:
+        cause = f"{type(error).__name__}: {error}"[:120]
+        raise ResultError(f"{files[0]}: damaged ({cause}); run again with another --out") from None
+    return inputs._replace(time=inputs.time - inputs.time[0], since=float(inputs.time[0])), rng
 
 
 def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:

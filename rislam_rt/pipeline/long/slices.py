@@ -16,6 +16,7 @@ import numpy as np
 from rislam_rt.arrays import Integers
 from rislam_rt.errors import ResultError
 from rislam_rt.model import NOTHING, Body, Paths, Scene, SchemeResult, Trajectory
+from rislam_rt.model.paths import COURSE
 from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
@@ -80,11 +81,9 @@ def run_slices(
     channel = build_channel(spec.channel, scene, radio, spec.depth)
     walk, seconds, cycles = SchemeSimulation(name, scene, body, spec, seeds), 0.0, len(scene.agent)
     for number, (first, last) in enumerate(slice_bounds(cycles)):
-        begin = perf_counter()
-        paths = channel.paths(scene.agent[first : min(last + walk.foresight, cycles)])
-        extras = trace_diffuse_clutter(
-            scene, radio, scene.agent[first : min(last + walk.foresight, cycles)], spec.extras
-        )
+        begin, motion = perf_counter(), scene.agent[first : min(last + walk.foresight, cycles)]
+        paths = channel.paths(motion)
+        extras = trace_diffuse_clutter(scene, radio, motion, spec.extras)
         seconds += perf_counter() - begin
         part = walk.lead(paths, first, last, tell, extras)
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
@@ -99,10 +98,9 @@ def run_slices(
 
 def slice_files(name: str, cycles: int) -> list[str]:
     """Names of all slice files that a scheme of a long run writes, relative to the run folder."""
-    count = len(slice_bounds(cycles))
     return [
         str(slice_file(Path(), number, file))
-        for number in range(count)
+        for number in range(len(slice_bounds(cycles)))
         for file in (PATHS_FILE, f"scheme_{name}.nc", f"measurements_{name}.nc")
     ]
 
@@ -157,14 +155,9 @@ def subsample_scheme(parts: Iterable[SlicePart], scene: Scene) -> tuple[Trajecto
     return scene.agent[::stride], join_paths(paths), joined
 
 
-Identity = tuple[int, int, tuple[int, ...], tuple[int, ...]]
-"""Identity of a path: kind, landmark, walls on the Tx leg, walls on the Rx leg."""
-
-
 def join_paths(parts: Sequence[Paths]) -> Paths:
     """Join the true paths of consecutive slices of a long run; a path that a slice lacks is not valid there."""
-    columns = path_columns(parts)
-    count = max((int(c.max(initial=-1)) for c in columns), default=-1) + 1
+    columns, count = path_columns(parts)
     first: dict[str, Any] = {}
     for name, empty in (("kind", -1), ("landmark", -1), ("num_vertices", 0)):
         first[name] = np.full(count, empty)
@@ -174,15 +167,13 @@ def join_paths(parts: Sequence[Paths]) -> Paths:
         for name, value in first.items():
             own = getattr(part, name)
             value[(column, *(slice(0, int(n)) for n in own.shape[1:]))] = own
-    names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
-    course = {name: _spread([getattr(p, name) for p in parts], columns, count) for name in names}
+    course = {name: _spread([getattr(p, name) for p in parts], columns, count) for name in COURSE}
     return replace(parts[0], **first, **course, ris=None)
 
 
 def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> SchemeResult:
     """Join the results of one scheme over consecutive slices, gains in columns by path identity as in `paths`."""
-    columns = path_columns(paths)
-    count = max((int(c.max(initial=-1)) for c in columns), default=-1) + 1
+    columns, count = path_columns(paths)
     ident = np.unique(np.concatenate([part.ident for part in parts]))
     places = [np.searchsorted(ident, part.ident) for part in parts]
     parent = np.full(len(ident), -1)
@@ -215,29 +206,29 @@ def join_schemes(parts: Sequence[SchemeResult], paths: Sequence[Paths]) -> Schem
 
 def subsampled_paths(paths: Paths, rows: Integers) -> Paths:
     """Paths of the cycles in `rows` alone, of a long run's slice."""
-    names = ("valid", "tau", "departure", "arrival", "gain", "vertices")
-    return replace(paths, **{name: getattr(paths, name)[rows] for name in names}, ris=None)
+    return replace(paths, **{name: getattr(paths, name)[rows] for name in COURSE}, ris=None)
 
 
 def subsampled_scheme(scheme: SchemeResult, rows: Integers) -> SchemeResult:
     """Result of a scheme for the cycles in `rows` alone, of a long run's slice."""
-    names = ("time", "position", "velocity", "heading", "covariance", "sent", "applied", "gain", "component_path",
-             "component_landmark", "held", "landmark_position", "ris_probability", "seconds", "panel")  # fmt: skip
+    tables = run_datasets.SCHEME | run_datasets.OPTIONAL
+    course = {name: getattr(scheme, name) for name, (axes, *_) in tables.items() if axes[0] == "time"}
     return replace(
-        scheme, **{name: getattr(scheme, name)[rows] for name in names if getattr(scheme, name) is not None},
+        scheme, **{name: values[rows] for name, values in course.items() if values is not None},
         info={name: values[rows] for name, values in scheme.info.items()},
-        smoothed=None if scheme.smoothed is None else scheme.smoothed[rows],
         outcome=tuple(scheme.outcome[row] for row in rows), given=None,
     )  # fmt: skip
 
 
-def path_columns(parts: Sequence[Paths]) -> list[Integers]:
-    """For each slice of a long run, the joined column (P,) of each of its paths, by order of first appearance."""
-    numbers: dict[Identity, int] = {}
-    return [
+def path_columns(parts: Sequence[Paths]) -> tuple[list[Integers], int]:
+    """For each slice of a long run, the joined column (P,) of each of its paths, by order of first appearance; and the
+    number of columns."""
+    numbers: dict[tuple[Any, ...], int] = {}
+    columns = [
         np.array([numbers.setdefault(p.identity(i), len(numbers)) for i in range(p.num_paths)], dtype=np.int64)
         for p in parts
     ]
+    return columns, len(numbers)
 
 
 def _spread(parts: Sequence[Any], columns: Sequence[Integers], count: int) -> Any:

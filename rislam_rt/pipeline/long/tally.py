@@ -40,7 +40,7 @@ class Tally:
         self.relative: float | None = 0.0
         self.begin: Floats | None = None
         self.diverged = False
-        self.nees: list[float] | None = [0.0]
+        self.nees: float | None = 0.0
         self.outcomes: Counter[str] = Counter()
         self.lost, self.start = LossTally(), 0.0
         self.pairs: Counter[tuple[int, Any]] = Counter()
@@ -69,15 +69,8 @@ class Tally:
         self.diverged |= has_diverged(errors, None)
         self.begin = truth[0].copy() if self.begin is None else self.begin
         relative = relative_errors(scheme, truth, self.begin)
-        if relative is None or self.relative is None:
-            self.relative = None
-        else:
-            self.relative += float(np.sum(relative**2))
-        squares = nees_per_dof(scheme, truth)
-        if squares is None or self.nees is None:
-            self.nees = None
-        else:
-            self.nees[0] += float(np.sum(squares))
+        self.relative = _grown(self.relative, None if relative is None else relative**2)
+        self.nees = _grown(self.nees, nees_per_dof(scheme, truth))
         self.start = self.start if self.outcomes else float(scheme.time[0])
         self.outcomes.update(scheme.outcome)
         self.lost.add(scheme.time, scheme.outcome, scheme.info.get("cause"))
@@ -91,7 +84,7 @@ class Tally:
         """Scores of one scheme of a long run, by name as `summarise_scheme` gives them."""
         walls = wall_scores(self.scene, self.map)
         seconds = dict(zip(STEPS, (self.seconds / self.cycles).tolist(), strict=True))
-        nees = None if self.nees is None else self.nees[0] / self.cycles
+        nees = None if self.nees is None else self.nees / self.cycles
         return {
             "rmse_m": float(np.sqrt(self.square / self.cycles)),
             "bound_m": None,
@@ -123,13 +116,13 @@ class Tally:
         self.landmark_square += np.nansum(track.error**2, axis=0)
         self.held += (track.column >= 0).sum(axis=0)
         self.landmark_final = track.error[-1]
-        for panel in range(len(self.scene.panels)):
-            number = len(self.scene.scatterers) + panel
-            self.identified[number] += int(np.sum(panels[:, panel] >= 0))
-            self.identified_last[number] = panels[-1, panel] >= 0
-            first = first_time(panels[:, panel] >= 0, part.scheme.time)
-            if first is not None:
-                self.identified_from.setdefault(number, part.scheme.time[0] + first - self.start)
+        first, time = len(self.scene.scatterers), part.scheme.time
+        self.identified[first:] += (panels >= 0).sum(axis=0)
+        self.identified_last[first:] = panels[-1] >= 0
+        for number, held in enumerate((panels >= 0).T, first):
+            since = first_time(held, time)
+            if since is not None:
+                self.identified_from.setdefault(number, time[0] + since - self.start)
 
     def _landmarks(self) -> dict[str, dict[str, Any]]:
         """Scores of each true landmark from the tally of a long run, by name."""
@@ -194,6 +187,11 @@ class _Overlap:
         flat = own[:2].sum() + true[:2].sum() - 2.0 * abs(overlap)
         upright = own[2] + true[2] - 2.0 * both[2]
         return float(np.sqrt(max(flat + upright, 0.0) / self.count))
+
+
+def _grown(total: float | None, values: Floats | None) -> float | None:
+    """Tally of a score with its values in a further slice; None where it is not known of all slices."""
+    return None if total is None or values is None else total + float(np.sum(values))
 
 
 def _plane(points: Floats) -> Any:

@@ -14,6 +14,7 @@ from rislam_rt.errors import ConfigError, RislamError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.input_messages import parse_number
 from rislam_rt.model import Body, Measurement, RadioConfig
+from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.recordings.inputs import PARTS, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.recordings.measurement_columns import (
     BACK_TO_HORIZON,
@@ -163,70 +164,47 @@ def inputs_of(
     check_heading(columns, cycle, place)
     check_amplitude(columns, heard, radio, place)
     filled = _filled({name: column[heard] for name, column in columns.items()}, radio)
-    probability = filled.get("panel_probability")
-    measurements = []
-    for number in range(len(cycles)):
-        rows = cycle[heard] == number
-        parts = {name: filled[name][rows] for name in PARTS}
-        measurements.append(Measurement(**parts, from_panel=None if probability is None else probability[rows]))
+    rows = [cycle[heard] == number for number in range(len(cycles))]
+    measurements = tuple(Measurement(**{name: values[own] for name, values in filled.items()}) for own in rows)
     heading = columns.get("heading_rad", np.zeros(len(time)))[np.searchsorted(cycle, np.arange(len(cycles)))]
     if "heading_rad" in columns:  # the compass shows the first heading, too
         start = replace(start, heading=float(heading[0]))
     else:
         heading = np.full(len(cycles), np.nan)
-    _check_stride(cycles, start, place)
+    step, speed = usual_step(cycles), float(np.linalg.norm(start.velocity))
+    if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
+        raise ConfigError(
+            f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
+            f"{step * speed:.3g} m; give seconds (were these milliseconds?), or mend the velocity"
+        )
     nothing = (None,) * len(cycles)
-    made = Inputs(
-        start, body or Body(), None, cycles - cycles[0], heading, tuple(measurements), nothing, float(cycles[0])
-    )
+    made = Inputs(start, body or Body(), None, cycles - cycles[0], heading, measurements, nothing, float(cycles[0]))
     return _check_inputs(made, place)
 
 
 def input_warnings(inputs: Inputs) -> list[str]:
     """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
     component with a time of its own, or components that are there twice."""
-    step = _median_step(inputs.time)
-    counts, lines = {len(one) for one in inputs.measurements}, []
+    step = usual_step(inputs.time)
+    counts, lines, row = {len(one) for one in inputs.measurements}, [], 0
+    copies: list[str] = []
     if step > LONGEST_STEP:
         lines.append(f"time_s: cycles are {step:g} s apart; give seconds, if these were milliseconds")
     if counts == {1} and 0.0 < step < SHORTEST_STEP:
         lines.append(
             f"time_s: every cycle holds one component, {step:g} s apart; rows of one time are one cycle: round them"
         )
-    return lines + _copies(inputs)
-
-
-def _copies(inputs: Inputs) -> list[str]:
-    """Warning of components that are exact copies of another one in their cycle, none or one: noise never draws two."""
-    total, first, row = 0, "", 0
     for time, one in zip(inputs.time + inputs.since, inputs.measurements, strict=True):
-        seen: set[bytes] = set()
+        seen: set[bytes] = set()  # noise never draws two that are alike
         for number, values in enumerate(np.column_stack([getattr(one, name) for name in PARTS])):
             if values.tobytes() in seen:
-                total += 1
-                first = first or f"row {row + number + 1} of the data, at {time:.10g} s"
+                copies.append(f"row {row + number + 1} of the data, at {time:.10g} s")
             seen.add(values.tobytes())
         row += max(len(one), 1)  # a cycle in which nothing was heard is a row, too
-    if not total:
-        return []
-    what = "component is an exact copy" if total == 1 else "components are exact copies"
-    return [f"{total} {what} of another in the same cycle, the first in {first}; leave copies out"]
-
-
-def _median_step(time: Floats) -> float:
-    """Median time [s] between cycles at times (K,) [s]; 0 for one cycle."""
-    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-
-
-def _check_stride(time: Floats, start: StartPrior, place: str) -> None:
-    """Raise an error where cycles at times (K,) [s] are so far apart that the agent of a start prior crosses a room
-    from one to the next."""
-    step, speed = _median_step(time), float(np.linalg.norm(start.velocity))
-    if step > LONGEST_STEP and step * speed > LONGEST_STRIDE:
-        raise ConfigError(
-            f"{place}: time_s: cycles are {step:g} s apart, in which an agent at {speed:.3g} m/s goes "
-            f"{step * speed:.3g} m; give seconds (were these milliseconds?), or mend the velocity"
-        )
+    if copies:
+        what = "component is an exact copy" if len(copies) == 1 else "components are exact copies"
+        lines.append(f"{len(copies)} {what} of another in the same cycle, the first in {copies[0]}; leave copies out")
+    return lines
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:
@@ -298,7 +276,7 @@ def _filled(columns: Mapping[str, Floats], radio: RadioConfig) -> dict[str, Floa
         "amplitude_std": columns.get("amplitude_std", np.full(len(snr), amplitude_std(radio))),
     }
     if "panel_probability" in columns:
-        found["panel_probability"] = columns["panel_probability"]
+        found["from_panel"] = columns["panel_probability"]
     return found
 
 

@@ -187,7 +187,9 @@ def replay(
     for key, value in (changes or {}).items():
         content = put_dotted(content, key, value)
     spec = build_spec(Table(Path("settings of the replay"), content, ()), PipelineSpec, build_settings)
-    settings = tell_settings(build_settings(spec, _alternated_panels(inputs)), spec.told)
+    alternated = any(one.from_panel is not None for one in inputs.measurements)
+    panels = 1 if inputs.panel is None else len(inputs.panel.panels)
+    settings = tell_settings(build_settings(spec, panels if alternated else 0), spec.told)
     recorder = Recorder(estimator or ESTIMATORS[SCHEMES[scheme].estimator])
     run = recorder.estimator
     own = run.config(settings)
@@ -198,10 +200,3 @@ def replay(
         run.estimate(state, own)
         progress(scheme, cycle + 1, len(inputs.time))
     return recorder.answers
-
-
-def _alternated_panels(inputs: Inputs) -> int:
-    """Number of RIS panels that a replayed recording's receiver told apart by alternated codes; 0 for none."""
-    if all(one.from_panel is None for one in inputs.measurements):
-        return 0
-    return 1 if inputs.panel is None else len(inputs.panel.panels)

@@ -15,7 +15,8 @@ def prepare_front_end(
 ) -> FrontEnd | None:
     """Draw the hardware impairments of the receiver's front end, and calibrate it if asked; None for an ideal one.
 
-    All schemes of a run share it.
+    All schemes of a run share it. It is calibrated by the direct path in captures of the first cycles, whose noise is
+    not that of the run.
 
     Parameters
     ----------
@@ -30,21 +31,11 @@ def prepare_front_end(
     front_end = build_front_end(settings.hardware, settings.radio, settings.receiver, rng=build)
     if not settings.hardware.calibration_cycles:
         return front_end
-    return calibrated(front_end, paths, motion, body, settings, rng=noise)
-
-
-def calibrated(
-    front_end: FrontEnd, paths: Paths, motion: Trajectory, body: Body, settings: Settings, *, rng: np.random.Generator
-) -> FrontEnd:
-    """The front end with its calibration, from the direct path in captures of the first cycles, panel at phase level 0.
-
-    Their noise is not that of the run.
-    """
     radio, receiver = settings.radio, replace(settings.receiver, alternation=False)
     recorded = []
     for cycle in range(min(settings.hardware.calibration_cycles, len(motion))):
         heard = receive(paths, cycle, float(motion.heading[cycle]), radio, receiver)
-        one, *_ = capture(heard, radio, receiver, front_end, direct_gain(paths, cycle), rng=rng)
+        one, *_ = capture(heard, radio, receiver, front_end, direct_gain(paths, cycle), rng=noise)
         recorded.append(one.samples)
     swinging = settings.hardware.agc_std_db > 0.0
     return front_end._replace(correction=calibrate(recorded, body, radio, receiver, swinging=swinging))

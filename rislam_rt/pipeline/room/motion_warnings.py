@@ -12,7 +12,6 @@ from rislam_rt.measurement.slot_motion import slot_weights
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.pipeline.cycle import usual_step
 from rislam_rt.pipeline.specification.pipeline_spec import BudgetSection
-from rislam_rt.pipeline.specification.time_budget import changed_steps, fitted_steps, total_seconds
 from rislam_rt.scene.findings import Finding, warning_at
 from rislam_rt.slam.model_constants import CONSTANTS
 
@@ -57,10 +56,10 @@ def _averaged_returns(
     )
     turning = replace(receiver, code_dwell=0.0)  # codes that are held for long keep the slot from being shorter
     slots = [digit * 10.0**power for power in range(-1, -12, -1) for digit in range(9, 0, -1)]
-    cycle_s = usual_step(scene.agent.time) or total_seconds(budget)
-    most = min(receiver.slot, fitted_steps(budget, cycle_s)["measure_s"])
+    cycle_s = usual_step(scene.agent.time) or budget.total
+    most = min(receiver.slot, budget.fitted(cycle_s)["measure_s"])
     slot = next(slot for slot in slots if slot <= most and _kept(shift, replace(turning, slot=slot)) ** 2 >= 0.5)
-    settings = changed_steps(budget, fitted_steps(budget, cycle_s, float(f"{slot:.1g}")))
+    settings = budget.options(budget.fitted(cycle_s, float(f"{slot:.1g}")))
     if _kept(shift, replace(receiver, slot=slot)) ** 2 < 0.5:
         settings = f"{settings} --set receiver.code_dwell=0".lstrip()
     yield warning_at(file, "budget.measure_s", message, f"give {settings}, which leaves the cycle as long as it is")

@@ -1,6 +1,7 @@
 """Overrides of a scene: another size of the panel, more or fewer scatterers, or rougher walls than its file says."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.triangles import distance_to_triangles
-from rislam_rt.model import RisPanel, Scatterer, Scene, join_panels
+from rislam_rt.model import Scatterer, Scene, join_panels
 from rislam_rt.pipeline.specification.pipeline_spec import RoomSection
 
 RADIUS = 0.05
@@ -33,23 +34,17 @@ def change_room(scene: Scene, room: RoomSection, *, rng: np.random.Generator) ->
     if room.panel_rows or room.panel_cols or room.panel_levels:
         if not panels:
             raise ConfigError(f"room.panel_rows: scene '{scene.name}' has no panel to change; leave it out")
-        panels = tuple(_changed(panel, room) for panel in panels)
+        override = {"rows": room.panel_rows, "cols": room.panel_cols, "levels": room.panel_levels}
+        given: dict[str, Any] = {name: value for name, value in override.items() if value}
+        panels = tuple(replace(panel, spec=replace(panel.spec, **given)) for panel in panels)
     scatterers = scene.scatterers
     if room.scatterers is not None:
         scatterers = _scatterers(scene, room.scatterers, rng=rng)
     ris = scene.ris if panels is scene.panels else join_panels(panels)
     reflectors = scene.reflectors
     if room.scattering is not None:
-        rough = [replace(r.material, scattering=room.scattering) for r in reflectors]
-        reflectors = tuple(replace(r, material=m) for r, m in zip(reflectors, rough, strict=True))
+        reflectors = tuple(replace(r, material=replace(r.material, scattering=room.scattering)) for r in reflectors)
     return replace(scene, ris=ris, scatterers=scatterers, reflectors=reflectors)
-
-
-def _changed(panel: RisPanel, room: RoomSection) -> RisPanel:
-    """RIS panel with the rows, columns and phase levels by which `[room]` overrides the scene's."""
-    spec = panel.spec
-    rows, cols = room.panel_rows or spec.rows, room.panel_cols or spec.cols
-    return replace(panel, spec=replace(spec, rows=rows, cols=cols, levels=room.panel_levels or spec.levels))
 
 
 def _scatterers(scene: Scene, count: int, *, rng: np.random.Generator) -> tuple[Scatterer, ...]:

@@ -47,16 +47,13 @@ def true_planes(scene: Scene) -> list[int]:
 
 def path_sources(paths: Paths, planes: Sequence[int], *, use_vt: bool) -> list[Source | None]:
     """True source of each path (P,) with walls in `planes` (W,); None for LOS, and for wall returns unless `use_vt`."""
-    return [_source(*paths.identity(path), planes, use_vt) for path in range(paths.num_paths)]
-
-
-def _source(
-    kind: int, landmark: int, tx: tuple[int, ...], rx: tuple[int, ...], planes: Sequence[int], use_vt: bool
-) -> Source | None:
-    """True source of a path of that identity."""
-    if kind == PathKind.LOS:
-        return None
-    before, after = [planes[wall] for wall in tx], [planes[wall] for wall in rx]
-    if kind == PathKind.VT:
-        return (-1, *sorted(before + after)) if use_vt else None
-    return landmark, after[0] if after else before[-1] if before else -1
+    found: list[Source | None] = []
+    for kind, landmark, tx, rx in map(paths.identity, range(paths.num_paths)):
+        before, after = [planes[wall] for wall in tx], [planes[wall] for wall in rx]
+        if kind == PathKind.LOS or (kind == PathKind.VT and not use_vt):
+            found.append(None)
+        elif kind == PathKind.VT:
+            found.append((-1, *sorted(before + after)))
+        else:
+            found.append((landmark, after[0] if after else before[-1] if before else -1))
+    return found

@@ -60,7 +60,6 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
     relative = relative_errors(scheme, truth, truth[0])
     squares = nees_per_dof(scheme, truth)
     nees = None if squares is None else float(np.mean(squares))
-    largest = float(errors.max())
     panels = len(scene.panels) if scheme.levels else 0
     settings = build_settings(PipelineSpec.model_validate(dict(result.config)), panels)
     use_vt = uses_wall_returns(scheme.scheme, settings)
@@ -73,7 +72,7 @@ def summarise_scheme(result: SlamResult, scheme: SchemeResult) -> dict[str, Any]
         "bound_m": bound,
         "over_bound": error / bound if bound else None,
         "final_m": float(errors[-1]),
-        "largest_m": largest,
+        "largest_m": float(errors.max()),
         "relative_rmse_m": None if relative is None else evaluate.root_mean_square(relative),
         "relative_bound_m": evaluate.root_mean_square(least.relative) if least else None,
         "rmse_aligned_m": evaluate.rmse(evaluate.align(scheme.position, truth), truth) if len(truth) > 1 else None,

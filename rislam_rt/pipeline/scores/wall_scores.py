@@ -30,16 +30,16 @@ def wall_scores(
     heard = np.array([least is None or name in least.walls for name in walls.names], dtype=np.bool_)
     asked = np.bincount(group, weights=heard) > 0
     match = match_planes(wall_surfaces(walls, group), estimate.wall_normal, estimate.wall_offset, asked)[group]
-    distance = plane_distance(alone, estimate.wall_normal, estimate.wall_offset)
-    angle = plane_angle(alone, estimate.wall_normal)
-    offset = np.abs(alone.middle @ estimate.wall_normal.T - estimate.wall_offset)
+    errors = {
+        "rmse_m": plane_distance(alone, estimate.wall_normal, estimate.wall_offset),
+        "angle_deg": plane_angle(alone, estimate.wall_normal),
+        "offset_m": np.abs(alone.middle @ estimate.wall_normal.T - estimate.wall_offset),
+    }
     scores: dict[str, dict[str, Any]] = {}
     for number, name in enumerate(walls.names):
         row, bound = match[number] if heard[number] else -1, least.walls.get(name) if least else None
         scores[name] = {
-            "rmse_m": float(distance[number, row]) if row >= 0 else None,
-            "angle_deg": float(angle[number, row]) if row >= 0 else None,
-            "offset_m": float(offset[number, row]) if row >= 0 else None,
+            **{key: float(error[number, row]) if row >= 0 else None for key, error in errors.items()},
             "std_deg": float(np.degrees(np.sqrt(2.0) * estimate.wall_std[row, 0])) if row >= 0 else None,
             "bound_deg": float(np.degrees(bound.angle)) if bound else None,
             "bound_m": bound.distance if bound else None,
@@ -105,16 +105,13 @@ def coplanar(walls: Walls) -> Integers:
     """Number of the plane of each true wall (W,) for its score, from 0; coplanar walls, which no agent can tell apart,
     have one."""
     group = np.full(len(walls), -1)
-    count = 0
-    for wall in range(len(walls)):
-        if group[wall] >= 0:
-            continue
+    while (group < 0).any():
+        wall = int(np.argmax(group < 0))
         cosine = walls.normal @ walls.normal[wall]
         same = (np.abs(cosine) >= np.cos(COPLANAR_ANGLE)) & (group < 0)
         same &= np.abs(walls.offset * np.sign(cosine) - walls.offset[wall]) <= COPLANAR_OFFSET
         same[wall] = True
-        group[same] = count
-        count += 1
+        group[same] = group.max() + 1
     return group
 
 

@@ -131,6 +131,12 @@ class DesignSection(DesignerSection):
         return 0.0 if self.least_snr_db is None else linear(self.least_snr_db)
 
 
+SAME_CYCLE = 0.01
+"""Largest relative difference between the scene's cycle time and the sum of the time budget: clocks are inexact."""
+DIGITS = 4
+"""Significant digits of a proposed step: its rounding is a hundredth of what the sum may differ by."""
+
+
 class BudgetSection(Section):
     """Time budget [s] of the cycle's four steps; their sum is the scene's cycle time."""
 
@@ -142,6 +148,29 @@ class BudgetSection(Section):
     """Time budget of sounding the channel."""
     localise_s: NotNegative = 0.04
     """Time budget of localising and mapping."""
+
+    @property
+    def total(self) -> float:
+        """Sum [s] of the four steps of the time budget."""
+        return self.optimise_s + self.communicate_s + self.measure_s + self.localise_s
+
+    def fills(self, cycle: float) -> bool:
+        """Whether the steps of the time budget sum to a scene's cycle time [s], but for `SAME_CYCLE` of it."""
+        return abs(self.total - cycle) <= SAME_CYCLE * cycle
+
+    def fitted(self, cycle: float, measure_s: float | None = None) -> dict[str, float]:
+        """Steps [s], by name, that sum to a scene's cycle time [s]: those of the time budget, scaled alike if they do
+        not sum to it. `measure_s` [s], if given, is the measurement's; what is left goes to the localisation."""
+        scale = 1.0 if self.fills(cycle) else cycle / (self.total or 1.0)
+        steps = {name: float(f"{scale * value:.{DIGITS}g}") for name, value in self.model_dump().items()}
+        steps["measure_s"] = steps["measure_s"] if measure_s is None else measure_s
+        rest = round(cycle - steps["optimise_s"] - steps["communicate_s"] - steps["measure_s"], 12)
+        return steps | {"localise_s": max(float(f"{rest:.{DIGITS}g}"), 0.0)}
+
+    def options(self, steps: dict[str, float]) -> str:
+        """Options of the command line that change the time budget to other steps [s]: `--set budget.measure_s=0.004
+        ...`."""
+        return " ".join(f"--set budget.{name}={s:g}" for name, s in steps.items() if s != getattr(self, name))
 
 
 class ControlSection(Section):
@@ -258,8 +287,22 @@ class PipelineSpec(Section):
     @model_validator(mode="before")
     @classmethod
     def _tell_all_estimators(cls, content: Any) -> Any:
-        """Copy a pipeline's process noise, `height`, `use_vt` to estimators for which the file gives none."""
-        return share_settings(content) if isinstance(content, dict) else content
+        """Copy a pipeline's process noise, `height`, `use_vt` to every estimator for which the file gives none.
+
+        The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for
+        the validation to refuse.
+        """
+        tables = [content, *(content.get(name, {}) for name in ("motion", "slam"))] if isinstance(content, dict) else []
+        if not tables or not all(isinstance(table, dict) for table in tables):
+            return content
+        _, motion, slam = tables
+        slam = {"sigma_a": motion.get("sigma_a_m_s2") or SlamSection.model_fields["sigma_a"].default, **slam}
+        shared = {key: slam.get(key, SlamSection.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
+        found = {**content, "slam": slam}
+        for name, keys in ESTIMATOR_SECTIONS.items():
+            section = content.get(name, {})
+            found[name] = {key: shared[key] for key in keys} | section if isinstance(section, dict) else section
+        return found
 
     @model_validator(mode="after")
     def _each_scheme_once(self) -> "PipelineSpec":
@@ -285,25 +328,6 @@ ESTIMATOR_SECTIONS = {
     "channel_slam": ("sigma_a", "height"),
 }
 """Tables of the other published estimators, and the settings that they take over from `[slam]` unless given."""
-
-
-def share_settings(content: dict[str, Any]) -> dict[str, Any]:
-    """Copy `sigma_a`, `height` and `use_vt` in a pipeline's content to every estimator for which they are not given.
-
-    The motion's acceleration goes to the filter, and the filter's to the others. What is not a table is left for the
-    validation to refuse.
-    """
-    motion, slam = content.get("motion", {}), content.get("slam", {})
-    if not isinstance(motion, dict) or not isinstance(slam, dict):
-        return content
-    told = {"sigma_a": motion.get("sigma_a_m_s2") or SlamSection.model_fields["sigma_a"].default}
-    slam = {**told, **slam}
-    shared = {key: slam.get(key, SlamSection.model_fields[key].default) for key in ("sigma_a", "height", "use_vt")}
-    found = {**content, "slam": slam}
-    for name, keys in ESTIMATOR_SECTIONS.items():
-        section = content.get(name, {})
-        found[name] = {key: shared[key] for key in keys} | section if isinstance(section, dict) else section
-    return found
 
 
 class Settings(NamedTuple):
@@ -345,26 +369,20 @@ def build_settings(spec: PipelineSpec, panels: int = 1) -> Settings:
     Raises
     ------
     ConfigError
-        A value is out of range.
+        A value is out of range, or the front end has impairments and the receiver simulates no signal.
     """
     radio, receiver = build_radio(spec.radio), build_receiver(spec.receiver, panels, slot=spec.budget.measure_s)
-    return Settings(
-        radio, receiver, SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
-        build_design(spec.design), BpSlamConfig(**spec.bp_slam.model_dump()),
-        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()), ChannelSlamConfig(**spec.channel_slam.model_dump()),
-        build_sensor(radio, receiver), _build_hardware(spec.hardware, receiver),
-    )  # fmt: skip
-
-
-def _build_hardware(section: HardwareSection, receiver: ReceiverConfig) -> HardwareConfig:
-    """Impairments of the front end from the table `[hardware]` of a pipeline's specification; an error if the receiver
-    simulates no signal."""
-    hardware = HardwareConfig(**section.model_dump())
+    hardware = HardwareConfig(**spec.hardware.model_dump())
     if receiver.estimator != "waveform" and hardware != HardwareConfig():
         raise ConfigError(
             f"hardware: set, with receiver.estimator '{receiver.estimator}', which has no front end; give 'waveform'"
         )
-    return hardware
+    return Settings(
+        radio, receiver, SlamConfig(**spec.slam.model_dump(), nested=NestedConfig(**spec.nested.model_dump())),
+        build_design(spec.design), BpSlamConfig(**spec.bp_slam.model_dump()),
+        BpSlamAoaConfig(**spec.bp_slam_aoa.model_dump()), ChannelSlamConfig(**spec.channel_slam.model_dump()),
+        build_sensor(radio, receiver), hardware,
+    )  # fmt: skip
 
 
 def build_design(section: DesignerSection) -> DesignConfig:
@@ -376,5 +394,4 @@ def build_design(section: DesignerSection) -> DesignConfig:
     ConfigError
         A value is out of range.
     """
-    names = [field.name for field in fields(DesignConfig) if field.name != "certify"]
-    return DesignConfig(**{name: getattr(section, name) for name in names}, certify=False)
+    return DesignConfig(**section.model_dump(include={field.name for field in fields(DesignConfig)}), certify=False)

@@ -142,9 +142,15 @@ def _read_toml(path: Path) -> dict[str, Any]:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise ConfigError(f"{path}: no such pipeline file; {_near_pipeline(path)}") from None
+        known = shipped_pipelines()
+        mend = did_you_mean(nearest(path.stem, known)) or f"give one, or a built-in one: {', '.join(known)}"
+        raise ConfigError(f"{path}: no such pipeline file; {mend if known else shipped_missing('pipelines')}") from None
     except OSError as error:
-        mend = _instead_of_folder(path) or "give a pipeline file in TOML"
+        mend = "give a pipeline file in TOML"
+        if (path / "scene.toml").is_file():
+            mend = f"give a pipeline, and the scene with it: trace_then_slam --scene {path}"
+        elif (path / "config.toml").is_file():
+            mend = f"give {path / 'config.toml'}"
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); {mend}") from None
     if len(content) > MAX_BYTES:
         raise ConfigError(f"{path}: more than {MAX_BYTES} bytes; give a pipeline file in TOML")
@@ -158,21 +164,6 @@ def _read_toml(path: Path) -> dict[str, Any]:
     if "reflector" in table:
         raise ConfigError(f"{path}: is a scene file, not a pipeline; give trace_then_slam --scene {path.parent}")
     return table
-
-
-def _instead_of_folder(path: Path) -> str:
-    """What to give instead of a folder in a pipeline file's place: the scene as one, or a run's own pipeline."""
-    if (path / "scene.toml").is_file():
-        return f"give a pipeline, and the scene with it: trace_then_slam --scene {path}"
-    return f"give {path / 'config.toml'}" if (path / "config.toml").is_file() else ""
-
-
-def _near_pipeline(path: Path) -> str:
-    """Hint at built-in pipelines with a name like that of a missing file, or that there are none."""
-    known = shipped_pipelines()
-    if not known:
-        return shipped_missing("pipelines")
-    return did_you_mean(nearest(path.stem, known)) or f"give one, or a built-in one: {', '.join(known)}"
 
 
 def _override(table: dict[str, Any], setting: str, folder: Path = Path()) -> str:

@@ -41,8 +41,12 @@ def list_settings(model: type[BaseModel], prefix: str = "") -> list[Setting]:
         below = field.annotation
         if isinstance(below, type) and issubclass(below, BaseModel):
             tables += list_settings(below, f"{prefix}{name}.")
-        else:
-            plain.append(_setting(model, name, field, prefix))
+            continue
+        owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
+        meaning = _meanings(RECORDS.get(owner, owner)).get(name, "")  # a record's fields, of a table made from one
+        default = None if field.is_required() else field.get_default(call_default_factory=True)
+        kind, allowed = _kind(below), _of_constraints(field)
+        plain.append(Setting(f"{prefix}{name}", default, field.is_required(), kind, allowed, unit_of(name), meaning))
     return plain + tables
 
 
@@ -54,9 +58,10 @@ def explain(settings: list[Setting], key: str) -> Setting:
     ConfigError
         There is none, or several.
     """
-    found = [one for one in settings if one.key == key or one.key.endswith(f".{key}")]
-    if len(found) == 1 or any(one.key == key for one in found):
-        return next((one for one in found if one.key == key), found[0])
+    exact = [one for one in settings if one.key == key]
+    found = exact or [one for one in settings if one.key.endswith(f".{key}")]
+    if len(found) == 1:
+        return found[0]
     if found:
         raise ConfigError(
             f"--explain {key}: several settings end so; give one of {', '.join(one.key for one in found)}"
@@ -72,21 +77,6 @@ def _near(key: str, keys: list[str]) -> str:
         return f"there are {', '.join(inside[:6])}{more}"
     ends = [one for one in keys if nearest(key.rpartition(".")[2], [one.rpartition(".")[2]])]
     return did_you_mean(nearest(key, keys, 3) or ends[:3]) or "`rislam-rt config` lists them all"
-
-
-def _setting(model: type[BaseModel], name: str, field: FieldInfo, prefix: str) -> Setting:
-    """Default, range, unit and meaning of one field of a typed model."""
-    owner, record = _owner(model, name)
-    meaning = _meanings(record or owner).get(name, "")
-    default = None if field.is_required() else field.get_default(call_default_factory=True)
-    kind, allowed = _kind(field.annotation), _of_constraints(field)
-    return Setting(f"{prefix}{name}", default, field.is_required(), kind, allowed, unit_of(name), meaning)
-
-
-def _owner(model: type[BaseModel], name: str) -> tuple[type, type | None]:
-    """The class that declares a listed setting, and the configuration record whose fields it takes over, if any."""
-    owner = next(part for part in model.__mro__ if name in inspect.get_annotations(part))
-    return owner, RECORDS.get(owner)
 
 
 @cache
@@ -128,7 +118,10 @@ def _kind(annotation: Any) -> str:
 
 def _of_constraints(field: FieldInfo) -> str:
     """Range or choices of a setting in words, from the constraints of its type; empty without any."""
-    metadata = [*field.metadata, *_inner_metadata(field.annotation)]
+    metadata = list(field.metadata)
+    for part in get_args(field.annotation):  # inside an optional or a list
+        for item in getattr(part, "__metadata__", ()):
+            metadata += item.metadata if isinstance(item, FieldInfo) else (item,)
     choices = list(_choices(field.annotation)) + [name for m in metadata if isinstance(m, Choices) for name in m.names]
     if choices:
         return "one of " + ", ".join(map(str, choices))
@@ -148,13 +141,6 @@ def _choices(annotation: Any) -> Iterator[Any]:
     else:
         for part in get_args(annotation):
             yield from _choices(part)
-
-
-def _inner_metadata(annotation: Any) -> Iterator[Any]:
-    """Constraints of a listed setting's type inside an optional or a list."""
-    for part in get_args(annotation):
-        for item in getattr(part, "__metadata__", ()):
-            yield from getattr(item, "metadata", ()) if isinstance(item, FieldInfo) else (item,)
 
 
 def _short(value: float) -> str:

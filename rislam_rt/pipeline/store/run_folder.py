@@ -8,13 +8,13 @@ One process at a time writes there.
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import ConfigError, ResultError, RislamError, StoreError
-from rislam_rt.model import SchemeResult, SlamResult, Trajectory
+from rislam_rt.model import Paths, Scene, SchemeResult, SlamResult, Trajectory
 from rislam_rt.pipeline import run_datasets
 from rislam_rt.pipeline.recordings.inputs import given_to_dataset
 from rislam_rt.pipeline.store.exports import SUMMARY_FILE, export_files
@@ -41,14 +41,10 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     def __getitem__(self, name: str) -> SchemeResult:
         file = scheme_file(self.folder, name)
-        if file.name not in self.files:
-            raise KeyError(name)
-        try:
-            if file_digest(file) != self.files[file.name]:
-                raise KeyError(name)
-            return _read_scheme(file, name, self.identity.digest)
-        except RislamError:
-            raise KeyError(name) from None
+        if self.holds([file.name]):
+            with suppress(RislamError):
+                return _read_scheme(file, name, self.identity.digest)
+        raise KeyError(name)
 
     def __setitem__(self, name: str, result: SchemeResult) -> None:
         data = run_datasets.seal_dataset(run_datasets.scheme_to_dataset(result), **self._stamp())
@@ -64,17 +60,11 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         self.files.pop(file.name, None)
 
     def __iter__(self) -> Iterator[str]:
-        names = (file.removesuffix(".nc") for file in sorted(self.files) if file.startswith("scheme_"))
-        return (name.removeprefix("scheme_") for name in names)
+        schemes = (file for file in sorted(self.files) if file.startswith("scheme_"))
+        return (file.removeprefix("scheme_").removesuffix(".nc") for file in schemes)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
-
-    def __contains__(self, name: object) -> bool:
-        try:
-            return isinstance(name, str) and self[name] is not None
-        except KeyError:
-            return False
 
     @property
     def spoiled(self) -> list[str]:
@@ -270,20 +260,27 @@ def read_run(folder: Path) -> SlamResult:
         check_files(folder, about)
         data = read_dataset(folder / PATHS_FILE)
         run_datasets.check_dataset(data, folder / PATHS_FILE, run=about["identity"], cycles=about["cycles"])
-        paths, scene = run_datasets.dataset_to_paths(data), load_scene(folder / "scene")
-        agent = Trajectory(
-            data["time"].to_numpy(), data["true_position"].to_numpy(), data["true_velocity"].to_numpy(),
-            data["true_heading"].to_numpy(), scene.agent.body,
-        )  # fmt: skip
+        paths, scene = run_datasets.dataset_to_paths(data), read_room(folder, about)
+        time, position, velocity, heading = (data[name].to_numpy() for name in run_datasets.TRAJECTORY)
+        agent = Trajectory(time, position, velocity, heading, scene.agent.body)
         schemes = {
             name: _read_scheme(scheme_file(folder, name), name, about["identity"], about["cycles"])
             for name in about["schemes"]
         }
-        return SlamResult(
-            name=about["name"], scene=replace(scene, agent=agent, digest=about["scene"]["sha256"]), paths=paths,
-            schemes=schemes, config=about["config"], seed=about["seed"], versions=about["versions"],
-            seconds=about["seconds"], warnings=tuple(about["warnings"]),
-        )  # fmt: skip
+        return result_of_marker(about, replace(scene, agent=agent), paths, schemes)
+
+
+def read_room(folder: Path, about: Mapping[str, Any]) -> Scene:
+    """Read the room of a run from its folder, with the SHA-256 of the files that it was made from."""
+    return replace(load_scene(folder / "scene"), digest=about["scene"]["sha256"])
+
+
+def result_of_marker(
+    about: Mapping[str, Any], scene: Scene, paths: Paths, schemes: Mapping[str, SchemeResult]
+) -> SlamResult:
+    """Result of a run from what its folder's marker says, and what the other files hold."""
+    told: dict[str, Any] = {name: about[name] for name in ("name", "seed", "config", "versions", "seconds")}
+    return SlamResult(scene=scene, paths=paths, schemes=schemes, warnings=tuple(about["warnings"]), **told)
 
 
 @contextmanager

@@ -159,21 +159,18 @@ def panel_dropped(examples: Examples, rule: Rule) -> dict[str, tuple[int, int]]:
 
 def f1(keep: Booleans, kept: Booleans) -> float:
     """F1 of the components kept against those to keep, both (N,)."""
-    return float(_f1(np.array(_counts(kept, keep, np.ones(len(keep), dtype=np.bool_)))[None])[0])
+    return float(_f1(_counts(kept, keep)[None])[0])
 
 
 def _tables(examples: Examples, kept: Booleans) -> Integers:
     """Confusion counts (walks, 4) of the classifier in each walk as `_counts` gives them, clutter left out."""
-    walks = np.unique(examples.walk)
-    return np.array([_counts(kept, examples.keep, examples.labelled & (examples.walk == walk)) for walk in walks])
+    walks = (examples.labelled & (examples.walk == walk) for walk in np.unique(examples.walk))
+    return np.array([_counts(kept[rows], examples.keep[rows]) for rows in walks])
 
 
-def _counts(kept: Booleans, keep: Booleans, rows: Booleans) -> tuple[int, int, int, int]:
-    """Confusion counts of the classifier among `rows`: kept rightly, kept wrongly, removed wrongly, removed rightly."""
-    return (
-        int(np.sum(rows & kept & keep)), int(np.sum(rows & kept & ~keep)), int(np.sum(rows & ~kept & keep)),
-        int(np.sum(rows & ~kept & ~keep)),
-    )  # fmt: skip
+def _counts(kept: Booleans, keep: Booleans) -> Integers:
+    """Confusion counts (4,) of the classifier: kept rightly, kept wrongly, removed wrongly, removed rightly."""
+    return np.bincount(2 * ~kept + ~keep, minlength=4)
 
 
 def _f1(tables: Any) -> Floats:

@@ -51,6 +51,7 @@ class Sets(NamedTuple):
 
 def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell = tell_nobody) -> Sets:
     """Gather the training, validation and test sets of the classifier; the specification's seed decides all draws.
+    Drawn rooms are tested on their own motion, under every code policy.
 
     Raises
     ------
@@ -64,13 +65,16 @@ def gather_sets(scenes: Sequence[Scene], spec: ClassifierSpec, *, progress: Tell
     for number in range(total):
         rooms.append(gather_random(number, spec))
         progress("rooms to learn from", number + 1, total)
-    test, drawn = dict[str, Examples](), dict[str, Examples]()
+    test, drawn, radio = dict[str, Examples](), dict[str, Examples](), build_radio(spec.radio)
     progress("rooms to test on", 0, len(scenes) + spec.drawn)
-    for scene, room in zip(scenes, spec.rooms, strict=True):
-        test[scene.name] = gather_room(scene, room.depth, spec)
+    for scene, named in zip(scenes, spec.rooms, strict=True):
+        test[scene.name] = gather_room(scene, named.depth, spec)
         progress("rooms to test on", len(test), len(scenes) + spec.drawn)
     for seed in range(spec.drawn_first, spec.drawn_first + spec.drawn):
-        drawn[f"random_{seed}"] = gather_drawn(seed, spec)
+        room, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
+        drawn[f"random_{seed}"] = gather_motion(
+            room, room.agent[: spec.cycles], DEPTH, radio, spec, seed, range(len(POLICIES)), rng=rng
+        )
         progress("rooms to test on", len(test) + len(drawn), len(scenes) + spec.drawn)
     return Sets(join_rows(rooms[: spec.train]), join_rows(rooms[spec.train :]), test, drawn)
 
@@ -95,15 +99,6 @@ def gather_random(number: int, spec: ClassifierSpec) -> Examples:
             continue
         return gather_motion(scene, motion, DEPTH, radio, spec, number, policies, rng=rng)
     raise SceneError(f"random room {number}: no walk of {spec.cycles} cycles in {_TRIES} rooms; give fewer cycles")
-
-
-def gather_drawn(seed: int, spec: ClassifierSpec) -> Examples:
-    """Test examples of the room of `scene.random_rooms` with that seed on its own motion, under every code policy."""
-    scene, rng = draw_room(seed).scene, np.random.default_rng([spec.seed, seed, 1])
-    policies = range(len(POLICIES))
-    return gather_motion(
-        scene, scene.agent[: spec.cycles], DEPTH, build_radio(spec.radio), spec, seed, policies, rng=rng
-    )
 
 
 def gather_room(scene: Scene, depth: int, spec: ClassifierSpec) -> Examples:

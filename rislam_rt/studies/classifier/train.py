@@ -1,5 +1,6 @@
 """Training of the component classifier: fits networks by L-BFGS from several starts, keeps the best and scores it."""
 
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -100,10 +101,14 @@ class Training(NamedTuple):
 
 def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
     """Train the classifier from several random starts, keep the best on the validation rooms, score it on all sets."""
-    starts = np.random.default_rng(spec.seed).spawn(spec.network.restarts)
-    networks = [_fit(sets.train, spec, rng=child) for child in starts]
-    tested = sets.tested
-    restarts = [(right_by_class(sets.validation, rules(net)["network"]), _f1_of(tested, net)) for net in networks]
+    section, tested = spec.network, sets.tested
+    known = take_rows(sets.train, sets.train.labelled & ~sets.train.near)
+    fit = partial(
+        train_network, known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations
+    )
+    networks = [fit(rng=child) for child in np.random.default_rng(spec.seed).spawn(section.restarts)]
+    paths, keepers = take_rows(tested, tested.labelled), [rules(net)["network"] for net in networks]
+    restarts = [(right_by_class(sets.validation, keeper), f1(paths.keep, keeper(paths))) for keeper in keepers]
     network = networks[int(np.argmax([chosen for chosen, _ in restarts]))]
     places = {**sets.test, ALL: tested, DRAWN: sets.all_drawn, RANDOM: sets.validation}
     judges = rules(network)
@@ -123,14 +128,6 @@ def train_and_score(sets: Sets, spec: ClassifierSpec) -> Training:
     return Training(network, sets, scores, mean, restarts, lost)
 
 
-def _fit(examples: Examples, spec: ClassifierSpec, *, rng: np.random.Generator) -> Network:
-    """Train one network of the classifier from one random start."""
-    known, section = take_rows(examples, examples.labelled & ~examples.near), spec.network
-    return train_network(
-        known.features, known.keep, balance(known), section.hidden, section.penalty, section.iterations, rng=rng
-    )
-
-
 def balance(examples: Examples) -> Floats:
     """Weights (N,) of the classifier's training examples: the two answers weigh the same, and so do their path classes.
 
@@ -144,9 +141,3 @@ def balance(examples: Examples) -> Floats:
             own = examples.kind == kind
             weight[own] *= 0.5 / (len(kinds) * weight[own].sum())
     return np.asarray(weight)
-
-
-def _f1_of(examples: Examples, network: Network) -> float:
-    """F1 of a network on the examples that are paths."""
-    known = take_rows(examples, examples.labelled)
-    return f1(known.keep, rules(network)["network"](known))

@@ -68,9 +68,11 @@ def gather_walk(
     baseline = float(np.linalg.norm(motion.body.tx_offset - motion.body.rx_offset))
     state, memory = init_tracks(), _TrackHistory()
     shift, found = doppler_shift(paths, motion, radio.wavelength), []
+    over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
+    over = np.where(paths.kind >= PathKind.PS, over, 0)
     for cycle in range(len(motion)):
-        heard = measure(paths, cycle, float(motion.heading[cycle]), radio, receiver, None, shift[cycle], rng=rng)
-        measurement, truth = heard
+        heading = float(motion.heading[cycle])
+        measurement, truth = measure(paths, cycle, heading, radio, receiver, None, shift[cycle], rng=rng)
         dt = float(motion.time[cycle] - motion.time[cycle - 1]) if cycle else 0.0
         state, label = step_tracks(state, measurement, dt)
         length = SPEED_OF_LIGHT * measurement.tau
@@ -87,18 +89,11 @@ def gather_walk(
                 features[far], age[far] = track_features(sightings, motion.body, radio), sightings.held.sum(axis=1)
             spread = 4.0 * np.pi * length / (radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain))
             walk, policy = (np.full(len(length), number) for number in name)
-            kind, legs = _classes(paths, truth.path)
+            kind = np.where(truth.path >= 0, paths.kind[truth.path], CLUTTER)
+            legs = np.where(truth.path >= 0, over[truth.path], 0)
             ratio = measurement.amplitude * spread  # a false component may have no length
             found.append(Examples(features, kind, legs, age, ratio, walk, policy, label, ~far))
     return join_rows(found)
-
-
-def _classes(paths: Paths, column: Integers) -> tuple[Integers, Integers]:
-    """True class (`Examples.kind`) and `.legs` of training examples by their columns of the paths, -1 for clutter."""
-    over = OVER_RX * np.any(paths.rx_walls >= 0, axis=1) + OVER_TX * np.any(paths.tx_walls >= 0, axis=1)
-    over = np.where(paths.kind >= PathKind.PS, over, 0)
-    true = column >= 0
-    return np.where(true, paths.kind[column], CLUTTER), np.where(true, over[column], 0)
 
 
 class _TrackHistory:

@@ -69,13 +69,9 @@ def set_codes(paths: Paths, panel: DataSheet | None, policy: str, *, rng: np.ran
     shape = (paths.num_cycles, panel.rows, panel.cols)
     if policy in ("aimed", "exact") and np.any(paths.kind == PathKind.RIS):
         best = focus_codes(paths, panel.levels).index
-        index = best if policy == "exact" else best[_middle(paths)]
+        direct = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
+        middle = direct[len(direct) // 2] if len(direct) else 0  # of the cycles with a direct panel path
+        index = best if policy == "exact" else best[middle]
     else:
         index = rng.integers(panel.levels, size=shape if policy == "random" else shape[1:])
     return rephase(paths, RisCode(index, panel.levels))
-
-
-def _middle(paths: Paths) -> int:
-    """Cycle of a walk at which the code of the policy `aimed` is designed: the middle one with a direct panel path."""
-    there = np.flatnonzero(paths.valid[:, paths.kind == PathKind.RIS].any(axis=1))
-    return int(there[len(there) // 2]) if len(there) else 0

@@ -61,9 +61,7 @@ def _look(
 ) -> dict[str, Any]:  # fmt: skip
     """Numbers of components and normalised angle errors of the receiver in one cycle, by comparison with true paths."""
     heading, shift = float(motion.heading[cycle]), doppler_shift(paths, motion, made.radio.wavelength)[cycle]
-    measurement, truth = measure(
-        paths, cycle, heading, made.radio, made.receiver, None, shift, front_end, rng=rng
-    )  # fmt: skip
+    measurement, truth = measure(paths, cycle, heading, made.radio, made.receiver, None, shift, front_end, rng=rng)
     true = truth.path >= 0
     kind = np.where(true, paths.kind[truth.path], -1)
     arrival = (paths.arrival[cycle, truth.path] @ rotation_z(motion.heading[cycle]))[:, :2]
@@ -80,10 +78,6 @@ def _look(
 def _scores(looks: list[dict[str, Any]]) -> dict[str, Any]:
     """Means of the receiver's counts over some cycles, and the quantile `HALF` of its normalised errors."""
     error: Floats = np.abs(np.concatenate([look["error"] for look in looks]))
-    return {
-        "false": float(np.mean([look["false"] for look in looks])),
-        "components": float(np.mean([look["components"] for look in looks])),
-        "landmarks": float(np.mean([look["landmarks"] for look in looks])),
-        "panel": float(np.mean([look["panel"] for look in looks])),
-        "error_over_std": float(np.quantile(error, HALF)) if error.size else None,
-    }
+    names = ("false", "components", "landmarks", "panel")
+    means = {name: float(np.mean([look[name] for look in looks])) for name in names}
+    return {**means, "error_over_std": float(np.quantile(error, HALF)) if error.size else None}

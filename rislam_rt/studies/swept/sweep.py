@@ -15,15 +15,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.studies.spec import study_record
 from rislam_rt.studies.swept.cell import FUNCTION, cell_spec
-from rislam_rt.studies.swept.spec import (
-    AblationsSpec,
-    Fig4bSpec,
-    Fig4cSpec,
-    HardwareSpec,
-    RobustnessSpec,
-    RoomsSpec,
-    SweptSpec,
-)
+from rislam_rt.studies.swept.spec import Fig4bSpec, Fig4cSpec, HardwareSpec, RoomsSpec, SweptSpec
 from rislam_rt.sweeps import Axis, Sweep
 
 RECEIVER = "rislam_rt.studies.swept.receiver:run_cell"
@@ -47,8 +39,14 @@ def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> S
     ConfigError
         No scene is named.
     """
-    beside = pipeline.parent
-    axes = _axes(spec)
+    values = {
+        "scene": spec.scenes if isinstance(spec, RoomsSpec) else (),
+        "size": spec.sizes if isinstance(spec, Fig4cSpec) else (),
+        "variant": [variant.name for variant in spec.all_variants],
+        SNR: spec.snr_db if isinstance(spec, Fig4bSpec) else (),
+    }
+    axes = tuple(Axis(key, tuple(own)) for key, own in values.items() if own)
+    beside, function = pipeline.parent, FUNCTION
     base: dict[str, Any] = {"run": dict(spec.run)}
     if isinstance(spec, RoomsSpec):
         if scene is not None:
@@ -61,12 +59,9 @@ def build_sweep(spec: SweptSpec, pipeline: Path, scene: Path | None = None) -> S
     variants = {variant.name: dict(variant.set) for variant in spec.all_variants}
     local = {"beside": os.path.abspath(beside), "variants": variants}
     keys = tuple(axis.key for axis in axes)
-    function = FUNCTION
     if isinstance(spec, HardwareSpec):
         base["places"], function = spec.places, RECEIVER
-    return Sweep(
-        function, axes, base, spec.repetitions, spec.seed, keys, local, _depends(pipeline, local), spec.name,
-    )  # fmt: skip
+    return Sweep(function, axes, base, spec.repetitions, spec.seed, keys, local, _depends(pipeline, local), spec.name)
 
 
 def check_swept(spec: SweptSpec) -> None:
@@ -84,19 +79,6 @@ def check_swept(spec: SweptSpec) -> None:
         except ConfigError as error:
             place = f"run, with variant '{name}'" if name else "run"
             raise ConfigError(f"{place}: {str(error).removeprefix('run: ')}") from None
-
-
-def _axes(spec: SweptSpec) -> tuple[Axis, ...]:
-    """Axes of a swept study by its kind: SNR, panel size, scenes, variants."""
-    if isinstance(spec, Fig4bSpec):
-        return Axis("variant", tuple(case.name for case in spec.cases)), Axis(SNR, tuple(spec.snr_db))
-    if isinstance(spec, Fig4cSpec):
-        return (Axis("size", tuple(spec.sizes)),)
-    if isinstance(spec, AblationsSpec | RobustnessSpec | HardwareSpec):
-        return (Axis("variant", tuple(variant.name for variant in spec.all_variants)),)
-    assert isinstance(spec, RoomsSpec)
-    rooms = Axis("scene", tuple(spec.scenes))
-    return (rooms, Axis("variant", tuple(variant.name for variant in spec.variants))) if spec.variants else (rooms,)
 
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:

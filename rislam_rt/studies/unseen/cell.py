@@ -91,8 +91,8 @@ def _applied_signals(setup: RunSetup, result: SchemeResult, spec: PipelineSpec, 
 def cell_label(settings: Mapping[str, Any]) -> str:
     """Label of a cell from its variant and SNR, for the names of saved files."""
     snr = settings["run"].get("radio", {}).get("reference_snr_db")
-    parts = [str(settings["variant"])] if settings.get("variant") else []
-    return "".join(f"{part}_" for part in [*parts, *([f"{snr:g}dB"] if snr is not None else [])])
+    parts = settings.get("variant"), None if snr is None else f"{snr:g}dB"
+    return "".join(f"{part}_" for part in parts if part)
 
 
 def scheme_here(asked: str, room: RandomRoom) -> str:

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.model import SchemeResult, SlamResult
 from rislam_rt.model.result import NOTHING, STEPS
 from rislam_rt.pipeline import PipelineSpec
-from rislam_rt.pipeline.long.whole_run import read_given, read_whole
+from rislam_rt.pipeline.long.run import read_given, read_whole
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, answers_from_arrays, replay
 from rislam_rt.progress import Tell, tell_nobody
@@ -77,7 +77,8 @@ def recorded_schemes(
         answers, apart, cycle_s = answers_of(scheme, inputs), None, None
         if replayed:
             again = replay(inputs, result.config, name, rng=rng, progress=progress)
-            apart = _apart(answers, again)
+            places = np.array([[one.position for one in each.estimates] for each in (answers, again)])
+            apart = float(np.linalg.norm(places[0] - places[1], axis=1).max())
             cycle_s = again.seconds
             answers = again if apart <= APART else answers
         scores = {"ran": name, **score_run(truth, inputs, answers)}
@@ -96,9 +97,3 @@ def replay_seconds(result: SlamResult) -> float:
     """Time [s] that localising took in a recorded run, all schemes together: about that of replaying them."""
     step = STEPS.index("localise")
     return float(sum(scheme.seconds[:, step].sum() for scheme in result.schemes.values()))
-
-
-def _apart(one: Answers, other: Answers) -> float:
-    """Largest distance [m] between the estimated positions of a recorded run and of its replay."""
-    places: list[Any] = [np.array([each.position for each in answers.estimates]) for answers in (one, other)]
-    return float(np.linalg.norm(places[0] - places[1], axis=1).max())

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, inpu
 from rislam_rt.storage.files import MARK
 from rislam_rt.storage.netcdf import Entry, read_dataset, variables, write_dataset
 from rislam_rt.studies.unseen.truth import Truth
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 TRUTH: dict[str, Entry] = {
     "position": (("time", "xyz"), "m", "midpoint of Tx and Rx"),
@@ -50,7 +47,8 @@ class Recording(NamedTuple):
 
 
 def write_recording(recording: Recording, path: Path) -> None:
-    """Write a recorded run to a NetCDF file, whole or not at all.
+    """Write a recorded run to a NetCDF file, whole or not at all: `INPUTS`, `TRUTH` with names from `true_` on, the
+    rest as attributes.
 
     Raises
     ------
@@ -61,7 +59,15 @@ def write_recording(recording: Recording, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StoreError(f"{path.parent}: cannot be made ({error.strerror}); check permissions") from None
-    write_dataset(recording_to_dataset(recording), path)
+    truth = recording.truth
+    about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
+    data = inputs_to_dataset(
+        recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel), origin=MARK
+    )
+    values = {name: getattr(truth, name) for name in TRUTH}
+    plain = {name: v.astype(np.int8) if v.dtype == np.bool_ else v for name, v in values.items()}
+    content = variables(plain, TRUTH)
+    write_dataset(data.assign({f"true_{name}": content[name] for name in content}), path)
 
 
 def read_recording(path: str | Path) -> Recording:
@@ -74,32 +80,13 @@ def read_recording(path: str | Path) -> Recording:
     """
     data = read_dataset(Path(path))
     try:
-        return dataset_to_recording(data)
+        marks, values = data.attrs, {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
+        for name in ("landmark_audible", "wall_audible"):
+            values[name] = values[name].astype(np.bool_)
+        truth = Truth(**values, panel=int(marks["true_panel"]))
+        config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
+        return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)
     except (KeyError, ValueError, TypeError, RislamError) as error:
         raise StoreError(
             f"{path}: not a recorded run ({type(error).__name__}: {str(error)[:80]}); write it again"
         ) from None
-
-
-def recording_to_dataset(recording: Recording) -> "xr.Dataset":
-    """NetCDF data set of a recorded run: `INPUTS`, `TRUTH` with names from `true_` on, the rest as attributes."""
-    truth = recording.truth
-    about = {name: json.dumps(getattr(recording, name)) for name in ("config", "traits", "scores")}
-    data = inputs_to_dataset(
-        recording.inputs, **about, scheme=recording.scheme, true_panel=int(truth.panel), origin=MARK
-    )
-    values = {name: getattr(truth, name) for name in TRUTH}
-    plain = {name: v.astype(np.int8) if v.dtype == np.bool_ else v for name, v in values.items()}
-    content = variables(plain, TRUTH)
-    return data.assign({f"true_{name}": content[name] for name in content})
-
-
-def dataset_to_recording(data: "xr.Dataset") -> Recording:
-    """Recorded run from a NetCDF data set that `recording_to_dataset` made."""
-    marks = data.attrs
-    values = {name: data[f"true_{name}"].to_numpy() for name in TRUTH}
-    for name in ("landmark_audible", "wall_audible"):
-        values[name] = values[name].astype(np.bool_)
-    truth = Truth(**values, panel=int(marks["true_panel"]))
-    config, traits, scores = (json.loads(marks[name]) for name in ("config", "traits", "scores"))
-    return Recording(dataset_to_inputs(data), truth, str(marks["scheme"]), config, traits, scores)

@@ -48,6 +48,7 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
         )
     told = inputs.start.position - truth.position[0]
     offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
+    covariance = np.array([estimate.covariance for estimate in answers.estimates])
     absolute, relative = np.linalg.norm(offset, axis=1), np.linalg.norm(offset - told, axis=1)
     late = inputs.time >= SETTLED
     drift = truth.position[0] + np.outer(inputs.time, inputs.start.velocity) - truth.position
@@ -57,10 +58,10 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
         **(_ratio("late_", absolute[late], truth.bound[late]) if late.any() else {}),
         **(_ratio("late_relative_", relative[late], truth.relative_bound[late]) if late.any() else {}),
         "dead_reckoning_m": evaluate.root_mean_square(np.linalg.norm(drift, axis=1)),
-        "nees": _nees(truth, answers, 3),
-        "horizontal_nees": _nees(truth, answers, 2),
+        "nees": _nees(offset, covariance, 3),
+        "horizontal_nees": _nees(offset, covariance, 2),
     }
-    own = np.array([np.sqrt(np.trace(estimate.covariance[:3, :3])) for estimate in answers.estimates])
+    own = np.array([np.sqrt(np.trace(one[:3, :3])) for one in covariance])
     outcomes = [info.outcome for info in answers.infos]
     scores |= lost_scores(relative, truth.relative_bound, own, inputs.time, outcomes)
     maps = [estimate.map for estimate in answers.estimates]
@@ -175,14 +176,12 @@ def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
-def _nees(truth: Truth, answers: Answers, count: int) -> float | None:
-    """Score in an unseen room: mean NEES of the absolute position error along the first `count` axes over the cycles,
-    per degree of freedom; None if none of them is filtered."""
-    covariance = np.array([estimate.covariance for estimate in answers.estimates])
+def _nees(offset: Floats, covariance: Floats, count: int) -> float | None:
+    """Score in an unseen room: mean NEES of the absolute position error (K, 3) [m] along the first `count` axes over
+    the cycles, per degree of freedom; None if none of them is filtered."""
     axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :count, :count]).min(axis=0) > 0.0)
     if not len(axes):
         return None
-    offset = np.array([estimate.position for estimate in answers.estimates]) - truth.position
     found = float(np.mean(evaluate.normalised_squares(offset[:, axes], covariance[:, axes[:, None], axes]))) / len(axes)
     return found if np.isfinite(found) else None
 

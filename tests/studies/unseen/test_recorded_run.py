@@ -13,8 +13,7 @@ from rislam_rt.errors import ConfigError, ResultError
 from rislam_rt.model import Scene
 from rislam_rt.pipeline import PipelineSpec, load_spec, run_slam
 from rislam_rt.pipeline.long import slices
-from rislam_rt.pipeline.long.run import run_long
-from rislam_rt.pipeline.long.whole_run import read_whole
+from rislam_rt.pipeline.long.run import read_whole, run_long
 from rislam_rt.pipeline.scores import audible_paths
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.store.identity import run_identity
