@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import parse_number
 from rislam_rt.shipped import find_pipeline, find_room
 
 if TYPE_CHECKING:
@@ -110,8 +112,6 @@ def check_one_scene(scene: Path | None, changed: Sequence[str] | None) -> None:
     ConfigError
         It is.
     """
-    from rislam_rt.errors import ConfigError
-
     if scene is not None and any(setting.partition("=")[0].strip() == "scene" for setting in changed or ()):
         raise ConfigError(f"--set scene: --scene {scene} is given too; leave one of them out")
 
@@ -125,9 +125,6 @@ def parse_point(option: str, text: str, farthest: float = FARTHEST) -> "Floats":
         It is not three numbers, or one lies beyond that: by default, beyond what a scene may hold.
     """
     import numpy as np
-
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.input_messages import parse_number
 
     try:
         values = np.array([parse_number(part) for part in text.split(",")])

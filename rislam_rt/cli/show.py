@@ -7,6 +7,8 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file, settings_of
 from rislam_rt.cli.output_files import OUTPUT, check_ending, check_output
+from rislam_rt.cli.progress_bars import show_progress
+from rislam_rt.storage.files import write_atomic
 
 if TYPE_CHECKING:
     from rislam_rt.model import Scene
@@ -37,7 +39,6 @@ def command(
 
     Example: rislam-rt show office --html office.html --depth 2
     """
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.cli.scene_arguments import open_scene
     from rislam_rt.report.terminal_tables import print_scene
     from rislam_rt.scene.scene_folder import safe_name
@@ -69,10 +70,8 @@ def command(
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
     """Part of `rislam-rt show --html`: write the view of a scene with the paths at some poses of its trajectory."""
     from rislam_rt.channel.image_source import ImageSourceChannel
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.report.view.page import view_page
     from rislam_rt.report.view.paths_data import paths_data, poses_of
-    from rislam_rt.storage.files import write_atomic
 
     with show_progress() as tell:
         tell("paths", 0, 2)
