@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
+from rislam_rt.channel.specular_legs import NO_WALL
 from rislam_rt.channel.traced.radio_materials import specular_material
-from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
@@ -73,11 +73,6 @@ class TracerScene:
     """The whole room (`NO_OCCLUDER`), and by number of each scatterer with an occluding mesh the room without that."""
     occluders: dict[int, mi.Scene]
     """The occluding mesh of each scatterer that has one, alone; those of no scatterer together (`ALONE`)."""
-
-    @property
-    def wavelength(self) -> float:
-        """Carrier wavelength [m] as the tracer has it."""
-        return float(self.scene.wavelength[0])
 
     def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
         """Walls (...,) that the tracer's rays hit, by shape and primitive (...,); `NO_WALL` where no wall was hit."""
