@@ -1,7 +1,7 @@
 """The command `rislam-rt report RUN`: scores a completed run again, draws its page, exports a GIF or Rerun file."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -11,9 +11,6 @@ from rislam_rt.cli.progress_bars import show_progress
 from rislam_rt.cli.run import show_scores
 from rislam_rt.errors import ConfigError
 from rislam_rt.storage.files import write_atomic
-
-if TYPE_CHECKING:
-    from rislam_rt.model import SlamResult
 
 
 def command(
@@ -45,18 +42,13 @@ def command(
         write_atomic(rerun, recording_bytes(result, run.resolve().name))
         typer.echo(f"recording: {rerun}")
     if gif is not None:
-        typer.echo(f"moving picture: {_write_gif(result, gif)}")
+        from rislam_rt.report.exports.animation import gif_bytes
+
+        with show_progress() as tell:
+            write_atomic(gif, gif_bytes(result, tell))
+        typer.echo(f"moving picture: {gif}")
     show_scores(summary)
     with hold_run(run):
         page = write_report(result, summary, run)
     typer.echo(f"report: {page}")
     write_json(json, summary)
-
-
-def _write_gif(result: "SlamResult", file: Path) -> Path:
-    """Write the animation of a run as a GIF, with a progress bar."""
-    from rislam_rt.report.exports.animation import gif_bytes
-
-    with show_progress() as tell:
-        write_atomic(file, gif_bytes(result, tell))
-    return file

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file, settings_of
+from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file
 from rislam_rt.cli.output_files import OUTPUT, check_ending, check_output
 from rislam_rt.cli.progress_bars import show_progress
 from rislam_rt.storage.files import write_atomic
@@ -40,11 +40,13 @@ def command(
     Example: rislam-rt show office --html office.html --depth 2
     """
     from rislam_rt.cli.scene_arguments import open_scene
+    from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.report.terminal_tables import print_scene
     from rislam_rt.scene.scene_folder import safe_name
 
     check_ending("--html", html, (".html", ".htm"))
-    settings = settings_of(pipeline, set_ or ()) if html is not None else None
+    settings = build_settings(load_spec(pipeline, set_ or ())) if html is not None else None
     if out is not None:
         from rislam_rt.report.style import picture_kind
 

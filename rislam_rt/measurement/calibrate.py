@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
@@ -72,7 +72,8 @@ def calibrate(
         level = np.abs(np.einsum("lm,tlm->t", direct.conj(), heard))
         loudness = float(np.median(level))
         heard = heard * (loudness / level)[:, None, None]
-    matrix = np.diag(_chains(heard.mean(axis=0), direct))
+    chains = np.sum(heard.mean(axis=0) * direct.conj(), axis=1)
+    matrix = np.diag(np.asarray(chains / np.mean(chains)))  # gain and phase of every chain, of mean one
     residue: Complexes = np.zeros_like(heard[0])
     image = np.zeros(len(residue), dtype=np.complex128)
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
@@ -99,25 +100,16 @@ def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> Calibratio
     return CalibrationReference(sounding, build_grid(sounding, window), window, direct, radio.noise_psd)
 
 
-def _chains(mean: Complexes, direct: Complexes) -> Complexes:
-    """Complex gains (L,) of the receive chains by calibration, of mean one, from the direct path in samples (L, M)."""
-    chains = np.sum(mean * direct.conj(), axis=1)
-    return np.asarray(chains / np.mean(chains))
-
-
 def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
     """Samples (L, M) that an ideal array would receive of the strong paths in calibrated samples, without ghosts."""
     scaled = samples / np.sqrt(known.noise)
     found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
-    kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
+    delay, strength = found.parameters[:, 0], np.abs(found.amplitude)
+    near = np.abs(delay[:, None] - delay) < GHOST_CELLS
+    # none so much weaker than one of about its delay that it may be its ghost
+    kept = found.parameters[strength >= faintest * np.max(near * strength, axis=1, initial=0.0)]
     fit = fit_amplitudes(known.sounding, kept, scaled)
     return fit.waves.sum(fit.amplitude * np.sqrt(known.noise))
-
-
-def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
-    """Which paths (P,) calibration uses: none so much weaker than one of about its delay that it may be its ghost."""
-    near = np.abs(delay[:, None] - delay) < GHOST_CELLS
-    return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:

@@ -30,7 +30,7 @@ def print_summary(summary: Mapping[str, Any]) -> None:
     table = Table("RMSE", *(Column(name, justify="right") for name in summary["schemes"]))
     for row in summary_rows(summary):
         table.add_row(*row)
-    _show(title, table)
+    show_table(title, table)
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
@@ -151,7 +151,7 @@ def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: fl
     for row in rows:
         gains = f"{row['lowest_gain_db']:.1f} to {row['highest_gain_db']:.1f}"
         table.add_row(row["class"], str(row["identities"]), f"{row['mean_per_cycle']:.1f}", gains)
-    _show(title, table)
+    show_table(title, table)
 
 
 def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> None:
@@ -177,8 +177,9 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
         table.add_row(f"largest {label} error", *(f"{content[key]:.2g} {unit}" for content in contents))
     for quantity in contents[0]["limits"]:
         label = f"{quantity.split(' [')[0]}: nearest to its limit"
-        table.add_row(label, *(_nearest(content["limits"][quantity]) for content in contents))
-    _show(title, table)
+        limits = (content["limits"][quantity] for content in contents)
+        table.add_row(label, *(f"{limit['nearest']['share']:.1%}" if limit else "-" for limit in limits))
+    show_table(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
         _print_faults(report, numbers, "cycle")
     print("agreed" if raw.passed and refined.passed else "NOT agreed")
@@ -193,11 +194,6 @@ def _print_faults(report: "PathReport", of: str, at: str) -> None:
         print(f"beyond its limit: {of}, {breach}")
 
 
-def _nearest(limits: "Mapping[str, Any]") -> str:
-    """Cell of a terminal table: the largest ratio of a path's error to its limit."""
-    return f"{limits['nearest']['share']:.1%}" if limits else "-"
-
-
 def print_validation(rows: Sequence["Validation"]) -> None:
     """Print the comparison of both channels in many rooms, a line for each room and kind of numbers, then failures."""
     table = Table("room", "numbers", "matched", "explained", "open", "beyond", "length \\[m]")
@@ -205,7 +201,7 @@ def print_validation(rows: Sequence["Validation"]) -> None:
         counts = (report.matched, sum(report.explained.values()), report.unexplained, report.num_breaches)
         length = report.as_dict()["max_length_error_m"]
         table.add_row(scene, numbers, *map(str, counts), f"{length:.0e}")
-    _show("traced against analytic, largest error", table)
+    show_table("traced against analytic, largest error", table)
     for scene, _, numbers, report in rows:
         _print_faults(report, f"{scene}, {numbers}", "pose")
     unexplained, beyond = sum(r.report.unexplained for r in rows), sum(r.report.num_breaches for r in rows)
@@ -223,7 +219,7 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], t
     bound = max(design.bound for design in designs.values())
     if bound > 0.0:
         table.add_row("lower bound", "", "", f"{np.sqrt(bound):.4g}", "", style="dim")
-    _show(title, table)
+    show_table(title, table)
 
 
 def print_sweep(scores: Sequence["SchemeScore"]) -> None:
@@ -237,7 +233,7 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
         counts = (str(len(score.rmse)), str(score.diverged), str(score.failed))
         point = (rooms.get(str(value), str(value)) for key, value in score.point.items() if key != "schemes")
         table.add_row(*point, score.scheme, overall, interval, *counts)
-    _show("sweep", table)
+    show_table("sweep", table)
 
 
 def print_cards(rows: Sequence["Row"], timings: Sequence[Mapping[str, Any]]) -> None:
@@ -268,10 +264,10 @@ def print_scene(scene: Scene) -> None:
     path = scene.agent.position
     table.add_row("agent", f"{len(path)} cycles", f"{_point(path[0])} to {_point(path[-1])}")
     table.add_row("bounds", "", f"{_point(low)} to {_point(high)}")
-    _show(scene.name, table)
+    show_table(scene.name, table)
 
 
-def _show(title: str, table: Table) -> None:
+def show_table(title: str, table: Table) -> None:
     """Print a table on the terminal under its title, which rich would wrap at the table's width."""
     console = Console(highlight=False)
     console.print(title, style="bold", markup=False)

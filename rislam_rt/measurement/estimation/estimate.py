@@ -99,13 +99,7 @@ def estimate_paths(
         if grown.cost >= fit.cost - threshold:
             break
         fit = grown
-    return _finish(sounding, fit, samples, threshold, window)
-
-
-def _finish(
-    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
-) -> Estimate:
-    """Final estimate of the search: refined to convergence, without paths that their neighbours can explain."""
+    # at last to convergence, and without paths that their neighbours can explain
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
@@ -144,7 +138,8 @@ def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshol
         information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
         variance = amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)
         certainty = np.abs(fit.amplitude) ** 2 / variance
-        doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
+        before = np.all(np.abs(fit.parameters[:, None] - tried) < SLACK, axis=-1).any(axis=1)
+        doubtful = np.flatnonzero((certainty < threshold) & ~before)
         for row in doubtful[np.argsort(certainty[doubtful])]:
             rest = _neighbours_instead(sounding, fit, samples, int(row), fit.cost + threshold)
             if rest is not None:
@@ -170,10 +165,3 @@ def _neighbours_instead(
     rest = fit.parameters.copy()
     rest[near[others]] = trial.parameters
     return np.delete(rest, row, axis=0)
-
-
-def _among(parameters: Floats, marked: Floats) -> Booleans:
-    """Which paths (P, 3) the waveform estimator holds for those `marked` (Q, 3), being within `SLACK` of one of
-    them."""
-    apart = np.abs(parameters[:, None] - marked)
-    return np.any(np.all(apart < SLACK, axis=-1), axis=1)

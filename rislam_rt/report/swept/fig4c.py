@@ -68,7 +68,9 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
     ]  # fmt: skip
     lines += [*table_lines(head, rows), "", "## From the smallest to the largest panel", ""]
     for fall in content["falls"]:
-        agent, panel = _percent(fall, "agent"), _percent(fall, "panel")
+        agent, panel = (
+            "an unknown share" if fall[name] is None else percent_between(fall, name) for name in ("agent", "panel")
+        )
         lines.append(f"- `{fall['scheme']}`: agent's RMSE lower by {agent}, panel's by {panel}")
     return lines
 
@@ -86,8 +88,3 @@ def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
     agent = paired_gain(large.column(scheme, "rmse_m"), small.column(scheme, "rmse_m"))
     panel = paired_gain(panel_error(large, scheme), panel_error(small, scheme))
     return {"scheme": scheme, **interval_entry("agent", agent), **interval_entry("panel", panel)}
-
-
-def _percent(fall: Mapping[str, Any], name: str) -> str:
-    """A reduction in percent with its interval, in words, for Fig. 4(c)."""
-    return "an unknown share" if fall[name] is None else percent_between(fall, name)

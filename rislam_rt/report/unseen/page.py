@@ -80,14 +80,12 @@ def _series(spec: UnseenSpec) -> list[str]:
     schemes = spec.run.get("schemes", [])
     lines = [f"- all: schemes {', '.join(f'`{name}`' for name in schemes)} (without a panel, what needs none)"]
     for variant in spec.variants:
-        settings = ", ".join(f"`{key} = {_toml(value)}`" for key, value in variant.set.items())
+        told = {
+            key: str(value).lower() if isinstance(value, bool) else repr(value) for key, value in variant.set.items()
+        }
+        settings = ", ".join(f"`{key} = {value}`" for key, value in told.items())
         lines.append(f"- `{variant.name}`: {settings or 'the defaults'}{f'; {variant.note}' if variant.note else ''}")
     return ["", *lines]
-
-
-def _toml(value: Any) -> str:
-    """A setting's value as in TOML, on the page of unseen rooms."""
-    return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
 def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
