@@ -84,11 +84,7 @@ def command(
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
-    content = {
-        "scene": str(scene),
-        "errors": errors,
-        "findings": [asdict(finding) for finding in findings],
-    }
+    content = {"scene": str(scene), "errors": errors, "findings": [asdict(finding) for finding in findings]}
     if checked is not None and looked is not None:
         content["advice"] = _advise(checked, settings, picture, looked)
     write_json(json, content)

@@ -144,21 +144,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: 
     removable = [number for number in dark if number != ALONE]  # the others are nobody's own
     views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
     alone = {number: _part([shade]) for number, shade in dark.items()}
-    views = {NO_OCCLUDER: scene.mi_scene} | views
-    return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
-
-
-def _part(objects: list[rt.SceneObject]) -> mi.Scene:
-    """Mitsuba scene of some of the tracer's meshes."""
-    return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
-
-
-def _numbered(
-    scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, members: list[Integers],
-    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers], views: dict[int, mi.Scene],
-    occluders: dict[int, mi.Scene],
-) -> TracerScene:  # fmt: skip
-    """Assemble the tracer's scene: number the triangles of all shapes (M,) by wall, and find each wall's largest."""
+    # the triangles of all shapes, in their order, and where each wall's largest is among them
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
     sizes = [len(members[m]) for m in order]
@@ -169,8 +155,14 @@ def _numbered(
     largest, _ = walls.largest_triangles()
     return TracerScene(
         scene, walls, origin, shape_of[largest], primitive_of[largest], walls.triangles[largest, 0] - origin,
-        ids[order], first, walls.wall_of_triangle[rows], *materials, _wall_boxes(walls, origin), views, occluders,
+        ids[order], first, walls.wall_of_triangle[rows], radio_materials, material_of_wall,
+        _wall_boxes(walls, origin), {NO_OCCLUDER: scene.mi_scene} | views, alone,
     )  # fmt: skip
+
+
+def _part(objects: list[rt.SceneObject]) -> mi.Scene:
+    """Mitsuba scene of some of the tracer's meshes."""
+    return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:

@@ -6,17 +6,13 @@ single-path refinements are replaced by joint Gauss-Newton steps, which also par
 path that its neighbours could explain as well as noise could is taken out again.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, into_range, pick_peaks
 from rislam_rt.measurement.estimation.path_signals import Sounding
 from rislam_rt.measurement.estimation.refine import (
-    Accuracy,
     LeastSquaresFit,
-    accuracy,
     amplitude_variance,
     fit_amplitudes,
     information_matrix,
@@ -53,17 +49,10 @@ NOTHING = np.zeros((0, 3))
 """Parameters of no paths."""
 
 
-class Estimate(NamedTuple):
-    """Estimate of P paths from one sounding, with the noise normalised to one: fit and standard deviations."""
-
-    fit: LeastSquaresFit
-    accuracy: Accuracy
-
-
 def estimate_paths(
     sounding: Sounding, grid: MatchedFilterGrid, samples: Complexes, threshold: float, window: tuple[float, float],
     most: int, known: Floats = NOTHING,
-) -> Estimate:  # fmt: skip
+) -> LeastSquaresFit:  # fmt: skip
     """The waveform estimator: all paths in samples (L, M) whose noise has unit variance; detect, refine, drop, and
     repeat.
 
@@ -102,8 +91,7 @@ def estimate_paths(
     # at last to convergence, and without paths that their neighbours can explain
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
-    fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
-    return Estimate(fit, accuracy(fit))
+    return refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
 
 
 def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
