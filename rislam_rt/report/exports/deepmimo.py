@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Material, PathKind, Paths, RadioConfig, Scene
 from rislam_rt.model.itu import itu_parameters
@@ -167,13 +167,9 @@ def _electric(material: Material, carrier: float) -> dict[str, float]:
 def _room_files(scene: Scene) -> dict[str, bytes]:
     """DeepMIMO's files of the room: vertices of all reflectors, with faces and materials of each."""
     materials = _distinct(scene)
-    faces: dict[str, Integers] = {}
-    kinds: dict[str, Integers] = {}
-    first = 0
-    for number, one in enumerate(scene.reflectors):
-        faces[str(number)] = one.faces + first
-        kinds[str(number)] = np.full(len(one.faces), materials.index(one.material))
-        first += len(one.vertices)
+    first = np.cumsum([0, *(len(one.vertices) for one in scene.reflectors)])
+    faces = {str(number): one.faces + first[number] for number, one in enumerate(scene.reflectors)}
+    kinds = {str(n): np.full(len(one.faces), materials.index(one.material)) for n, one in enumerate(scene.reflectors)}
     objects = [
         {"name": one.name, "label": "objects", "id": number, "mesh_key": str(number)}
         for number, one in enumerate(scene.reflectors)
