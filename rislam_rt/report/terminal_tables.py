@@ -30,7 +30,7 @@ def print_summary(summary: Mapping[str, Any]) -> None:
     table = Table("RMSE", *(Column(name, justify="right") for name in summary["schemes"]))
     for row in summary_rows(summary):
         table.add_row(*row)
-    show_table(title, table)
+    _show(title, table)
 
 
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
@@ -151,7 +151,7 @@ def print_paths(name: str, paths: Paths, rows: list[dict[str, Any]], seconds: fl
     for row in rows:
         gains = f"{row['lowest_gain_db']:.1f} to {row['highest_gain_db']:.1f}"
         table.add_row(row["class"], str(row["identities"]), f"{row['mean_per_cycle']:.1f}", gains)
-    show_table(title, table)
+    _show(title, table)
 
 
 def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> None:
@@ -179,7 +179,7 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
         label = f"{quantity.split(' [')[0]}: nearest to its limit"
         limits = (content["limits"][quantity] for content in contents)
         table.add_row(label, *(f"{limit['nearest']['share']:.1%}" if limit else "-" for limit in limits))
-    show_table(title, table)
+    _show(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
         _print_faults(report, numbers, "cycle")
     print("agreed" if raw.passed and refined.passed else "NOT agreed")
@@ -201,7 +201,7 @@ def print_validation(rows: Sequence["Validation"]) -> None:
         counts = (report.matched, sum(report.explained.values()), report.unexplained, report.num_breaches)
         length = report.as_dict()["max_length_error_m"]
         table.add_row(scene, numbers, *map(str, counts), f"{length:.0e}")
-    show_table("traced against analytic, largest error", table)
+    _show("traced against analytic, largest error", table)
     for scene, _, numbers, report in rows:
         _print_faults(report, f"{scene}, {numbers}", "pose")
     unexplained, beyond = sum(r.report.unexplained for r in rows), sum(r.report.num_breaches for r in rows)
@@ -219,7 +219,7 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], t
     bound = max(design.bound for design in designs.values())
     if bound > 0.0:
         table.add_row("lower bound", "", "", f"{np.sqrt(bound):.4g}", "", style="dim")
-    show_table(title, table)
+    _show(title, table)
 
 
 def print_sweep(scores: Sequence["SchemeScore"]) -> None:
@@ -233,7 +233,7 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
         counts = (str(len(score.rmse)), str(score.diverged), str(score.failed))
         point = (rooms.get(str(value), str(value)) for key, value in score.point.items() if key != "schemes")
         table.add_row(*point, score.scheme, overall, interval, *counts)
-    show_table("sweep", table)
+    _show("sweep", table)
 
 
 def print_cards(rows: Sequence["Row"], timings: Sequence[Mapping[str, Any]]) -> None:
@@ -264,10 +264,10 @@ def print_scene(scene: Scene) -> None:
     path = scene.agent.position
     table.add_row("agent", f"{len(path)} cycles", f"{_point(path[0])} to {_point(path[-1])}")
     table.add_row("bounds", "", f"{_point(low)} to {_point(high)}")
-    show_table(scene.name, table)
+    _show(scene.name, table)
 
 
-def show_table(title: str, table: Table) -> None:
+def _show(title: str, table: Table) -> None:
     """Print a table on the terminal under its title, which rich would wrap at the table's width."""
     console = Console(highlight=False)
     console.print(title, style="bold", markup=False)

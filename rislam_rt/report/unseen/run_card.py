@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
 from rislam_rt.report.markdown import NOTHING
-from rislam_rt.report.terminal_tables import show_table
 from rislam_rt.report.unseen.page import MILLI
 from rislam_rt.studies.unseen.score import SETTLED
 
@@ -21,7 +21,9 @@ def print_run_card(title: str, scores: Mapping[str, Mapping[str, Any]]) -> None:
     table = Table("score", *(Column(escape(name), justify="right") for name in scores))
     for label, cells in card_rows(scores).items():
         table.add_row(escape(label), *cells)
-    show_table(title, table)
+    console = Console(highlight=False)
+    console.print(title, style="bold", markup=False)
+    console.print(table)
 
 
 def card_rows(scores: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
