@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.specular_legs import SpecularLegs
+from rislam_rt.channel.specular_legs import NO_WALL, SpecularLegs, turned_round
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PathKind, Paths, RadioConfig, RisLegs, Scene
@@ -95,7 +95,7 @@ def _direct_block(direct: SpecularLegs, radio: RadioConfig, depth: int) -> dict[
         "departure": direct.at_device[:, keep],
         "arrival": direct.at_far_end[:, keep],
         "gain": direct.gain(radio.wavelength)[:, keep] * np.sqrt(radio.tx_gain * radio.rx_gain),
-        "vertices": _padded_vertices(direct.vertices[:, keep], depth + 1),
+        "vertices": _padded(direct.vertices[:, keep], depth + 1, axis=2, fill=0.0),
     }
 
 
@@ -112,7 +112,7 @@ def _join_block(
         "kind": np.where(bare, plain, walled),
         "landmark": np.full(len(i), landmark),
         "tx_walls": _padded(tx.walls[i], depth),
-        "rx_walls": _padded(_reversed_rows(rx.walls, rx.num_bounces)[j], depth),
+        "rx_walls": _padded(turned_round(rx.walls)[j], depth),
         "num_vertices": tx.num_bounces[i] + rx.num_bounces[j] + 1,
         "tx_leg": i,
         "rx_leg": j,
@@ -143,23 +143,11 @@ def _panel_responses(
     return responses[0], responses[1]
 
 
-def _padded(walls: Integers, depth: int) -> Integers:
-    """Composition of paths: pad or cut the legs' wall sequences (P, d) to exactly `depth` columns."""
-    fill = np.full((len(walls), max(depth - walls.shape[1], 0)), -1)
-    return np.concatenate([walls, fill], axis=1)[:, :depth]
-
-
-def _padded_vertices(vertices: Floats, count: int) -> Floats:
-    """Composition of paths: pad or cut the legs' vertices (K, S, D, 3) to exactly `count` points."""
-    cycles, paths, depth, _ = vertices.shape
-    fill = np.zeros((cycles, paths, max(count - depth, 0), 3))
-    return np.concatenate([vertices, fill], axis=2)[:, :, :count]
-
-
-def _reversed_rows(walls: Integers, bounces: Integers) -> Integers:
-    """Reverse the first `bounces` (S,) walls of each leg (S, d) to compose paths of them; the padding stays behind."""
-    index = bounces[:, None] - 1 - np.arange(walls.shape[1])
-    return np.where(index >= 0, np.take_along_axis(walls, np.maximum(index, 0), axis=1), -1)
+def _padded(values: Any, count: int, axis: int = 1, fill: float = NO_WALL) -> Any:
+    """Composition of paths: pad or cut the legs' wall sequences (P, d), or their vertices (K, S, D, 3), to exactly
+    `count` bounces, which lie along an axis."""
+    width = [(0, max(count - values.shape[n], 0) if n == axis else 0) for n in range(values.ndim)]
+    return np.pad(values, width, constant_values=fill).take(np.arange(count), axis=axis)
 
 
 def _joined_vertices(tx: SpecularLegs, rx: SpecularLegs, i: Integers, j: Integers, point: Floats, count: int) -> Floats:

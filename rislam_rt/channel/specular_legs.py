@@ -6,6 +6,15 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, freeze
 
+NO_WALL = -1
+"""Padding of wall sequences."""
+
+
+def turned_round(sequences: Integers) -> Integers:
+    """Wall sequences (S, D) of specular legs in reverse, the padding kept at the end."""
+    index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
+    return np.where(index >= 0, np.take_along_axis(sequences, np.maximum(index, 0), axis=1), NO_WALL)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpecularLegs:

@@ -1,5 +1,6 @@
 """The command `rislam-rt check SCENE`: checks a scene folder, and predicts which landmarks a run will detect."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,12 +8,11 @@ import typer
 
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, SceneFolder, Settings, pipeline_file
 from rislam_rt.cli.output_files import OUTPUT, write_json
+from rislam_rt.errors import ConfigError
 from rislam_rt.input_messages import counted
 from rislam_rt.shipped import is_shipped
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rislam_rt.adviser.link_budget import Survey
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
@@ -57,6 +57,7 @@ def command(
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings
     from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.scene import check_scene
+    from rislam_rt.scene.load import read_draft
     from rislam_rt.scene.scene_folder import scene_file
 
     changed = list(set_ or ())
@@ -70,7 +71,9 @@ def command(
 
         picture_kind(picture)  # before anything is worked out
     findings = check_scene(Path(scene), settings.radio)
-    checked, looked = _checked_scene(Path(scene), findings), None
+    checked, looked = None, None
+    if not any(finding.severity == "error" for finding in findings):
+        checked = read_draft(Path(scene)).scene
     if checked is not None:
         looked = survey(checked, settings)
         places = str(scene_file(scene)), "--set" if is_shipped(file) else str(file)
@@ -81,11 +84,7 @@ def command(
     for finding in findings:
         typer.echo(f"{finding.severity}: {finding.line}")
     errors, warnings = (sum(f.severity == severity for f in findings) for severity in ("error", "warning"))
-    content = {
-        "scene": str(scene),
-        "errors": errors,
-        "findings": [asdict(finding) for finding in findings],
-    }
+    content = {"scene": str(scene), "errors": errors, "findings": [asdict(finding) for finding in findings]}
     if checked is not None and looked is not None:
         content["advice"] = _advise(checked, settings, picture, looked)
     write_json(json, content)
@@ -94,21 +93,13 @@ def command(
         raise typer.Exit(2)
 
 
-def _checked_scene(folder: Path, findings: "Sequence[Finding]") -> "Scene | None":
-    """Scene that `rislam-rt check` found no error in; None if it found one."""
-    from rislam_rt.scene.load import read_draft
-
-    return None if any(finding.severity == "error" for finding in findings) else read_draft(folder).scene
-
-
 def _run_errors(
-    scene: "Scene", spec: "PipelineSpec", files: tuple[str, str], changed: "Sequence[str]", *, named: bool
+    scene: "Scene", spec: "PipelineSpec", files: tuple[str, str], changed: Sequence[str], *, named: bool
 ) -> "list[Finding]":
     """Part of `rislam-rt check`: the error that `rislam-rt run` would end with at once, of a pipeline that does not fit
     a scene. Its place is one of the `files` of scene and pipeline, or `--set` for what is `changed` there, or stands
     in a file that comes with the package; `named`: whether the user named the schemes."""
     from rislam_rt.cli.run import panel_schemes, without_schemes
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import check_run
     from rislam_rt.scene.findings import error_at
 

@@ -8,11 +8,10 @@ import typer
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, Settings
 from rislam_rt.cli.output_files import write_json
 from rislam_rt.shipped import name_from_here, room_beside
+from rislam_rt.toml import toml_value
 
 if TYPE_CHECKING:
     from rislam_rt.pipeline.specification.settings_list import Setting
-
-Value = dict[str, Any]
 
 
 def command(
@@ -44,8 +43,6 @@ def command(
 def _print_file(settings: "list[Setting]", spec: Any, folder: Path) -> None:
     """Print all settings of `config` as TOML, each under one line on its meaning; those without a value as comments.
     Rooms are named as a file in the working folder names them, for that is where the output is put."""
-    from rislam_rt.toml import toml_value
-
     table = ""
     for one in settings:
         head, _, name = one.key.rpartition(".")
@@ -59,8 +56,6 @@ def _print_file(settings: "list[Setting]", spec: Any, folder: Path) -> None:
 
 def _print_one(one: "Setting", value: Any) -> None:
     """Print value, meaning, range and default of one setting."""
-    from rislam_rt.toml import toml_value
-
     typer.echo(f"{one.key} = {'(not set)' if value is None else toml_value(_plain(value))}")
     typer.echo(_facts(one))
     if not one.required:

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 import typer
 
 from rislam_rt.cli.options import parse_point
+from rislam_rt.errors import ConfigError
+from rislam_rt.toml import parse_toml
 
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files of a room that this program made.")]
 _ROOM = "paper_room"
@@ -67,7 +69,6 @@ def command(
 
     Example: rislam-rt new myroom --template two_scatterers
     """
-    from rislam_rt.errors import ConfigError
     from rislam_rt.scene import new_scene, write_scene
 
     _one_origin(source, floorplan, seed, template)
@@ -101,28 +102,23 @@ def command(
         )
         for remark in remarks:
             typer.echo(f"- {remark}")
-        _tell_left(scene, before)
-        typer.echo(f"{scene}: made from '{source or 'a floor plan'}'; edit its scene.toml")
-        return
-    if seed is not None:
+        made = f"{scene}: made from '{source or 'a floor plan'}'"
+    elif seed is not None:
         from rislam_rt.scene.random_rooms import draw_room
 
         room = draw_room(seed)
         about = f"Made by `rislam-rt new --seed {seed}`: {room.shape}, {room.motion}."
         write_scene(room.scene, scene, overwrite=overwrite, about=about)
-        _tell_left(scene, before)
-        typer.echo(f"{scene}: random room {seed} ({room.shape}, {room.motion}); edit its scene.toml")
-        return
-    folder = new_scene(template, scene, overwrite=overwrite)
+        made = f"{scene}: random room {seed} ({room.shape}, {room.motion})"
+    else:
+        made = f"{new_scene(template, scene, overwrite=overwrite)}: made from '{template}'"
     _tell_left(scene, before)
-    typer.echo(f"{folder}: made from '{template}'; edit its scene.toml")
+    typer.echo(f"{made}; edit its scene.toml")
 
 
 def _named_files(folder: Path) -> set[str]:
     """Files that the scene file in a folder names, of which `new --overwrite` tells those that remain; none where it
     cannot be read."""
-    from rislam_rt.toml import parse_toml
-
     try:
         table = parse_toml((folder / "scene.toml").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -143,8 +139,6 @@ def _tell_left(folder: Path, before: set[str]) -> None:
 
 def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, template: str) -> None:
     """Check that the options of `new` name one origin of the room: a file, a floor plan, a seed or a template."""
-    from rislam_rt.errors import ConfigError
-
     origins = {"--from": source, "--floorplan": floorplan, "--seed": seed, "--template": template}
     given = [name for name, value in origins.items() if value not in (None, _ROOM)]
     if len(given) > 1:
@@ -154,7 +148,6 @@ def _one_origin(source: Path | None, floorplan: str | None, seed: int | None, te
 def _from_xml(source: Path, folder: Path, within: str, useless: list[str], overwrite: bool, carrier_ghz: float) -> None:
     """Part of `rislam-rt new`: a scene folder from an XML scene, for whose units and materials options are
     `useless`."""
-    from rislam_rt.errors import ConfigError
     from rislam_rt.scene.xml import new_from_xml
 
     if useless:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from rislam_rt.cli.output_files import OUTPUT
+from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import parse_number
 from rislam_rt.shipped import find_pipeline, find_room
 
 if TYPE_CHECKING:
     from rislam_rt.arrays import Floats
-    from rislam_rt.pipeline.specification.pipeline_spec import Settings as RunSettings
 
 FARTHEST = 1e5
 """Largest coordinate [m] of a point on the command line, as in a scene."""
@@ -110,8 +111,6 @@ def check_one_scene(scene: Path | None, changed: Sequence[str] | None) -> None:
     ConfigError
         It is.
     """
-    from rislam_rt.errors import ConfigError
-
     if scene is not None and any(setting.partition("=")[0].strip() == "scene" for setting in changed or ()):
         raise ConfigError(f"--set scene: --scene {scene} is given too; leave one of them out")
 
@@ -126,9 +125,6 @@ def parse_point(option: str, text: str, farthest: float = FARTHEST) -> "Floats":
     """
     import numpy as np
 
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.input_messages import parse_number
-
     try:
         values = np.array([parse_number(part) for part in text.split(",")])
     except ValueError:
@@ -140,18 +136,3 @@ def parse_point(option: str, text: str, farthest: float = FARTHEST) -> "Floats":
     if values.shape != (3,) or not np.isfinite(values).all():
         raise ConfigError(f"{option}: '{text[:60]}' received; give three numbers, e.g. {option} 0.5,0.7,0.5")
     return values
-
-
-def settings_of(pipeline: Path, changed: Sequence[str]) -> "RunSettings":
-    """Settings of a pipeline in SI units (radio, receiver, estimators), with the command line's `--set KEY=VALUE` put
-    over them.
-
-    Raises
-    ------
-    ConfigError
-        The pipeline or a setting is unusable.
-    """
-    from rislam_rt.pipeline import load_spec
-    from rislam_rt.pipeline.specification.pipeline_spec import build_settings
-
-    return build_settings(load_spec(pipeline, changed))

@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from rislam_rt.cli.verbosity import with_switches
+from rislam_rt.errors import ConfigError
+from rislam_rt.storage.files import MARK, check_writable, is_device, is_own, json_file, led_to, write_atomic
 
 OUTPUT = "a file to write"
 """Mark, in an option's annotation, of a file that the command writes."""
@@ -48,9 +50,6 @@ def check_output(file: Path | None, option: str = "") -> Path | None:
     StoreError
         Its folder cannot be written to.
     """
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.storage.files import check_writable, is_device, is_own, led_to
-
     if file is None:
         return None
     if file.is_dir():
@@ -72,8 +71,6 @@ def check_ending(option: str, file: Path | None, endings: Sequence[str]) -> None
     ConfigError
         It has that of another.
     """
-    from rislam_rt.errors import ConfigError
-
     if file is not None and file.suffix and file.suffix.lower() not in endings:
         raise ConfigError(f"{option} {file}: not of that ending; give a name that ends in {' or '.join(endings)}")
 
@@ -96,10 +93,8 @@ def study_folder(out: Path | None, name: str, record: Mapping[str, Any], files: 
     StoreError
         It cannot be written to.
     """
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.store.identity import short_name
     from rislam_rt.storage.checksums import checksum
-    from rislam_rt.storage.files import check_writable
 
     folder = out or Path("runs") / short_name(name, checksum(record))
     if folder.exists() and not folder.is_dir():
@@ -133,8 +128,5 @@ def write_json(file: Path | None, content: dict[str, Any]) -> None:
     StoreError
         The disk refused.
     """
-    if file is None:
-        return
-    from rislam_rt.storage.files import MARK, json_file, write_atomic
-
-    write_atomic(file, json_file({**content, "origin": MARK}, indent=2))
+    if file is not None:
+        write_atomic(file, json_file({**content, "origin": MARK}, indent=2))

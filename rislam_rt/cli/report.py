@@ -1,16 +1,16 @@
 """The command `rislam-rt report RUN`: scores a completed run again, draws its page, exports a GIF or Rerun file."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from rislam_rt.cli.options import JsonFile, RunFolder
 from rislam_rt.cli.output_files import OUTPUT, write_json
+from rislam_rt.cli.progress_bars import show_progress
 from rislam_rt.cli.run import show_scores
-
-if TYPE_CHECKING:
-    from rislam_rt.model import SlamResult
+from rislam_rt.errors import ConfigError
+from rislam_rt.storage.files import write_atomic
 
 
 def command(
@@ -29,7 +29,6 @@ def command(
 
     Example: rislam-rt report runs/demo-paper_room-7-0123abcd --rerun demo.rrd
     """
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run
     from rislam_rt.report import write_report
@@ -39,25 +38,17 @@ def command(
     summary, result = read_any(run)
     if rerun is not None:
         from rislam_rt.report.exports.rerun_recording import recording_bytes
-        from rislam_rt.storage.files import write_atomic
 
         write_atomic(rerun, recording_bytes(result, run.resolve().name))
         typer.echo(f"recording: {rerun}")
     if gif is not None:
-        typer.echo(f"moving picture: {_write_gif(result, gif)}")
+        from rislam_rt.report.exports.animation import gif_bytes
+
+        with show_progress() as tell:
+            write_atomic(gif, gif_bytes(result, tell))
+        typer.echo(f"moving picture: {gif}")
     show_scores(summary)
     with hold_run(run):
         page = write_report(result, summary, run)
     typer.echo(f"report: {page}")
     write_json(json, summary)
-
-
-def _write_gif(result: "SlamResult", file: Path) -> Path:
-    """Write the animation of a run as a GIF, with a progress bar."""
-    from rislam_rt.cli.progress_bars import show_progress
-    from rislam_rt.report.exports.animation import gif_bytes
-    from rislam_rt.storage.files import write_atomic
-
-    with show_progress() as tell:
-        write_atomic(file, gif_bytes(result, tell))
-    return file

@@ -1,28 +1,20 @@
 """The command `rislam-rt run PIPELINE`: runs a SLAM pipeline or a study, or goes on with one that was stopped."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rislam_rt.cli.options import (
-    MAIN_JOB,
-    JsonFile,
-    PipelineFile,
-    SceneOption,
-    Settings,
-    StudyOptions,
-    check_one_scene,
-)
+from rislam_rt.cli.interrupts import Interrupted
+from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, StudyOptions, check_one_scene
 from rislam_rt.cli.output_files import write_json
+from rislam_rt.cli.progress_bars import show_progress
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.input_messages import counted
 from rislam_rt.shipped import is_shipped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from rislam_rt.model import Scene
     from rislam_rt.pipeline import PipelineSpec
     from rislam_rt.pipeline.store.identity import RunIdentity
@@ -102,7 +94,7 @@ def run_main_job(spec: "PipelineSpec", given: StudyOptions, *, named: bool) -> N
     compute_run(spec, opened.scene, identity, folder, given)
 
 
-def names_schemes(spec: "PipelineSpec", pipeline: Path, changed: "Sequence[str]") -> bool:
+def names_schemes(spec: "PipelineSpec", pipeline: Path, changed: Sequence[str]) -> bool:
     """For `rislam-rt run`: whether the user named the schemes, in a pipeline of their own or by `--set`."""
     in_file = "schemes" in spec.model_fields_set and not is_shipped(pipeline)
     return in_file or any(setting.partition("=")[0].strip() == "schemes" for setting in changed)
@@ -115,14 +107,14 @@ def panel_schemes(spec: "PipelineSpec", scene: "Scene") -> list[str]:
     return [] if scene.ris is not None else [name for name in spec.schemes if SCHEMES[name].panel]
 
 
-def without_schemes(spec: "PipelineSpec", left_out: "Sequence[str]") -> "PipelineSpec":
+def without_schemes(spec: "PipelineSpec", left_out: Sequence[str]) -> "PipelineSpec":
     """For `rislam-rt run`: a pipeline without the schemes that find no panel; with `no_ris` if none is left."""
     if not left_out:
         return spec
     return spec.model_copy(update={"schemes": [name for name in spec.schemes if name not in left_out] or ["no_ris"]})
 
 
-def show_run(folder: Path, about: "Mapping[str, Any]", given: StudyOptions) -> None:
+def show_run(folder: Path, about: Mapping[str, Any], given: StudyOptions) -> None:
     """For `rislam-rt run`: print the scores of a completed run from its folder, draw its page if that is missing."""
     from rislam_rt.pipeline.long.run import read_any
     from rislam_rt.pipeline.store.run_folder import hold_run, read_summary
@@ -152,8 +144,6 @@ def compute_run(
 
     import numpy as np
 
-    from rislam_rt.cli.interrupts import Interrupted
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.pipeline import run_slam
     from rislam_rt.pipeline.long.run import LongRun, run_long
     from rislam_rt.pipeline.long.slices import is_long

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rislam_rt.cli.options import parse_point
 from rislam_rt.cli.verbosity import warn
+from rislam_rt.errors import ConfigError
 from rislam_rt.shipped import room_beside
 
 if TYPE_CHECKING:
@@ -54,8 +55,6 @@ def scene_of(option: Path | None, spec: "PipelineSpec | Fig4aSpec", pipeline: Pa
     ConfigError
         Neither names one.
     """
-    from rislam_rt.errors import ConfigError
-
     if option is not None:
         return option
     if spec.scene is None:
@@ -72,8 +71,6 @@ def point_in(scene: "Scene", text: str) -> "Floats":
     ConfigError
         It is not three finite numbers, or lies outside.
     """
-    from rislam_rt.errors import ConfigError
-
     point = parse_point("--at", text)
     low, high = scene.bounds
     if (point < low - 1e-9).any() or (point > high + 1e-9).any():

@@ -7,7 +7,9 @@ import typer
 
 from rislam_rt.cli.options import JsonFile, RunFolder
 from rislam_rt.cli.output_files import check_output, write_json
+from rislam_rt.cli.progress_bars import show_progress
 from rislam_rt.cli.verbosity import verbosity, warn
+from rislam_rt.errors import ConfigError
 from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
@@ -74,8 +76,6 @@ def command(
 
 def _recording_file(folder: Path, run: Path, scheme: str) -> Path:
     """Path of the recording of a scheme, checked: the score card is not computed if it cannot be written."""
-    from rislam_rt.errors import ConfigError
-
     if not folder.is_dir() and (folder.exists() or folder.suffix == ".nc"):
         raise ConfigError(f"--save {folder}: names a file; give a folder, for one recording of each scheme")
     file = folder / f"{run.resolve().name}_{scheme}.nc"
@@ -85,7 +85,6 @@ def _recording_file(folder: Path, run: Path, scheme: str) -> Path:
 
 def _recorded(result: "SlamResult", run: Path, *, replay: bool) -> "list[RecordedScheme]":
     """Recordings of all schemes for their score cards, with a progress bar while they are replayed."""
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.studies.unseen.recorded_run import recorded_schemes, replay_seconds
 
     if not replay:

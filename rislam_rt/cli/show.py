@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file, settings_of
+from rislam_rt.cli.options import MAIN_JOB, Depth, SceneFolder, Settings, pipeline_file
 from rislam_rt.cli.output_files import OUTPUT, check_ending, check_output
+from rislam_rt.cli.progress_bars import show_progress
+from rislam_rt.storage.files import write_atomic
 
 if TYPE_CHECKING:
     from rislam_rt.model import Scene
@@ -37,13 +39,14 @@ def command(
 
     Example: rislam-rt show office --html office.html --depth 2
     """
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.cli.scene_arguments import open_scene
+    from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.report.terminal_tables import print_scene
     from rislam_rt.scene.scene_folder import safe_name
 
     check_ending("--html", html, (".html", ".htm"))
-    settings = settings_of(pipeline, set_ or ()) if html is not None else None
+    settings = build_settings(load_spec(pipeline, set_ or ())) if html is not None else None
     if out is not None:
         from rislam_rt.report.style import picture_kind
 
@@ -69,10 +72,8 @@ def command(
 def _write_view(room: "Scene", settings: "Records", depth: int, file: Path) -> Path:
     """Part of `rislam-rt show --html`: write the view of a scene with the paths at some poses of its trajectory."""
     from rislam_rt.channel.image_source import ImageSourceChannel
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.report.view.page import view_page
     from rislam_rt.report.view.paths_data import paths_data, poses_of
-    from rislam_rt.storage.files import write_atomic
 
     with show_progress() as tell:
         tell("paths", 0, 2)

@@ -10,6 +10,9 @@ from rislam_rt.cli.options import MAIN_JOB, JsonFile, Settings, parse_point, pip
 from rislam_rt.cli.output_files import write_json
 from rislam_rt.cli.verbosity import warn
 from rislam_rt.constants import MAX_SPEED
+from rislam_rt.errors import ConfigError
+from rislam_rt.input_messages import parse_number
+from rislam_rt.storage.files import check_writable
 
 if TYPE_CHECKING:
     from rislam_rt.model import Body
@@ -86,16 +89,21 @@ def command(
     from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.storage.files import write_all
+    from rislam_rt.storage.netcdf import NETCDF
 
     spec = load_spec(config, set_ or ())
     stds = (spec.start.position_std_m, spec.start.velocity_std_m_s, float(np.deg2rad(spec.start.heading_std_deg)))
     prior = None if start is None else _prior(start, velocity or "0,0,0", stds, heading)
     options = {"--start": start, "--velocity": velocity, "--heading": heading, "--tx": tx, "--rx": rx}
-    _check_no_second_start(measurements, options)
+    given = [option for option, value in options.items() if value is not None]
+    if given and measurements.suffix.lower() in NETCDF:
+        raise ConfigError(f"{', '.join(given)}: {measurements} brings its own start, Tx and Rx; leave it out")
     body = _body(tx, rx)
     inputs = read_inputs(measurements, prior, build_radio(spec.radio), body)
     if prior is not None:
-        _check_body(measurements, body)
+        if body is None:  # a baseline that is not the agent's own is an error of centimetres that no deviation shows
+            where = "a CSV file does not say where Tx and Rx sit on the agent"
+            raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
         inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
     for line in input_warnings(inputs):
         warn(f"{measurements}: {line}")
@@ -111,23 +119,11 @@ def command(
     write_json(json, summary)
 
 
-def _check_no_second_start(measurements: Path, options: dict[str, str | None]) -> None:
-    """Check that `rislam-rt slam` is not given by options what a NetCDF file of measurements brings: start, offsets."""
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.storage.netcdf import NETCDF
-
-    given = [option for option, value in options.items() if value is not None]
-    if given and measurements.suffix.lower() in NETCDF:
-        raise ConfigError(f"{', '.join(given)}: {measurements} brings its own start, Tx and Rx; leave it out")
-
-
 def _prior(start: str, velocity: str, stds: tuple[float, float, float], heading: str | None = None) -> "StartPrior":
     """Start prior for `rislam-rt slam` from the options `--start`, `--velocity` and `--heading`; without a heading, it
     is along the velocity."""
     import numpy as np
 
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.input_messages import parse_number
     from rislam_rt.slam import StartPrior
 
     first, speed = parse_point("--start", start), parse_point("--velocity", velocity)
@@ -149,7 +145,6 @@ def _with_heading(inputs: "Inputs", heading: str | None, mode: str, measurements
     without either, the direction of the velocity and its deviation where the heading is estimated."""
     import numpy as np
 
-    from rislam_rt.errors import ConfigError
     from rislam_rt.slam.start_prior import heading_from_velocity
 
     compass = not np.isnan(inputs.heading).any()
@@ -166,7 +161,6 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
     """Offsets of Tx and Rx for `rislam-rt slam` from the options `--tx` and `--rx`; None without them."""
     import numpy as np
 
-    from rislam_rt.errors import ConfigError
     from rislam_rt.model import Body
 
     if tx is None and rx is None:
@@ -180,21 +174,8 @@ def _body(tx: str | None, rx: str | None) -> "Body | None":
     return Body(*ends)
 
 
-def _check_body(measurements: Path, body: "Body | None") -> None:
-    """Check that `rislam-rt slam` is given the offsets of Tx and Rx with a table of measurements, which has none: a
-    baseline that is not the agent's own is an error of centimetres that no deviation shows."""
-    from rislam_rt.errors import ConfigError
-
-    if body is None:
-        where = "a CSV file does not say where Tx and Rx sit on the agent"
-        raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
-
-
 def _new_folder(folder: Path) -> Path:
     """Output folder of `rislam-rt slam`, which must not exist or be empty."""
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.storage.files import check_writable
-
     try:
         place = Path(os.path.realpath(folder))  # `x/..` is there though `x` is not
         taken = place.exists() and (not place.is_dir() or any(place.iterdir()))

@@ -1,16 +1,17 @@
 """The command `rislam-rt sweep PIPELINE`: runs a SLAM pipeline over axes of settings and over seeds."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rislam_rt.cli.interrupts import Interrupted
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, check_one_scene
 from rislam_rt.cli.output_files import write_json
+from rislam_rt.cli.progress_bars import show_sweep
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rislam_rt.sweeps import Row, Sweep, SweepOptions, SweepReport
 
 
@@ -45,7 +46,6 @@ def command(
     """
     import os
 
-    from rislam_rt.cli.interrupts import Interrupted
     from rislam_rt.report.terminal_tables import print_sweep
     from rislam_rt.studies.pipeline_sweep import default_folder, load_section, score_rows, slam_sweep
     from rislam_rt.sweeps import SweepOptions
@@ -71,7 +71,6 @@ def command(
 
 def _run(sweep: "Sweep", target: Path, effort: "SweepOptions") -> "SweepReport":
     """Part of `rislam-rt sweep`: run the cells with a progress bar, updating scores and their figure as cells end."""
-    from rislam_rt.cli.progress_bars import show_sweep
     from rislam_rt.pipeline.channels import prepare_channel
     from rislam_rt.report.studies.sweep import draw_scores
     from rislam_rt.studies.pipeline_sweep import score_rows, write_scores

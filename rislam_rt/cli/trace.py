@@ -8,6 +8,9 @@ import typer
 
 from rislam_rt.cli.options import ChannelName, Depth, JsonFile, SceneFolder
 from rislam_rt.cli.output_files import OUTPUT, check_ending, check_output, write_json
+from rislam_rt.cli.progress_bars import show_progress
+from rislam_rt.errors import ConfigError
+from rislam_rt.storage.files import MARK
 
 if TYPE_CHECKING:
     from rislam_rt.model import Paths, RadioConfig, Scene
@@ -64,11 +67,10 @@ def command(
     Example: rislam-rt trace paper_room --stride 50 --deepmimo scenarios/paper_room
     """
     from rislam_rt.cli.scene_arguments import open_scene
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.channels import prepare_channel
     from rislam_rt.pipeline.signal_simulation import load_signals_spec, signal_settings
     from rislam_rt.pipeline.specification.read_pipeline import load_radio
-    from rislam_rt.report.exports.deepmimo import deepmimo_files
+    from rislam_rt.report.exports.deepmimo import check_name, deepmimo_files
     from rislam_rt.report.terminal_tables import path_table, print_paths
     from rislam_rt.scene.scene_folder import safe_name
     from rislam_rt.scene.write import write_files
@@ -82,7 +84,9 @@ def command(
     opened = open_scene(scene, radio)
     room = _part_of_motion(opened.scene, cycles, stride)
     if deepmimo is not None:
-        _check_new(deepmimo)
+        check_name(deepmimo.name)
+        if deepmimo.exists():
+            raise ConfigError(f"--deepmimo {deepmimo}: exists already; give a folder that does not exist yet")
     prepare_channel(channel)
     if signals:
         traced = _trace_signals(
@@ -102,21 +106,10 @@ def command(
     write_json(json, {**content, "seconds": traced.seconds, "classes": table, **traced.content})
 
 
-def _check_new(folder: Path) -> None:
-    """Check the folder of `rislam-rt trace --deepmimo` before paths are traced: new, and of a name that loads."""
-    from rislam_rt.errors import ConfigError
-    from rislam_rt.report.exports.deepmimo import check_name
-
-    check_name(folder.name)
-    if folder.exists():
-        raise ConfigError(f"--deepmimo {folder}: exists already; give a folder that does not exist yet")
-
-
 def _part_of_motion(scene: "Scene", cycles: int | None, stride: int) -> "Scene":
     """Scene for `rislam-rt trace` with every `stride`-th of its first `cycles`; an error if it has fewer."""
     from dataclasses import replace
 
-    from rislam_rt.errors import ConfigError
     from rislam_rt.pipeline.run import check_one_piece
 
     if cycles is not None and cycles > len(scene.agent):
@@ -132,7 +125,6 @@ def _trace_paths(scene: "Scene", radio: "RadioConfig", channel: str, depth: int,
 
     from rislam_rt.pipeline.channels import build_channel
     from rislam_rt.pipeline.run_datasets import paths_to_dataset
-    from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
     begin = perf_counter()
@@ -153,9 +145,7 @@ def _trace_signals(
 
     import numpy as np
 
-    from rislam_rt.cli.progress_bars import show_progress
     from rislam_rt.pipeline import signal_simulation
-    from rislam_rt.storage.files import MARK
     from rislam_rt.storage.netcdf import write_dataset
 
     check_output(file)

@@ -9,11 +9,10 @@ Astron. Astrophys. 22, 1984): strong paths first, fainter ones as the array gets
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Complexes, Floats
+from rislam_rt.arrays import Complexes
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
@@ -38,19 +37,6 @@ STRAY, LEAST_STRAY = 0.1, 1e-3
 it is as found in the last round."""
 
 
-class CalibrationReference(NamedTuple):
-    """Known inputs of a front end's calibration: sounding, search grid, direct path and noise."""
-
-    sounding: Sounding
-    grid: MatchedFilterGrid
-    window: tuple[float, float]
-    """First and last delay in resolution cells."""
-    direct: Floats
-    """(3,) delay of the direct path in cells, and its two cosines."""
-    noise: float
-    """N0 [J]."""
-
-
 def calibrate(
     samples: Sequence[Complexes], body: Body, radio: RadioConfig, config: ReceiverConfig, *, swinging: bool = False
 ) -> Correction:
@@ -63,61 +49,52 @@ def calibrate(
     swinging
         Whether the gain changes from cycle to cycle; it is then measured on the direct path.
     """
-    known = _known(body, radio, config)
-    unit = np.full(1, 1.0 / np.sqrt(known.sounding.num_samples), dtype=np.complex128)
-    direct = waves_at(known.sounding, known.direct[None]).sum(unit)
+    sounding = build_sounding(num_tones(radio, config), radio)
+    window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
+    grid, span = build_grid(sounding, window), body.tx_offset - body.rx_offset
+    length = float(np.linalg.norm(span))
+    place = np.array([[length / SPEED_OF_LIGHT * radio.bandwidth, *(span[:2] / length)]])  # of the direct path
+    unit = np.full(1, 1.0 / np.sqrt(sounding.num_samples), dtype=np.complex128)
+    direct = waves_at(sounding, place).sum(unit)
     heard = np.array(samples)
     loudness = 0.0
     if swinging:
         level = np.abs(np.einsum("lm,tlm->t", direct.conj(), heard))
         loudness = float(np.median(level))
         heard = heard * (loudness / level)[:, None, None]
-    matrix = np.diag(_chains(heard.mean(axis=0), direct))
+    chains = np.sum(heard.mean(axis=0) * direct.conj(), axis=1)
+    matrix = np.diag(np.asarray(chains / np.mean(chains)))  # gain and phase of every chain, of mean one
     residue: Complexes = np.zeros_like(heard[0])
     image = np.zeros(len(residue), dtype=np.complex128)
     spread, stray = float(np.mean(np.abs(heard) ** 2)), STRAY
     for faintest in FAINTEST:
         plain, inverse = heard - image[:, None] * image_spectrum(heard) - residue, np.linalg.inv(matrix)
-        drawn = np.array([_ideal_samples(inverse @ one, known, faintest) for one in plain])
+        drawn = np.array(
+            [_ideal_samples(inverse @ one, sounding, grid, window, radio.noise_psd, faintest) for one in plain]
+        )
         matrix = _array_matrix(plain, drawn, matrix, spread, stray)
         stray = max(float(np.sqrt(np.mean(np.abs(matrix - np.diag(np.diag(matrix))) ** 2))), LEAST_STRAY)
         model = matrix @ drawn
         image = _image(heard - residue - model, heard)
         rest = heard - image[:, None] * image_spectrum(heard) - model
         residue, spread = _constant_residue(rest)
-    left = max(spread - known.noise, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
+    left = max(spread - radio.noise_psd, 0.0) / float(np.mean(np.abs(heard - residue) ** 2))
     return Correction(np.asarray(np.linalg.inv(matrix)), residue, image, direct, loudness, left)
 
 
-def _known(body: Body, radio: RadioConfig, config: ReceiverConfig) -> CalibrationReference:
-    """What is known before calibration, from the body's drawing and the settings of radio and receiver."""
-    span = body.tx_offset - body.rx_offset
-    length = float(np.linalg.norm(span))
-    sounding = build_sounding(num_tones(radio, config), radio)
-    window = (config.min_delay * radio.bandwidth, config.max_delay * radio.bandwidth)
-    direct = np.array([length / SPEED_OF_LIGHT * radio.bandwidth, *(span[:2] / length)])
-    return CalibrationReference(sounding, build_grid(sounding, window), window, direct, radio.noise_psd)
-
-
-def _chains(mean: Complexes, direct: Complexes) -> Complexes:
-    """Complex gains (L,) of the receive chains by calibration, of mean one, from the direct path in samples (L, M)."""
-    chains = np.sum(mean * direct.conj(), axis=1)
-    return np.asarray(chains / np.mean(chains))
-
-
-def _ideal_samples(samples: Complexes, known: CalibrationReference, faintest: float) -> Complexes:
+def _ideal_samples(
+    samples: Complexes, sounding: Sounding, grid: MatchedFilterGrid, window: tuple[float, float], noise: float,
+    faintest: float,
+) -> Complexes:  # fmt: skip
     """Samples (L, M) that an ideal array would receive of the strong paths in calibrated samples, without ghosts."""
-    scaled = samples / np.sqrt(known.noise)
-    found = estimate_paths(known.sounding, known.grid, scaled, LOUD, known.window, MOST).fit
-    kept = found.parameters[_paths(found.parameters[:, 0], np.abs(found.amplitude), faintest)]
-    fit = fit_amplitudes(known.sounding, kept, scaled)
-    return fit.waves.sum(fit.amplitude * np.sqrt(known.noise))
-
-
-def _paths(delay: Floats, strength: Floats, faintest: float) -> Booleans:
-    """Which paths (P,) calibration uses: none so much weaker than one of about its delay that it may be its ghost."""
+    scaled = samples / np.sqrt(noise)
+    found = estimate_paths(sounding, grid, scaled, LOUD, window, MOST)
+    delay, strength = found.parameters[:, 0], np.abs(found.amplitude)
     near = np.abs(delay[:, None] - delay) < GHOST_CELLS
-    return np.asarray(strength >= faintest * np.max(near * strength, axis=1, initial=0.0))
+    # none so much weaker than one of about its delay that it may be its ghost
+    kept = found.parameters[strength >= faintest * np.max(near * strength, axis=1, initial=0.0)]
+    fit = fit_amplitudes(sounding, kept, scaled)
+    return fit.waves.sum(fit.amplitude * np.sqrt(noise))
 
 
 def _array_matrix(plain: Complexes, drawn: Complexes, matrix: Complexes, spread: float, stray: float) -> Complexes:

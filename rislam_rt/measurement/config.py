@@ -8,8 +8,6 @@ from annotated_types import Ge, Gt, Le
 from rislam_rt.errors import ConfigError
 from rislam_rt.ranges import check_ranges
 
-ORDERS = ("ABBA", "AB")
-"""Values of `ReceiverConfig.order`: orders of a code and its phase-reversed one within the slot."""
 MOST_TONES = 65536
 """Largest number of tones of a sounding: memory and time of the estimator grow with it."""
 Threshold = Annotated[float, Ge(2.0), Le(60.0)]

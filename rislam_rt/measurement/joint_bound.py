@@ -5,7 +5,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.measurement.components import ComponentErrors, NoiselessComponents, in_resolution_cells, join
 from rislam_rt.measurement.config import ReceiverConfig
-from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding, inner_of, waves_at
+from rislam_rt.measurement.estimation.path_signals import build_sounding, inner_of, waves_at
 from rislam_rt.measurement.estimation.refine import joint_bound
 from rislam_rt.measurement.received_paths import Received
 from rislam_rt.measurement.received_signal import num_tones
@@ -40,7 +40,8 @@ def joint_errors(
         leader = _absorbed(strength * unit * np.sqrt(sounding.num_samples) < LEAST_CERTAINTY, near)
     while True:
         parts = join(received, leader)
-        covariance, variance = _bound(parts, sounding, radio, unit)
+        parameters = np.column_stack([parts.tau * radio.bandwidth, parts.cosines])
+        covariance, variance = joint_bound(inner_of(sounding, waves_at(sounding, parameters)), parts.gain * unit)
         rows = np.unique(leader)
         certainty = np.abs(parts.gain) * unit / np.sqrt(variance)
         doubtful = rows[np.argsort(certainty)[: np.sum(certainty < LEAST_CERTAINTY)]]
@@ -48,12 +49,6 @@ def joint_errors(
         if np.array_equal(merged, leader):
             return parts, _draw(parts, covariance, np.sqrt(variance) / unit, draws, radio)
         leader = merged
-
-
-def _bound(parts: NoiselessComponents, sounding: Sounding, radio: RadioConfig, unit: float) -> tuple[Floats, Floats]:
-    """Joint bound of components: covariance (3N, 3N) of delays and cosines, variance (N,) of amplitudes, in `unit`."""
-    parameters = np.column_stack([parts.tau * radio.bandwidth, parts.cosines])
-    return joint_bound(inner_of(sounding, waves_at(sounding, parameters)), parts.gain * unit)
 
 
 def _absorbed(faint: Booleans, near: Floats) -> Integers:

@@ -15,8 +15,9 @@ from rislam_rt.measurement.components import ReportedComponents, capped_cosine_s
 from rislam_rt.measurement.config import ReceiverConfig
 from rislam_rt.measurement.detection_threshold import detection_threshold
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, build_grid
-from rislam_rt.measurement.estimation.estimate import NOTHING, Estimate, estimate_paths
+from rislam_rt.measurement.estimation.estimate import NOTHING, estimate_paths
 from rislam_rt.measurement.estimation.path_signals import Sounding, build_sounding
+from rislam_rt.measurement.estimation.refine import LeastSquaresFit, accuracy
 from rislam_rt.measurement.hardware import FrontEnd, SentSignal, digitise, draw_gain_variation, scaled_to_fit
 from rislam_rt.measurement.joint_bound import LEAST_CERTAINTY
 from rislam_rt.measurement.panel_probability import panel_probability
@@ -166,8 +167,8 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     sounding, grid = _searched(one.samples.shape[1], window, radio, config)
     threshold = detection_threshold(radio, config)
     samples = one.samples / np.sqrt(one.noise_psd)
-    found = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
-    parameters, gain, deviation, amplitude_std = _resolved(found, one.samples.size, radio)
+    fit = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
+    parameters, gain, deviation, amplitude_std = _resolved(fit, one.samples.size, radio)
     cosines = clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))
     variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
@@ -193,15 +194,15 @@ def _searched(
     return sounding, build_grid(sounding, window)
 
 
-def _resolved(found: Estimate, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
+def _resolved(fit: LeastSquaresFit, samples: int, radio: RadioConfig) -> tuple[Floats, Complexes, Floats, Floats]:
     """Components of the waveform receiver after merging estimated paths that cannot be resolved: parameters (N, 3),
     gains (N,), their standard deviations (N, 3), (N,)."""
     # Paths between which the data cannot share the amplitude out are reported as one, as wide as they lie apart.
-    parameters, amplitude, bound = found.fit.parameters, found.fit.amplitude, found.accuracy
+    parameters, amplitude, bound = fit.parameters, fit.amplitude, accuracy(fit)
     label = _groups(parameters, np.abs(amplitude) < LEAST_CERTAINTY * bound.amplitude, radio)
     member = (label == np.unique(label)[:, None]).astype(np.float64)
     gain = member @ amplitude
-    spread = np.real(np.sum((member @ found.fit.covariance) * member, axis=1))
+    spread = np.real(np.sum((member @ fit.covariance) * member, axis=1))
     single = member.sum(axis=1) == 1
     share = member * np.abs(amplitude)
     share /= share.sum(axis=1, keepdims=True)

@@ -36,9 +36,12 @@ def metres(value: float | None) -> str:
 def metres_between(entry: Mapping[str, Any], name: str = "rmse") -> str:
     """Table cell in Markdown: an entry's error in metres with its interval."""
     value, low, high = (entry[f"{name}{end}_m"] for end in ("", "_low", "_high"))
-    if value is None or low is None:
-        return metres(value)
-    return f"{value:.3f} ({low:.3f} to {high:.3f})"
+    return metres(value) if value is None or low is None else between(value, low, high)
+
+
+def between(value: float, low: float, high: float, digits: int = 3) -> str:
+    """Table cell in Markdown: a number with its interval."""
+    return f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
 
 def ratio(value: float | None) -> str:

@@ -2,7 +2,7 @@
 
 import base64
 import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -105,13 +105,12 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
     title = f"{result.name} in {result.scene.name}"
     about = f"{summary['cycles']} cycles, seed {summary['seed']}, paths {result.paths.source} in "
     about += f"{summary['trace_seconds']:.1f} s."
-    names = list(summary["schemes"])
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
-    cells = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in summary_rows(summary))
-    rows = "".join(f"<tr>{row}</tr>" for row in cells)
-    said = judge_run(result, summary)
-    lacks = {name: [*said.lost[name], *(f"not found: {one}" for one in said.missing[name])] for name in said.schemes}
-    sentences = "".join(f"<li>{html.escape(text)}{_bullets(lacks[name])}</li>" for name, text in said.schemes.items())
+    rows = "".join(f"<tr>{_elements('td', row)}</tr>" for row in summary_rows(summary))
+    said, sentences = judge_run(result, summary), ""
+    for name, text in said.schemes.items():
+        lacks = [*said.lost[name], *(f"not found: {one}" for one in said.missing[name])]
+        nested = f"<ul>{_elements('li', lacks)}</ul>" if lacks else ""
+        sentences += f"<li>{html.escape(text)}{nested}</li>"
     figures = "".join(
         f'<figure><img alt="{html.escape(CAPTIONS[name])}" src="data:image/png;base64,'
         f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
@@ -133,7 +132,7 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
 <p class="note">{html.escape(about)} The map: what each agent believed at a time; its codes; drag to turn.</p>
 {warnings}{figures}
 <h2>RMSE</h2>
-<div class="scroll"><table><tr><th></th>{head}</tr>{rows}</table></div>
+<div class="scroll"><table><tr><th></th>{_elements("th", summary["schemes"])}</tr>{rows}</table></div>
 <p class="note">Agent and landmarks: over the cycles (for a landmark, those in which the map holds it).
 Relative to its start: without what the agent was told wrong of it
 (within {100.0 * result.config["start"]["position_std_m"]:.3g} cm an axis), which no measurement can mend. Path aligned:
@@ -156,6 +155,6 @@ so and the error is more than {FAR_OVER:g} of its own deviations, too.</p>
 """
 
 
-def _bullets(lines: Sequence[str]) -> str:
-    """HTML list of what a scheme lacks: why it was lost, landmarks not found; empty without any."""
-    return f"<ul>{''.join(f'<li>{html.escape(line)}</li>' for line in lines)}</ul>" if lines else ""
+def _elements(tag: str, texts: Iterable[str]) -> str:
+    """HTML elements of a page, table cells or list items, that hold these texts."""
+    return "".join(f"<{tag}>{html.escape(text)}</{tag}>" for text in texts)

@@ -1,6 +1,6 @@
 """Tables for the terminal: scores of runs and studies, path classes, channel comparisons, designs, sweeps, scenes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.pipeline.scores.loss_causes import is_unnoticed, words_of_loss
 from rislam_rt.pipeline.scores.wall_scores import PlaneScore, found_of_heard, plane_scores
+from rislam_rt.report.markdown import ratio
 from rislam_rt.shipped import short_names
 
 if TYPE_CHECKING:
@@ -35,34 +36,11 @@ def print_summary(summary: Mapping[str, Any]) -> None:
 def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """Rows of the terminal table of a run's scores: label, then one cell for each scheme."""
     schemes = list(summary["schemes"].values())
-    first = schemes[0]
-    relative, aligned = ([s[key] for s in schemes] for key in ("relative_rmse_m", "rmse_aligned_m"))
-    rows = [
-        ["agent", *(_metres(s["rmse_m"]) for s in schemes)],
-        ["agent, largest error", *(_metres(s["largest_m"]) for s in schemes)],
-        ["agent, relative to its start", *("-" if error is None else _metres(error) for error in relative)],
-        ["agent, path aligned", *("-" if error is None else _metres(error) for error in aligned)],
-        *(
-            [f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)]
-            for name in first["landmarks"]
-        ),
-        *_panel_rows(schemes),
-        *_wall_rows(schemes),
-    ]
-    shares = [[share_text(s["association"][name]) for name in ("precision", "recall")] for s in schemes]
-    rows += [
-        ["posterior bound of the agent", *(_fine(s["bound_m"]) for s in schemes)],
-        ["agent over it", *(_over(s, "") for s in schemes)],
-        ["bound relative to the start", *(_fine(s["relative_bound_m"]) for s in schemes)],
-        ["agent over it, relative to its start", *(_over(s, "relative_") for s in schemes)],
-        ["NEES per degree of freedom", *(_number(s["nees_per_dof"]) for s in schemes)],
-        ["GOSPA of the map", *(_metres(s["map"]["gospa_m"]) for s in schemes)],
-        ["association: precision, recall", *map(", ".join, shares)],
-        ["slower than its budget", *(", ".join(s["over_budget"]) or "no step" for s in schemes)],
-        ["diverged", *(_diverged(s) for s in schemes)],
-        ["lost, relative to its start", *(_lost(s["true_loss"]) for s in schemes)],
-        ["held itself for lost", *(_said(s["outcomes"]) for s in schemes)],
-    ]
+    rows = [[label, *map(show, schemes)] for label, show in ERRORS.items()]
+    for name in schemes[0]["landmarks"]:
+        rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
+    rows += [*_panel_rows(schemes), *_wall_rows(schemes)]
+    rows += [[label, *map(show, schemes)] for label, show in SCORES.items()]
     if any(s["lost"]["times"] for s in schemes):
         rows.append(["because", *(words_of_loss(s["lost"]) if s["lost"]["times"] else "-" for s in schemes)])
     return rows
@@ -83,7 +61,8 @@ def _panel_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 def _wall_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """Rows of a terminal table: how many walls each scheme found of those heard for `HEARD` seconds, and ghosts; each
     wall that was heard or found; how many there are else. Walls in one plane are one."""
-    found = [f"{found_of_heard(s['walls'])}{_ghosts(s['ghost_walls'])}" for s in schemes]
+    ghosts = [f", {counted(s['ghost_walls'], 'ghost')}" if s["ghost_walls"] else "" for s in schemes]
+    found = [found_of_heard(s["walls"]) + more for s, more in zip(schemes, ghosts, strict=True)]
     asked = all(plane.heard is not None for s in schemes for plane in plane_scores(s["walls"]))
     rows, others = [["walls found of those heard" if asked else "walls found", *found]], 0
     for planes in zip(*(plane_scores(s["walls"]) for s in schemes), strict=True):
@@ -94,16 +73,6 @@ def _wall_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:
         rows.append([f"wall {first}{f' (+{len(more)} in its plane)' if more else ''}", *map(_wall, planes)])
     why = f"not heard for {HEARD:g} s" if asked else "not found"
     return rows + ([[counted(others, "other wall"), *(why for _ in schemes)]] if others else [])
-
-
-def _ghosts(count: int) -> str:
-    """Part of a cell of a terminal table: how many ghost walls there are, empty without any."""
-    return f", {counted(count, 'ghost')}" if count else ""
-
-
-def _diverged(scores: Mapping[str, Any]) -> str:
-    """Cell of a terminal table: whether a scheme diverged by the truth, and whether it noticed."""
-    return "yes, without noticing" if is_unnoticed(scores) else "yes" if scores["diverged"] else "no"
 
 
 def _lost(loss: Mapping[str, Any] | None) -> str:
@@ -126,15 +95,35 @@ def _fine(value: float | None) -> str:
     return f"{1000.0 * value:.2f} mm" if value < 0.01 else _metres(value)
 
 
-def _number(value: float | None) -> str:
-    """Cell of a terminal table: a number of two digits after the point."""
-    return "-" if value is None else f"{value:.2f}"
-
-
 def _said(outcomes: Mapping[str, int]) -> str:
     """Cell of a terminal table: in how many cycles the estimator itself reported divergence."""
     cycles = outcomes.get("diverged", 0)
     return f"in {cycles} of {sum(outcomes.values())} cycles" if cycles else "never"
+
+
+ERRORS: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "agent": lambda s: _metres(s["rmse_m"]),
+    "agent, largest error": lambda s: _metres(s["largest_m"]),
+    "agent, relative to its start": lambda s: _metres(s["relative_rmse_m"], "-"),
+    "agent, path aligned": lambda s: _metres(s["rmse_aligned_m"], "-"),
+}
+SCORES: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    "posterior bound of the agent": lambda s: _fine(s["bound_m"]),
+    "agent over it": lambda s: _over(s, ""),
+    "bound relative to the start": lambda s: _fine(s["relative_bound_m"]),
+    "agent over it, relative to its start": lambda s: _over(s, "relative_"),
+    "NEES per degree of freedom": lambda s: ratio(s["nees_per_dof"]),
+    "GOSPA of the map": lambda s: _metres(s["map"]["gospa_m"]),
+    "association: precision, recall": lambda s: (
+        f"{share_text(s['association']['precision'])}, {share_text(s['association']['recall'])}"
+    ),
+    "slower than its budget": lambda s: ", ".join(s["over_budget"]) or "no step",
+    "diverged": lambda s: "yes, without noticing" if is_unnoticed(s) else "yes" if s["diverged"] else "no",
+    "lost, relative to its start": lambda s: _lost(s["true_loss"]),
+    "held itself for lost": lambda s: _said(s["outcomes"]),
+}
+"""Rows of a scheme's scores by their labels, before those of the landmarks and walls and after: functions that make a
+cell."""
 
 
 def path_table(paths: Paths) -> list[dict[str, Any]]:
@@ -188,7 +177,8 @@ def print_comparison(name: str, refined: "PathReport", raw: "PathReport") -> Non
         table.add_row(f"largest {label} error", *(f"{content[key]:.2g} {unit}" for content in contents))
     for quantity in contents[0]["limits"]:
         label = f"{quantity.split(' [')[0]}: nearest to its limit"
-        table.add_row(label, *(_nearest(content["limits"][quantity]) for content in contents))
+        limits = (content["limits"][quantity] for content in contents)
+        table.add_row(label, *(f"{limit['nearest']['share']:.1%}" if limit else "-" for limit in limits))
     _show(title, table)
     for report, numbers in ((raw, "float32"), (refined, "refined")):
         _print_faults(report, numbers, "cycle")
@@ -202,11 +192,6 @@ def _print_faults(report: "PathReport", of: str, at: str) -> None:
         print(f"unexplained: {of}, {at} {path.cycle}, {path.label}, only {path.side}")
     for breach in report.breaches[:10]:
         print(f"beyond its limit: {of}, {breach}")
-
-
-def _nearest(limits: "Mapping[str, Any]") -> str:
-    """Cell of a terminal table: the largest ratio of a path's error to its limit."""
-    return f"{limits['nearest']['share']:.1%}" if limits else "-"
 
 
 def print_validation(rows: Sequence["Validation"]) -> None:
@@ -289,10 +274,10 @@ def _show(title: str, table: Table) -> None:
     console.print(table)
 
 
-def _metres(value: float | None) -> str:
-    """Cell of a terminal table: an error in centimetres, or in metres from one on; `not found` if None."""
+def _metres(value: float | None, unknown: str = "not found") -> str:
+    """Cell of a terminal table: an error in centimetres, or in metres from one on; `unknown` if None."""
     if value is None:
-        return "not found"
+        return unknown
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
 
 

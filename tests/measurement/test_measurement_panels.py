@@ -2,18 +2,19 @@
 
 from dataclasses import replace
 from itertools import combinations
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from rislam_rt.information import measurement_std
 from rislam_rt.measurement import ReceiverConfig, load_signals, measure, signals_dataset
-from rislam_rt.measurement.config import ORDERS
 from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.slot_motion import code_signs, codes_in_turn, slot_mean, split_by_code
 from rislam_rt.model import PathKind, Paths, RadioConfig, Trajectory
 
 RADIO = RadioConfig()
+ORDERS = get_args(get_type_hints(ReceiverConfig)["order"])
 BOTH = ReceiverConfig(clutter_rate=0.0, alternation=True, panels=2)
 UP = (0.3, -0.2, 0.9)
 SHIFT = 6.0

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -11,7 +12,6 @@ from rislam_rt.channel.doppler import doppler_shift, turn_rate
 from rislam_rt.channel.image_source import ImageSourceChannel
 from rislam_rt.measurement import ReceiverConfig, measure, receive, slot_motion
 from rislam_rt.measurement.components import ReportedComponents
-from rislam_rt.measurement.config import ORDERS
 from rislam_rt.measurement.panel_probability import panel_probability
 from rislam_rt.measurement.slot_motion import code_signs, slot_mean, slot_weights, split_by_code
 from rislam_rt.model import PathKind, RadioConfig
@@ -19,6 +19,7 @@ from rislam_rt.scene import load_scene
 
 ROOM = Path(__file__).parents[2] / "scenes" / "paper_room"
 RADIO = RadioConfig()
+ORDERS = get_args(get_type_hints(ReceiverConfig)["order"])
 SPLIT = ReceiverConfig(clutter_rate=0.0, alternation=True)
 UP = (0.3, -0.2, 0.9)
 FASTEST = 0.2 / RADIO.wavelength

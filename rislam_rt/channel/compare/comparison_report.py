@@ -10,6 +10,11 @@ from rislam_rt.arrays import Floats, Integers, freeze
 from rislam_rt.channel.compare.error_limits import ErrorLimits
 from rislam_rt.model import PathKind
 
+ERRORS = {
+    "length_error_m": "length_error", "gain_error_db": "gain_error_db", "gain_error": "gain_error",
+    "phase_error_rad": "phase_error", "aod_error_rad": "aod_error", "aoa_error_rad": "aoa_error",
+}  # fmt: skip
+"""Fields of a report with errors, by their names in JSON."""
 MOST_LISTED = 20
 """Largest number of limit violations that a report lists, the worst first; all are counted."""
 
@@ -83,8 +88,7 @@ class PathReport:
     def __post_init__(self) -> None:
         freeze(self, np.int64, kind=(None,))
         freeze(self, np.int64, **dict.fromkeys(("path", "cycle"), self.kind.shape))
-        errors = ("length_error", "gain_error_db", "gain_error", "phase_error", "aod_error", "aoa_error")
-        freeze(self, np.float64, **dict.fromkeys(errors, self.kind.shape))
+        freeze(self, np.float64, **dict.fromkeys(ERRORS.values(), self.kind.shape))
 
     @property
     def matched(self) -> int:
@@ -157,14 +161,7 @@ class PathReport:
             "limits": {quantity: self._nearest(*pair) for quantity, pair in self.judged.items()},
             "proof_limits_m": self.explanation_limits,
             "matched_by_kind": {k.name: int(np.sum(self.kind == k)) for k in PathKind if np.any(self.kind == k)},
-            "percentiles": {
-                "length_error_m": _percentiles(self.length_error),
-                "gain_error_db": _percentiles(self.gain_error_db),
-                "gain_error": _percentiles(self.gain_error),
-                "phase_error_rad": _percentiles(self.phase_error),
-                "aod_error_rad": _percentiles(self.aod_error),
-                "aoa_error_rad": _percentiles(self.aoa_error),
-            },
+            "percentiles": {name: _percentiles(getattr(self, error)) for name, error in ERRORS.items()},
         }
 
     def _nearest(self, error: Floats, limit: Floats) -> dict[str, Any]:

@@ -21,7 +21,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.channel.cross_section import cross_section
-from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Paths, RadioConfig, Scene, Trajectory
@@ -95,7 +95,10 @@ class RoomPrecision:
         walls = build_walls(scene)
         u = SINGLE if single else DOUBLE
         extent = float(np.abs(scene.bounds - (scene.bounds.mean(axis=0) if single else 0.0)).max())
-        flatness, altitude = _flatness(walls)
+        corners, owner, altitude = walls.triangles, walls.wall_of_triangle, walls.largest_triangles()[1]
+        height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
+        flatness = np.zeros(len(walls))
+        np.maximum.at(flatness, owner, height.max(axis=1, initial=0.0))
         off = u * extent + flatness * single
         field = np.array([field_error(m, radio.carrier) for m in walls.material])
         return cls(scene, radio, u, extent, RAY_OFFSET if single else 0.0, 2.0 * off, 4.0 * off / altitude, field)
@@ -107,8 +110,10 @@ class RoomPrecision:
         shape = _shape(paths, cycle, path, trajectory, build_walls(self.scene).names)
         reach = self.extent + shape.length
         shift = (2.0 + STEPS * shape.bounces) * self.roundoff * reach * (shape.length > 0.0)
+        gain = np.full(len(shift), 4.0 * FIELD_STEPS * SINGLE)  # rounding in materials and antennas
         for leg, walls in enumerate(shape.walls):
             there = walls >= 0
+            gain += np.where(there, self.field[walls], 0.0).sum(axis=1)
             shift[:, leg] += np.where(there, self.offset[walls], 0.0).sum(axis=1)
             shift[:, leg] += np.where(there, self.tilt[walls], 0.0).sum(axis=1) * reach[:, leg]
         beside = shift + self.offset_rays * (1.0 + reach) * (shape.bounces > 0)
@@ -119,18 +124,11 @@ class RoomPrecision:
         ends = np.where(direct[:, None], beside[:, :1], beside)
         angle = np.minimum(_ratio(ends, shape.at_device) + 8.0 * self.roundoff, np.pi)
         turn = _ratio(beside, shape.at_landmark) + 8.0 * self.roundoff
-        gain = self._field(shape) + _ratio(leg_length, shape.length).sum(axis=1)
+        gain += _ratio(leg_length, shape.length).sum(axis=1)
         gain += self._landmark(paths, cycle, path, trajectory, turn) + self._patterns(paths, cycle, path)
         share = np.minimum(gain * scale / np.maximum(np.abs(paths.gain[cycle, path]), np.finfo(np.float64).tiny), 1.0)
         phase = 2.0 * np.pi / self.radio.wavelength * length + np.where(share < 1.0, np.arcsin(share), np.pi)
         return ErrorLimits(length, gain, np.minimum(phase, np.pi), angle[:, 0], angle[:, 1])
-
-    def _field(self, shape: PathLegs) -> Floats:
-        """Gain's error limit (M,) from rounding in materials and antennas, relative to the coherent scale."""
-        error = np.full(len(shape.length), 4.0 * FIELD_STEPS * SINGLE)
-        for walls in shape.walls:
-            error += np.where(walls >= 0, self.field[walls], 0.0).sum(axis=1)
-        return error
 
     def _patterns(self, paths: Paths, cycle: Integers, path: Integers) -> Floats:
         """Gain's error limit (M,) from antenna patterns: a half-wave dipole's is a small difference over a sine."""
@@ -242,16 +240,6 @@ def _bend(segments: Floats, beside: Floats) -> Floats:
     # A segment's ends then are up to twice that apart across it: `(2 d)^2 / (2 l)`, and never more than both moves.
     across = np.where(segments > 0.0, beside[:, None], 0.0)
     return np.minimum(_ratio(2.0 * across**2, segments), 2.0 * across).sum(axis=1)
-
-
-def _flatness(walls: Walls) -> tuple[Floats, Floats]:
-    """Error limits of walls: largest distance (W,) [m] of corners from the plane, altitude (W,) [m] of the largest
-    triangle."""
-    corners, owner = walls.triangles, walls.wall_of_triangle
-    height = np.abs(np.einsum("tci,ti->tc", corners, walls.normal[owner]) - walls.offset[owner][:, None])
-    flatness = np.zeros(len(walls))
-    np.maximum.at(flatness, owner, height.max(axis=1, initial=0.0))
-    return flatness, walls.largest_triangles()[1]
 
 
 @cache

@@ -36,14 +36,15 @@ def compare_paths(
     shortest_segment
         [m] the tracer's limit: below it, and only for paths that the tracer lacks, a segment's length is a proof.
     """
-    for name, value, kind in (
-        ("traced", traced, Paths),
-        ("analytic", analytic, Paths),
-        ("scene", scene, Scene),
-        ("trajectory", trajectory, Trajectory),
-    ):
-        expect(name, value, kind)
-    identities, traced_column, analytic_column = _align(traced, analytic)
+    expect("traced", traced, Paths)
+    expect("analytic", analytic, Paths)
+    expect("scene", scene, Scene)
+    expect("trajectory", trajectory, Trajectory)
+    places = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
+    identities = sorted(places[0].keys() | places[1].keys())
+    traced_column, analytic_column = (
+        np.array([place.get(i, -1) for i in identities], dtype=np.int64) for place in places
+    )
     in_traced, in_analytic = _valid(traced, traced_column), _valid(analytic, analytic_column)
     depth = min(traced.tx_walls.shape[1], analytic.tx_walls.shape[1])
     certifier = DifferenceExplainer.of(scene, trajectory, depth, shortest_segment)
@@ -58,7 +59,8 @@ def compare_paths(
     )
     at_traced, at_analytic = (cycle, traced_column[path]), (cycle, analytic_column[path])
     scale = _scale(analytic, identities, (*at_analytic, path), trajectory, precision)
-    gain_t, gain_a = traced.gain[at_traced], analytic.gain[at_analytic]
+    gain_t, gain_a, least = traced.gain[at_traced], analytic.gain[at_analytic], np.finfo(np.float64).tiny
+    level_ratio = np.maximum(np.abs(gain_t), least) / np.maximum(np.abs(gain_a), least)  # 1 where both are 0
     return PathReport(
         cycles=traced.num_cycles,
         labels=tuple(certifier.label(identity) for identity in identities),
@@ -66,8 +68,8 @@ def compare_paths(
         cycle=cycle,
         kind=analytic.kind[at_analytic[1]],
         length_error=SPEED_OF_LIGHT * np.abs(traced.tau[at_traced] - analytic.tau[at_analytic]),
-        gain_error_db=_level_difference(np.abs(gain_t), np.abs(gain_a)),
-        gain_error=np.abs(np.abs(gain_t) - np.abs(gain_a)) / np.maximum(scale, np.finfo(np.float64).tiny),
+        gain_error_db=np.abs(20.0 * np.log10(level_ratio)),
+        gain_error=np.abs(np.abs(gain_t) - np.abs(gain_a)) / np.maximum(scale, least),
         phase_error=np.abs(np.angle(gain_t * np.conj(gain_a))),
         aod_error=angle_between(traced.departure[at_traced], analytic.departure[at_analytic]),
         aoa_error=angle_between(traced.arrival[at_traced], analytic.arrival[at_analytic]),
@@ -93,14 +95,6 @@ def _scale(
     return peak_amplitude(antennas) * coherent_scale(unit, cycle, columns, trajectory, precision)
 
 
-def _align(traced: Paths, analytic: Paths) -> tuple[list[Identity], Integers, Integers]:
-    """Union of the path identities of two channels, with their columns in either."""
-    sides = [{named_identity(paths, p): p for p in range(paths.num_paths)} for paths in (traced, analytic)]
-    identity = sorted(sides[0].keys() | sides[1].keys())
-    here = [np.array([side.get(i, -1) for i in identity], dtype=np.int64) for side in sides]
-    return identity, here[0], here[1]
-
-
 def named_identity(paths: Paths, path: int) -> Identity:
     """Identity of a path with landmark and walls by name, so that paths of two channels match."""
     kind, landmark, tx, rx = paths.identity(path)
@@ -114,9 +108,3 @@ def _valid(paths: Paths, column: Integers) -> Booleans:
     valid = np.zeros((paths.num_cycles, len(column)), dtype=np.bool_)
     valid[:, column >= 0] = paths.valid[:, column[column >= 0]]
     return valid
-
-
-def _level_difference(a: Floats, b: Floats) -> Floats:
-    """Absolute level difference |20 lg(a / b)| [dB] of matched paths' gains, 0 where both are 0 (panel edge-on)."""
-    floor = np.finfo(np.float64).tiny
-    return np.abs(20.0 * np.log10(np.maximum(a, floor) / np.maximum(b, floor)))

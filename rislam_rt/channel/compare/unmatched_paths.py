@@ -9,7 +9,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.channel.image_source.wall_facets import WallFacets, build_facets
 from rislam_rt.channel.occluders import ALONE
-from rislam_rt.channel.walls import Walls, build_walls
+from rislam_rt.channel.walls import build_walls
 from rislam_rt.constants import RAY_OFFSET
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.plane_segmentation import FLOAT32_ROUNDING
@@ -96,7 +96,9 @@ class DifferenceExplainer:
         owner = np.repeat(np.arange(len(walls)), [len(o) for o in outlines])
         edges = np.concatenate([np.zeros((0, 2, 3)), *outlines])
         center = scene.bounds.mean(axis=0)
-        tilt = _tilts(walls, center)
+        largest, altitude = walls.largest_triangles()
+        extent = np.abs(walls.triangles[largest] - center).max(axis=(1, 2), initial=0.0)
+        tilt = 2.0 * FLOAT32_ROUNDING * extent / np.maximum(altitude, np.finfo(np.float64).tiny)
         return cls(scene, trajectory, depth, shortest, walls.names, facets, edges, owner, tilt, center, walls.hosts)
 
     def label(self, identity: Identity) -> str:
@@ -260,10 +262,3 @@ class DifferenceExplainer:
         seen = edges - (edges @ along)[..., None] * along
         distance = float(distance_to_edges(np.zeros((1, 3)), seen)[0])
         return distance if inside else -distance
-
-
-def _tilts(walls: Walls, center: Floats) -> Floats:
-    """Largest turn (W,) [rad] of each wall's normal by float32 rounding of corners, which may cost a channel a path."""
-    largest, altitude = walls.largest_triangles()
-    extent = np.abs(walls.triangles[largest] - center).max(axis=(1, 2), initial=0.0)
-    return 2.0 * FLOAT32_ROUNDING * extent / np.maximum(altitude, np.finfo(np.float64).tiny)

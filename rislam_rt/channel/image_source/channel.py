@@ -62,26 +62,14 @@ class ImageSourceChannel:
         expect("trajectory", trajectory, Trajectory)
         tx, rx = trajectory.tx, trajectory.rx
         ends = self.antennas or self.radio.antennas
-        at = {
-            end: None if ends.plain else LegEnds(*pair, trajectory.heading)
-            for end, pair in (
-                ("direct", (ends.of_tx, ends.of_rx)),
-                ("tx", (ends.of_tx, ends.of_landmark)),
-                ("rx", (ends.of_rx, ends.of_landmark)),
-            )
-        }
-        direct = find_legs(self.sequence_search, self.coatings, tx, rx, self.depth, terminals=at["direct"])
+        pairs = (ends.of_tx, ends.of_rx), (ends.of_tx, ends.of_landmark), (ends.of_rx, ends.of_landmark)
+        at_direct, at_tx, at_rx = (None if ends.plain else LegEnds(*pair, trajectory.heading) for pair in pairs)
+        direct = find_legs(self.sequence_search, self.coatings, tx, rx, self.depth, terminals=at_direct)
         landmarks = range(len(self.scene.landmarks))
-        return compose_paths(
-            self.scene,
-            self.radio,
-            self.walls,
-            self.depth,
-            direct,
-            [self._landmark_legs(tx, number, at["tx"]) for number in landmarks],
-            [self._landmark_legs(rx, number, at["rx"]) for number in landmarks],
-            f"image source, {self.sequence_search.words}",
-        )
+        tx_legs = [self._landmark_legs(tx, number, at_tx) for number in landmarks]
+        rx_legs = [self._landmark_legs(rx, number, at_rx) for number in landmarks]
+        source = f"image source, {self.sequence_search.words}"
+        return compose_paths(self.scene, self.radio, self.walls, self.depth, direct, tx_legs, rx_legs, source)
 
     def respond(self, paths: Paths, code: RisCode) -> Paths:
         """The image-source paths with their gains under another panel code, without a new search."""

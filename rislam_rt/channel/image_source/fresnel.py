@@ -78,8 +78,7 @@ class Coatings:
         before, after = polarisation_basis(incident), polarisation_basis(reflected)
         constant = self.reflection[wall]
         kept = _turned(field, before[0], after[0], constant) + _turned(field, before[1], after[1], constant)
-        result: Complexes = np.where(constant[:, None] > 0.0, kept, slab)
-        return result
+        return np.where(constant[:, None] > 0.0, kept, slab)
 
 
 def build_coatings(materials: tuple[Material, ...], carrier: float) -> Coatings:
@@ -115,5 +114,4 @@ def _incidence_basis(incident: Floats, reflected: Floats, normal: Floats) -> tup
 def _turned(field: Complexes, onto: Floats, out: Floats, coefficient: Floats | Complexes) -> Complexes:
     """Reflected part `coefficient (onto . field) out` of a polarised field (N, 3): the part along `onto`, now along
     `out`."""
-    result: Complexes = (coefficient * np.sum(field * onto, axis=-1))[:, None] * out
-    return result
+    return np.asarray((coefficient * np.sum(field * onto, axis=-1))[:, None] * out)

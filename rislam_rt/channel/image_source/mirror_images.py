@@ -128,21 +128,16 @@ def _legs(
     for cycle, column, rays in parts:
         place = cycle, column
         ray = rays.image - device[cycle]
-        normals = facets.normal[rays.walls]
+        leaving, normals = unit(ray), facets.normal[rays.walls]
         valid[place] = True
         length[place] = np.linalg.norm(ray, axis=-1)
-        at_device[place] = unit(ray)
-        at_far_end[place] = -_followed(unit(ray), normals)
+        at_device[place] = arriving = leaving
+        for normal in normals.swapaxes(0, 1):
+            arriving = mirror_direction(arriving, normal)
+        at_far_end[place] = -arriving
         if terminals is None:
-            coefficient[place] = coatings.coefficient(rays.walls, normals, unit(ray))
+            coefficient[place] = coatings.coefficient(rays.walls, normals, leaving)
         else:
-            coefficient[place] = terminals.coefficient(coatings, rays.walls, normals, unit(ray), cycle)
+            coefficient[place] = terminals.coefficient(coatings, rays.walls, normals, leaving, cycle)
         vertices[cycle, column, : rays.walls.shape[1]] = rays.bounces
     return SpecularLegs(walls, valid, length, at_device, at_far_end, coefficient, vertices)
-
-
-def _followed(direction: Floats, normals: Floats) -> Floats:
-    """Directions (N, 3) of rays, for legs by mirror images, after reflection on walls of normals (N, d, 3) in turn."""
-    for normal in normals.swapaxes(0, 1):
-        direction = mirror_direction(direction, normal)
-    return direction

@@ -90,10 +90,6 @@ class WallFacets:
                 own[rows] = ~self.contains(points[rows], np.full(len(rows), upper))
         return own
 
-    def _planes(self, wall: Integers) -> Integers:
-        """Numbers (N,) of the walls whose facets' planes walls (N,) share, -1 for no wall."""
-        return np.where(wall >= 0, self.plane[wall], -1) if len(self) else wall
-
     def _on_wall(self, points: Floats, wall: int) -> Booleans:
         """Whether points (N, 3) in the plane of one wall lie on one of its triangles."""
         span = slice(self.first[wall], self.first[wall + 1])
@@ -119,6 +115,7 @@ class WallFacets:
         """
         blocker = np.full(len(start), -1, dtype=np.int64)
         normal, offset = self.normal[walls].T, self.offset[walls]
+        own = np.where(spared >= 0, self.plane[spared], -1) if len(self) else spared
         for rows in row_blocks(len(start), len(walls)) if len(walls) else []:
             a, b = start[rows] @ normal - offset, end[rows] @ normal - offset
             crossing = np.minimum(a, b) < -SURFACE_TOLERANCE
@@ -127,7 +124,7 @@ class WallFacets:
             fraction = a[segment, column] / (a[segment, column] - b[segment, column])
             segment, wall = segment + rows.start, walls[column]
             point = start[segment] + fraction[:, None] * (end[segment] - start[segment])
-            hit = self.contains(point, wall) & (self._planes(spared)[segment] != self.plane[wall])
+            hit = self.contains(point, wall) & (own[segment] != self.plane[wall])
             blocker[segment[hit]] = wall[hit]
         return blocker
 
@@ -147,8 +144,7 @@ class WallFacets:
         """Side bits (W,): on which sides of each wall's plane any of the points (N, 3) lies."""
         distance = self.distance(points)
         front, back = distance.max(axis=0) > SEAM, distance.min(axis=0) < -SEAM
-        bits: Integers = FRONT * front + BACK * back
-        return bits
+        return np.asarray(FRONT * front + BACK * back)
 
 
 def build_facets(walls: Walls) -> WallFacets:

@@ -12,8 +12,8 @@ import mitsuba as mi
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
+from rislam_rt.channel.specular_legs import NO_WALL
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_indices, as_points
-from rislam_rt.channel.traced.wall_sequences import NO_WALL
 
 _NO_WALL = NO_WALL % 2**32
 

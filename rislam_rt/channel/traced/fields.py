@@ -16,11 +16,11 @@ from sionna.rt import antenna_pattern
 from sionna.rt.utils import spectrum_to_matrix_4f
 
 from rislam_rt.arrays import Booleans, Complexes, Floats, Integers, cross
+from rislam_rt.channel.specular_legs import NO_WALL
 from rislam_rt.channel.traced.leg_query import LegEndpoints
 from rislam_rt.channel.traced.path_geometry import PathGeometry, segment_directions
 from rislam_rt.channel.traced.radio_materials import ConstantReflection
 from rislam_rt.channel.traced.tracer_scene import TracerScene, as_floats
-from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.model import Antennas
 
@@ -68,8 +68,7 @@ def _jones(material: Any, incident: Floats, reflected: Floats, normal: Floats) -
     # at normal incidence any direction in the wall will do: across and along the plane are alike there
     across = np.where(sine > POLE, across / np.where(sine > POLE, sine, 1.0), spherical_basis(incident)[0])
     before, after = (_turn(spherical_basis(ray), across) for ray in (incident, reflected))
-    turned: Complexes = after.swapaxes(1, 2) @ incidence_jones(material, np.abs(along)) @ before
-    return turned
+    return np.asarray(after.swapaxes(1, 2) @ incidence_jones(material, np.abs(along)) @ before)
 
 
 def incidence_jones(material: Any, cosine: Floats) -> Complexes:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
-from rislam_rt.channel.traced.wall_sequences import NO_WALL
+from rislam_rt.channel.specular_legs import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import mirror, mirror_direction, signed_distance

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.occluders import ALONE
+from rislam_rt.channel.specular_legs import NO_WALL
 from rislam_rt.channel.traced.radio_materials import specular_material
-from rislam_rt.channel.traced.wall_sequences import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import SceneError
@@ -73,11 +73,6 @@ class TracerScene:
     """The whole room (`NO_OCCLUDER`), and by number of each scatterer with an occluding mesh the room without that."""
     occluders: dict[int, mi.Scene]
     """The occluding mesh of each scatterer that has one, alone; those of no scatterer together (`ALONE`)."""
-
-    @property
-    def wavelength(self) -> float:
-        """Carrier wavelength [m] as the tracer has it."""
-        return float(self.scene.wavelength[0])
 
     def wall_hit(self, shape: Integers, primitive: Integers) -> Integers:
         """Walls (...,) that the tracer's rays hit, by shape and primitive (...,); `NO_WALL` where no wall was hit."""
@@ -149,21 +144,7 @@ def build_tracer_scene(walls: Walls, carrier: float, origin: Floats, occluders: 
     removable = [number for number in dark if number != ALONE]  # the others are nobody's own
     views = {number: _part([*objects, *(o for n, o in dark.items() if n != number)]) for number in removable}
     alone = {number: _part([shade]) for number, shade in dark.items()}
-    views = {NO_OCCLUDER: scene.mi_scene} | views
-    return _numbered(scene, origin, walls, ids, members, (radio_materials, material_of_wall), views, alone)
-
-
-def _part(objects: list[rt.SceneObject]) -> mi.Scene:
-    """Mitsuba scene of some of the tracer's meshes."""
-    return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
-
-
-def _numbered(
-    scene: rt.Scene, origin: Floats, walls: Walls, ids: Integers, members: list[Integers],
-    materials: tuple[tuple[rt.RadioMaterialBase, ...], Integers], views: dict[int, mi.Scene],
-    occluders: dict[int, mi.Scene],
-) -> TracerScene:  # fmt: skip
-    """Assemble the tracer's scene: number the triangles of all shapes (M,) by wall, and find each wall's largest."""
+    # the triangles of all shapes, in their order, and where each wall's largest is among them
     order = np.argsort(ids)
     rows = np.concatenate([members[m] for m in order] or [np.zeros(0, dtype=np.int64)])
     sizes = [len(members[m]) for m in order]
@@ -174,8 +155,14 @@ def _numbered(
     largest, _ = walls.largest_triangles()
     return TracerScene(
         scene, walls, origin, shape_of[largest], primitive_of[largest], walls.triangles[largest, 0] - origin,
-        ids[order], first, walls.wall_of_triangle[rows], *materials, _wall_boxes(walls, origin), views, occluders,
+        ids[order], first, walls.wall_of_triangle[rows], radio_materials, material_of_wall,
+        _wall_boxes(walls, origin), {NO_OCCLUDER: scene.mi_scene} | views, alone,
     )  # fmt: skip
+
+
+def _part(objects: list[rt.SceneObject]) -> mi.Scene:
+    """Mitsuba scene of some of the tracer's meshes."""
+    return mi.load_dict({"type": "scene"} | {o.name: o.mi_mesh for o in objects})
 
 
 def _wall_boxes(walls: Walls, origin: Floats) -> WallBoxes:

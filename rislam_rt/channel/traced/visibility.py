@@ -20,9 +20,10 @@ from sionna.rt.path_solvers.paths_buffer import PathsBuffer
 from sionna.rt.utils import spawn_ray_to
 
 from rislam_rt.arrays import Floats, Integers, take_rows
+from rislam_rt.channel.specular_legs import NO_WALL, turned_round
 from rislam_rt.channel.traced.float32_limits import SEGMENT_LIMIT
 from rislam_rt.channel.traced.tracer_scene import NO_OCCLUDER, TracerScene, as_indices, as_mask, as_points
-from rislam_rt.channel.traced.wall_sequences import NO_WALL, CandidateIndices, turned_round
+from rislam_rt.channel.traced.wall_sequences import CandidateIndices
 
 
 class SingleRays:
@@ -63,7 +64,11 @@ def visible_rows(
         return rows, np.zeros((0, sequences.shape[1], 3))
     candidates = sequences[rows.sequence]
     sources, targets = as_points(far - tracer_scene.origin), as_points(device - tracer_scene.origin)
-    traced = _trace(tracer_scene, candidates, sources, targets, rows, ImageMethod(), spared)
+    with _short_segments():
+        traced = ImageMethod()(
+            scene=SingleRays(tracer_scene.views[spared]), paths=fill_buffer(tracer_scene, candidates, rows),
+            diffraction=False, diffraction_lit_region=False, src_positions=sources, tgt_positions=targets,
+        )  # fmt: skip
     traced.schedule()  # one pass through the scene for all that is read below
     dr.eval()
     keep = _confirmed(tracer_scene, candidates, traced)
@@ -86,18 +91,6 @@ def _clear_of_occluder(
         clear &= ~np.array(tracer_scene.occluders[spared].ray_test(ray), dtype=np.bool_)
         last = point
     return np.flatnonzero(clear)
-
-
-def _trace(
-    tracer_scene: TracerScene, candidates: Integers, far: mi.Point3f, device: mi.Point3f, rows: CandidateIndices,
-    method: ImageMethod, spared: int,
-) -> PathsBuffer:  # fmt: skip
-    """Run the tracer's image method on candidate wall sequences (N, D), in the room without the occluder `spared`."""
-    with _short_segments():
-        return method(
-            scene=SingleRays(tracer_scene.views[spared]), paths=fill_buffer(tracer_scene, candidates, rows),
-            diffraction=False, diffraction_lit_region=False, src_positions=far, tgt_positions=device,
-        )  # fmt: skip
 
 
 def _confirmed(tracer_scene: TracerScene, sequences: Integers, traced: PathsBuffer) -> Integers:

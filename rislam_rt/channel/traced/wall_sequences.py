@@ -10,15 +10,14 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers, join_rows, take_rows
+from rislam_rt.arrays import Booleans, Floats, Integers, join_rows, row_blocks, take_rows
+from rislam_rt.channel.specular_legs import NO_WALL
 from rislam_rt.channel.walls import Walls
 from rislam_rt.constants import SURFACE_TOLERANCE
 from rislam_rt.errors import ConfigError
 
 FRONT, BACK = 1, 2
 """Sides of a plane, as bits: a wall may have parts on both."""
-NO_WALL = -1
-"""Padding of wall sequences."""
 MANY = 100_000
 """Number of wall sequences of one bounce count up to which all are tried at every position, without cones."""
 MOST_LOOKS = 2_000_000_000
@@ -35,7 +34,7 @@ def wall_sides(walls: Walls) -> Integers:
     corners = walls.triangles[order].reshape(-1, 3)
     first = 3 * np.searchsorted(walls.wall_of_triangle[order], np.arange(len(walls)))
     sides = np.zeros((len(walls), len(walls)), dtype=np.int64)
-    for rows in _blocks(len(walls), len(corners)):
+    for rows in row_blocks(len(walls), len(corners), _BLOCK):
         height = walls.normal[rows] @ corners.T - walls.offset[rows, None]
         sides[rows] = np.where(np.maximum.reduceat(height, first, axis=1) > SURFACE_TOLERANCE, FRONT, 0)
         sides[rows] |= np.where(np.minimum.reduceat(height, first, axis=1) < -SURFACE_TOLERANCE, BACK, 0)
@@ -126,26 +125,13 @@ def _check(count: int, most: int, sides: Integers, depth: int, verb: str) -> Non
         )
 
 
-def turned_round(sequences: Integers) -> Integers:
-    """Reverse wall sequences (S, D), the padding kept at the end."""
-    index = (sequences != NO_WALL).sum(axis=1)[:, None] - 1 - np.arange(sequences.shape[1])
-    return np.where(index >= 0, np.take_along_axis(sequences, np.maximum(index, 0), axis=1), NO_WALL)
-
-
 def _with_wall_before(level: Integers, onward: Integers, sides: Integers) -> Iterator[tuple[Integers, Integers]]:
     """Put every possible wall in front of wall sequences (S, d), block by block."""
     # `onward` (S,) are the side bits of their first wall on which the ray goes on; the longer ones come with theirs.
-    for rows in _blocks(len(level), len(sides)):
+    for rows in row_blocks(len(level), len(sides), _BLOCK):
         first = level[rows, 0]
         row, wall = np.nonzero(((sides[first] & onward[rows, None]) > 0) & (sides[:, first].T > 0))
         yield np.concatenate([wall[:, None], level[rows][row]], axis=1), sides[wall, first[row]]
-
-
-def _blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of `count` sequences such that rows times width stay bounded."""
-    step = max(1, _BLOCK // max(width, 1))
-    for start in range(0, count, step):
-        yield slice(start, min(start + step, count))
 
 
 class CandidateIndices(NamedTuple):

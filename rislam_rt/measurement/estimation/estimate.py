@@ -6,17 +6,13 @@ single-path refinements are replaced by joint Gauss-Newton steps, which also par
 path that its neighbours could explain as well as noise could is taken out again.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Complexes, Floats
 from rislam_rt.measurement.estimation.detect import MatchedFilterGrid, into_range, pick_peaks
 from rislam_rt.measurement.estimation.path_signals import Sounding
 from rislam_rt.measurement.estimation.refine import (
-    Accuracy,
     LeastSquaresFit,
-    accuracy,
     amplitude_variance,
     fit_amplitudes,
     information_matrix,
@@ -53,17 +49,10 @@ NOTHING = np.zeros((0, 3))
 """Parameters of no paths."""
 
 
-class Estimate(NamedTuple):
-    """Estimate of P paths from one sounding, with the noise normalised to one: fit and standard deviations."""
-
-    fit: LeastSquaresFit
-    accuracy: Accuracy
-
-
 def estimate_paths(
     sounding: Sounding, grid: MatchedFilterGrid, samples: Complexes, threshold: float, window: tuple[float, float],
     most: int, known: Floats = NOTHING,
-) -> Estimate:  # fmt: skip
+) -> LeastSquaresFit:  # fmt: skip
     """The waveform estimator: all paths in samples (L, M) whose noise has unit variance; detect, refine, drop, and
     repeat.
 
@@ -99,17 +88,10 @@ def estimate_paths(
         if grown.cost >= fit.cost - threshold:
             break
         fit = grown
-    return _finish(sounding, fit, samples, threshold, window)
-
-
-def _finish(
-    sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshold: float, window: tuple[float, float]
-) -> Estimate:
-    """Final estimate of the search: refined to convergence, without paths that their neighbours can explain."""
+    # at last to convergence, and without paths that their neighbours can explain
     fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
     fit = prune(sounding, drop(sounding, fit, samples, threshold, window), samples, threshold)
-    fit = refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
-    return Estimate(fit, accuracy(fit))
+    return refine(sounding, fit, samples, steps=FINAL_STEPS, tolerance=FINAL_TOLERANCE)
 
 
 def _touched(fit: LeastSquaresFit, fresh: int, num_samples: int) -> Booleans:
@@ -144,7 +126,8 @@ def prune(sounding: Sounding, fit: LeastSquaresFit, samples: Complexes, threshol
         information = 2.0 * information_matrix(fit.inner, fit.covariance, fit.amplitude)
         variance = amplitude_variance(fit.inner, fit.covariance, fit.amplitude, information)
         certainty = np.abs(fit.amplitude) ** 2 / variance
-        doubtful = np.flatnonzero((certainty < threshold) & ~_among(fit.parameters, tried))
+        before = np.all(np.abs(fit.parameters[:, None] - tried) < SLACK, axis=-1).any(axis=1)
+        doubtful = np.flatnonzero((certainty < threshold) & ~before)
         for row in doubtful[np.argsort(certainty[doubtful])]:
             rest = _neighbours_instead(sounding, fit, samples, int(row), fit.cost + threshold)
             if rest is not None:
@@ -170,10 +153,3 @@ def _neighbours_instead(
     rest = fit.parameters.copy()
     rest[near[others]] = trial.parameters
     return np.delete(rest, row, axis=0)
-
-
-def _among(parameters: Floats, marked: Floats) -> Booleans:
-    """Which paths (P, 3) the waveform estimator holds for those `marked` (Q, 3), being within `SLACK` of one of
-    them."""
-    apart = np.abs(parameters[:, None] - marked)
-    return np.any(np.all(apart < SLACK, axis=-1), axis=1)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Floats
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import Material, PathKind, Paths, RadioConfig, Scene
 from rislam_rt.model.itu import itu_parameters
@@ -30,7 +30,6 @@ NO_SCATTERING = ("cross_polarization_coefficient", "roughness", "vertical_attenu
 """Settings that the format wants and that have no meaning here: paths are specular or run over a point."""
 METAL = 1e7
 """[S/m] Conductivity of a metal in ITU-R P.2040."""
-PER_PATH = ("power", "phase", "delay", "aod_az", "aod_el", "aoa_az", "aoa_el", "inter", "inter_pos")
 
 
 def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -> dict[str, bytes]:
@@ -46,7 +45,7 @@ def deepmimo_files(scene: Scene, paths: Paths, radio: RadioConfig, depth: int) -
     depth
         Largest number of wall bounces that was looked for.
     """
-    room = _room_files(scene, radio)
+    room = _room_files(scene)
     cycles = paths.num_cycles
     files: dict[str, bytes] = {"params.json": json_file(_parameters(scene, paths, radio, depth))}
     for cycle in range(cycles):
@@ -88,7 +87,7 @@ def cycle_matrices(paths: Paths, cycle: int) -> dict[str, Floats]:
         "aoa_el": np.rad2deg(theta_r),
         "inter": np.array([_interactions(paths, int(path)) for path in found], dtype=np.float64), "inter_pos": points,
     }  # fmt: skip
-    return {name: values[name][None] for name in PER_PATH}
+    return {name: value[None] for name, value in values.items()}
 
 
 def _interactions(paths: Paths, path: int) -> int:
@@ -165,16 +164,12 @@ def _electric(material: Material, carrier: float) -> dict[str, float]:
     return {"permittivity": index**2, "conductivity": 0.0}
 
 
-def _room_files(scene: Scene, radio: RadioConfig) -> dict[str, bytes]:
+def _room_files(scene: Scene) -> dict[str, bytes]:
     """DeepMIMO's files of the room: vertices of all reflectors, with faces and materials of each."""
     materials = _distinct(scene)
-    faces: dict[str, Integers] = {}
-    kinds: dict[str, Integers] = {}
-    first = 0
-    for number, one in enumerate(scene.reflectors):
-        faces[str(number)] = one.faces + first
-        kinds[str(number)] = np.full(len(one.faces), materials.index(one.material))
-        first += len(one.vertices)
+    first = np.cumsum([0, *(len(one.vertices) for one in scene.reflectors)])
+    faces = {str(number): one.faces + first[number] for number, one in enumerate(scene.reflectors)}
+    kinds = {str(n): np.full(len(one.faces), materials.index(one.material)) for n, one in enumerate(scene.reflectors)}
     objects = [
         {"name": one.name, "label": "objects", "id": number, "mesh_key": str(number)}
         for number, one in enumerate(scene.reflectors)

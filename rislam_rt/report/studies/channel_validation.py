@@ -78,8 +78,8 @@ def validation_table(rows: Sequence[Validation]) -> str:
         columns = ("length_error_m", "gain_error_db", "phase_error_rad", "aod_error_rad", "aoa_error_rad")
         errors = [_error(spread[name]) for name in columns]
         counts = [str(report.cycles), str(report.matched), _reasons(numbers), str(report.unexplained)]
-        shares = " ".join(_share(limits) for limits in numbers["limits"].values())
-        cells.append([scene, str(depth), kind, *counts, str(report.num_breaches), *errors, shares])
+        nearest = [f"{limits['nearest']['share']:.0%}" if limits else "-" for limits in numbers["limits"].values()]
+        cells.append([scene, str(depth), kind, *counts, str(report.num_breaches), *errors, " ".join(nearest)])
     return "\n".join(table_lines(_HEAD, cells)) + "\n"
 
 
@@ -97,11 +97,6 @@ def _reasons(numbers: Mapping[str, Any]) -> str:
         for reason, n in numbers["explained"].items()
     ]
     return ", ".join(texts) or "none needed"
-
-
-def _share(limits: Mapping[str, Any]) -> str:
-    """Table cell of the channel validation: largest ratio of a path's error to its limit."""
-    return f"{limits['nearest']['share']:.0%}" if limits else "-"
 
 
 def _error(spread: Mapping[str, float]) -> str:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rislam_rt.report.markdown import paragraph, picture, table_lines
+from rislam_rt.report.markdown import between, paragraph, picture, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.slam.classify import FEATURES, network_arrays
-from rislam_rt.studies.classifier.score import ClassifierScore, by_value, mistakes, panel_dropped, rules
+from rislam_rt.studies.classifier.score import by_value, mistakes, panel_dropped, rules
 from rislam_rt.studies.classifier.spec import ClassifierSpec
 from rislam_rt.studies.classifier.train import Training
 from rislam_rt.studies.classifier.training_examples import Examples
@@ -59,8 +59,7 @@ def draw_scores(found: Training) -> Figure:
         figure.axes[0].set_title("All scores")
         figure.axes[1].set_title("The same from 0.9; dotted: the aim, 0.98")
         figure.axes[0].invert_yaxis()
-        handles, labels = figure.axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -181,11 +180,12 @@ def _score_table(found: Training) -> list[str]:
         share = [f"{part:.2f}" for part in share_of(found, name)] if name in found.sets.test else ["", ""]
         tail = [f"{net.removed:.3f}", f"{net.clutter_kept:.2f}"]
         if has_keep(found, name):
-            cells = [*(_f1(scores[rule]) for rule in NAME), f"{net.precision:.3f}", f"{net.recall:.3f}"]
+            found_f1 = [between(one.f1, one.low, one.high) for one in (scores[rule] for rule in NAME)]
+            cells = [*found_f1, f"{net.precision:.3f}", f"{net.recall:.3f}"]
         else:
             cells = ["nothing to keep", "", "", "", "", ""]
         rows.append([name, *share, *cells, *tail])
-    mean = [f"{m:.3f} ({low:.3f} to {high:.3f})" for m, low, high in (found.mean[rule] for rule in NAME)]
+    mean = [between(*found.mean[rule]) for rule in NAME]
     return table_lines(titles, [*rows, ["mean over test rooms", "", "", *mean, "", "", "", ""]])
 
 
@@ -265,8 +265,3 @@ def _by_snr(found: Training, rule: str) -> dict[str, tuple[float, int]]:
     tested = found.sets.tested
     level = 10.0 / np.log(10.0) * tested.features[:, FEATURES.index("snr")]
     return by_value(tested, rules(found.network)[rule], level, SNRS)
-
-
-def _f1(score: ClassifierScore) -> str:
-    """Table cell of the classifier's page: F1 with its interval."""
-    return f"{score.f1:.3f} ({score.low:.3f} to {score.high:.3f})"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.design import GainCurves
-from rislam_rt.report.markdown import picture, table_lines
+from rislam_rt.report.markdown import between, picture, table_lines
 from rislam_rt.report.style import SCHEME, TRUTH, styled, to_png
 from rislam_rt.storage.files import csv_file, json_file, write_all
 from rislam_rt.studies.fig4a import Fig4a
@@ -57,8 +57,7 @@ def draw_fig4a(found: Fig4a, spec: Fig4aSpec) -> Figure:
             axis.set_title(f"element pattern '{element}'", weight="bold")
             axis.set_xlabel("distance from agent to panel [m]")
         axes[0].set_ylabel("gain of the direct path [dB]")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=9)
     return figure
 
 
@@ -119,8 +118,10 @@ def fig4a_page(found: Fig4a, spec: Fig4aSpec, scene: str, figure: str | None) ->
     lines += picture(figure, "Gain against distance")
     shown = np.unique(np.linspace(0, len(found.distance) - 1, NUM_SHOWN).round().astype(int))
     for element, curves in found.curves.items():
-        rows = [[f"{found.distance[k]:.2f}", _spread(curves.optimized, k), _spread(curves.random, k),
-                 f"{curves.exact[k]:.2f}", f"{found.sphere[k]:.2f}"] for k in shown]  # fmt: skip
+        spread = [[between(*ends, digits=2) for ends in zip(*both, strict=True)]
+                  for both in (curves.optimized, curves.random)]  # fmt: skip
+        rows = [[f"{found.distance[k]:.2f}", *(one[k] for one in spread), f"{curves.exact[k]:.2f}",
+                 f"{found.sphere[k]:.2f}"] for k in shown]  # fmt: skip
         table = table_lines(["distance [m]", "optimised", "random", "optimum", "sphere"], rows)
         lines += [f"## Element pattern `{element}`, gains in dB", "", *table, ""]
     return "\n".join(lines[:-1]) + "\n"
@@ -170,9 +171,3 @@ def _extent(distance: Floats, where: Booleans) -> str:
 def _interval(curve: Any) -> dict[str, list[float]]:
     """Middle and ends of a gain curve of Fig. 4(a) as lists, by name."""
     return {name: values.tolist() for name, values in curve._asdict().items()}
-
-
-def _spread(curve: Any, place: int) -> str:
-    """Table cell of Fig. 4(a): gain at a place with its interval."""
-    middle, low, high = (values[place] for values in curve)
-    return f"{middle:.2f} ({low:.2f} to {high:.2f})"

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rislam_rt.input_messages import unit_of
 from rislam_rt.report.style import save_figure, scheme_colour, styled
-from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.report.swept.error_curves import log_metres
 from rislam_rt.shipped import short_names
 from rislam_rt.studies.pipeline_sweep import SchemeScore
 
@@ -43,18 +43,18 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
         figure = Figure(figsize=(7.0, 4.6))
         axis = figure.subplots()
         for number, ((scheme, others), group) in enumerate(groups.items()):
-            shift = 0.0 if numeric or not along else step * (number - 0.5 * (len(groups) - 1))
+            shift = 0.0 if not along else step * (number - 0.5 * (len(groups) - 1))
             line = "none" if not numeric else LINES[kinds.index(others) % len(LINES)]
             style: Mapping[str, Any] = {"ls": line, "marker": MARKERS[number % len(MARKERS)], "ms": 5, "capsize": 3}
-            x = [_place(score, along, ticks, numeric) + shift for score in group]
+            labels = [str(score.point.get(along, score.scheme)) for score in group]
+            x = [float(label) if numeric else ticks.index(label) + shift for label in labels]
             middle = np.array([score.overall for score in group])
             ends = np.array([score.interval or (score.overall, score.overall) for score in group])
             label = ", ".join(part for part in (scheme, others) if part)
             axis.errorbar(x, middle, np.abs(ends.T - middle), color=scheme_colour(scheme), label=label, **style)
         if not numeric:
             axis.set_xticks(range(len(ticks)), [*short_names(ticks).values()] if along == "scene" else ticks)
-        axis.set_yscale("log")
-        mark_metres(axis.yaxis)
+        log_metres(axis)
         unit = unit_of(along)
         axis.set(xlabel=(f"{along} [{unit}]" if unit else along) or "scheme", ylabel="RMSE of the agent's position [m]")
         runs = sorted({len(score.rmse) for score in scores})
@@ -75,11 +75,6 @@ def _others(point: Mapping[str, Any], along: str) -> str:
     """Values of a point along the other axes, as text."""
     kept = {key: value for key, value in point.items() if key not in (along, "schemes")}
     return ", ".join(f"{key.rpartition('.')[2]} = {value}" for key, value in kept.items())
-
-
-def _place(score: SchemeScore, along: str, ticks: Sequence[str], numeric: bool) -> float:
-    """Abscissa of a point: its value along the main axis, or the number of its tick."""
-    return float(score.point[along]) if numeric else float(ticks.index(str(score.point.get(along, score.scheme))))  # type: ignore[arg-type]
 
 
 def _is_number(value: Any) -> bool:

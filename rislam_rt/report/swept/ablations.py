@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rislam_rt.report.markdown import metres, metres_between, percent_between, picture, ratio, table_lines
 from rislam_rt.report.style import TRUTH, styled
 from rislam_rt.report.swept.entries import interval_entry, rmse_change, scheme_entry
-from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
+from rislam_rt.report.swept.error_curves import draw_rmse, log_metres
 from rislam_rt.studies.swept import AblationsSpec, Group
 
 TITLE = "Ablations: one setting at a time"
@@ -47,10 +47,10 @@ def draw_ablations(content: Mapping[str, Any], spec: AblationsSpec) -> Figure:
                 axis.plot([entry["bound_m"]], [row], color=TRUTH, marker="|", ms=11, mew=1.6)
         if entries:
             axis.axvline(entries[0]["rmse_m"], color=SAME, lw=1.0, ls=":")
-        axis.set_yticks(range(len(entries)), [_label(entry) for entry in entries], fontsize=9)
+        labels = [": ".join(part for part in (entry["group"], entry["variant"]) if part) for entry in entries]
+        axis.set_yticks(range(len(entries)), labels, fontsize=9)
         axis.invert_yaxis()
-        axis.set_xscale("log")
-        mark_metres(axis.xaxis)
+        log_metres(axis, "x")
         axis.grid(axis="y", visible=False)
         axis.set_xlabel("RMSE of the agent's position [m]: dot with 95 % interval; black tick: posterior bound")
         axis.set_title("blue: better than the reference, orange: worse, grey: no telling", fontsize=10)
@@ -91,8 +91,3 @@ def _colour(entry: Mapping[str, Any]) -> str:
     if entry["change"] is None or entry["change_low"] <= 0.0 <= entry["change_high"]:
         return SAME
     return WORSE if entry["change"] > 0.0 else BETTER
-
-
-def _label(entry: Mapping[str, Any]) -> str:
-    """Label of an ablation in the figure."""
-    return f"{entry['group']}: {entry['variant']}" if entry["group"] else str(entry["variant"])

@@ -21,8 +21,7 @@ def draw_schemes(axis: Axes, x: Sequence[float], curves: Mapping[str, Sequence[M
     for scheme, entries in curves.items():
         axis.plot(x, numbers(entries, "bound_m"), color=scheme_colour(scheme), ls="--", lw=1.1)
         draw_error(axis, x, entries, scheme, "rmse")
-    axis.set_yscale("log")
-    mark_metres(axis.yaxis)
+    log_metres(axis)
     label_ends(axis, curves, "rmse_m")
 
 
@@ -34,8 +33,10 @@ def draw_error(axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, An
     axis.plot(x, value, color=colour, marker=MARKER.get(scheme, "o"), ms=5, lw=1.7)
 
 
-def mark_metres(side: Axis) -> None:
-    """Set the ticks of error curves' logarithmic axis to 1, 2 and 5 of every power of ten, in plain numbers."""
+def log_metres(axis: Axes, which: str = "y") -> None:
+    """Make one axis of error curves logarithmic, with ticks at 1, 2 and 5 of every power of ten in plain numbers."""
+    axis.set(**{f"{which}scale": "log"})
+    side: Axis = getattr(axis, f"{which}axis")
     side.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     side.set_major_formatter(lambda value, _: f"{value:g}")
     side.set_minor_formatter(NullFormatter())
@@ -43,9 +44,13 @@ def mark_metres(side: Axis) -> None:
 
 def draw_rmse(axis: Axes, row: float, entry: Mapping[str, Any], colour: str, **marker: Any) -> None:
     """Draw an RMSE as a dot in a row, with its interval as a line."""
-    value, low, high = (entry[name] or entry["rmse_m"] for name in ("rmse_m", "rmse_low_m", "rmse_high_m"))
-    axis.plot([low, high], [row, row], color=colour, lw=1.4)
-    axis.plot([value], [row], color=colour, marker="o", **marker)
+    axis.plot(ends_of(entry), [row, row], color=colour, lw=1.4)
+    axis.plot([entry["rmse_m"]], [row], color=colour, marker="o", **marker)
+
+
+def ends_of(entry: Mapping[str, Any]) -> tuple[float, float]:
+    """Ends of the interval of an RMSE [m] for drawing; the RMSE itself where there is none."""
+    return entry["rmse_low_m"] or entry["rmse_m"], entry["rmse_high_m"] or entry["rmse_m"]
 
 
 def numbers(entries: Sequence[Mapping[str, Any]], name: str) -> Floats:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rislam_rt.report.markdown import metres, metres_between, percent_between, picture, ratio, table_lines
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, panels_of, scheme_entry, what_limits
-from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, mark_metres
+from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, log_metres
 from rislam_rt.studies.swept import Fig4cSpec, Group, paired_gain, spread
 
 TITLE = "Error against the panel's size: Fig. 4(c)"
@@ -40,8 +40,7 @@ def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
         for scheme, own in curves.items():
             if any(entry["panel_m"] is not None for entry in own):
                 draw_error(panel, sizes, own, scheme, "panel")
-        panel.set_yscale("log")
-        mark_metres(panel.yaxis)
+        log_metres(panel)
         label_ends(panel, curves, "panel_m")
         for axis, what in ((agent, "agent's position"), (panel, "panel's position at the end")):
             axis.set_xticks(sizes, [f"{size} x {size}" for size in sizes], fontsize=9)
@@ -69,7 +68,9 @@ def fig4c_body(content: Mapping[str, Any], spec: Fig4cSpec, figure: str | None) 
     ]  # fmt: skip
     lines += [*table_lines(head, rows), "", "## From the smallest to the largest panel", ""]
     for fall in content["falls"]:
-        agent, panel = _percent(fall, "agent"), _percent(fall, "panel")
+        agent, panel = (
+            "an unknown share" if fall[name] is None else percent_between(fall, name) for name in ("agent", "panel")
+        )
         lines.append(f"- `{fall['scheme']}`: agent's RMSE lower by {agent}, panel's by {panel}")
     return lines
 
@@ -87,8 +88,3 @@ def _fall(groups: Sequence[Group], scheme: str) -> dict[str, Any]:
     agent = paired_gain(large.column(scheme, "rmse_m"), small.column(scheme, "rmse_m"))
     panel = paired_gain(panel_error(large, scheme), panel_error(small, scheme))
     return {"scheme": scheme, **interval_entry("agent", agent), **interval_entry("panel", panel)}
-
-
-def _percent(fall: Mapping[str, Any], name: str) -> str:
-    """A reduction in percent with its interval, in words, for Fig. 4(c)."""
-    return "an unknown share" if fall[name] is None else percent_between(fall, name)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from rislam_rt.report import markdown
 from rislam_rt.report.style import styled
 from rislam_rt.report.swept.entries import interval_entry, rmse_change, scheme_entry
-from rislam_rt.report.swept.error_curves import draw_rmse, mark_metres
+from rislam_rt.report.swept.error_curves import draw_rmse, ends_of, log_metres
 from rislam_rt.studies.swept import Group, RobustnessSpec
 
 WORST = 3
@@ -62,7 +62,7 @@ def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
         figure = Figure(figsize=(8.6, 1.6 + 0.36 * len(rows)))
         axis = figure.subplots()
         for base in (entry for entry in own if not entry["mismatch"]):
-            axis.axvspan(base["rmse_low_m"] or base["rmse_m"], base["rmse_high_m"] or base["rmse_m"], color="#eeeeee")
+            axis.axvspan(*ends_of(base), color="#eeeeee")
             axis.axvline(base["rmse_m"], color=REFERENCE, lw=1.0, ls=":")
         for row, name in enumerate(rows):
             levels = [entry for entry in own if entry["mismatch"] == name]
@@ -71,8 +71,8 @@ def draw_robustness(content: Mapping[str, Any], spec: RobustnessSpec) -> Figure:
                 edge = "black" if entry["ordinary"] else colour
                 draw_rmse(axis, place, entry, colour, ms=5.5, mec=edge, mew=1.0)
         axis.set_yticks(range(len(rows)), [_label(content, name) for name in rows], fontsize=8)
-        axis.set(ylim=(len(rows) - 0.4, -0.6), xscale="log")
-        mark_metres(axis.xaxis)
+        axis.set_ylim(len(rows) - 0.4, -0.6)
+        log_metres(axis, "x")
         axis.set_xlabel(f"RMSE of the agent's position [m], {scheme}; dotted: nothing wrong")
         axis.set_title("Levels from light to dark; ring: ordinary equipment", fontsize=10)
     return figure

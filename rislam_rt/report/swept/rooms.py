@@ -12,7 +12,7 @@ from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.report.markdown import metres, metres_between, paragraph, picture, ratio, table_lines
 from rislam_rt.report.style import MARKER, scheme_colour, styled
 from rislam_rt.report.swept.entries import scheme_entry, what_limits
-from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.report.swept.error_curves import ends_of, log_metres
 from rislam_rt.shipped import short_names
 from rislam_rt.studies.swept import Group, RoomsSpec
 
@@ -79,9 +79,7 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
             shown = [room for room in rooms if room in own and own[room]["rmse_m"]]
             x = np.array([rooms.index(room) + shift for room in shown])
             value = np.array([own[room]["rmse_m"] for room in shown])
-            ends = np.array(
-                [[own[r]["rmse_low_m"] or own[r]["rmse_m"], own[r]["rmse_high_m"] or own[r]["rmse_m"]] for r in shown]
-            ).reshape(-1, 2)
+            ends = np.array([ends_of(own[room]) for room in shown]).reshape(-1, 2)
             bound = [own[room]["bound_m"] for room in shown]
             colour = scheme_colour(scheme)
             axis.errorbar(
@@ -91,8 +89,7 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
             axis.hlines(bound, x - 0.06, x + 0.06, color=colour, lw=2.0, ls=(0, (1, 0.6)))
         axis.axhline(AIMS["rmse_m"], color="black", lw=0.9, ls=":")
         axis.text(1.0, AIMS["rmse_m"], " aim", va="center", fontsize=9, transform=axis.get_yaxis_transform())
-        axis.set_yscale("log")
-        mark_metres(axis.yaxis)
+        log_metres(axis)
         axis.set_xticks(range(len(rooms)), rooms, rotation=20, ha="right")
         axis.set_ylabel("RMSE of the agent's position [m]")
         axis.set_title("Marks: RMSE over seeds with 95 % interval; short bars: posterior bound", fontsize=10)

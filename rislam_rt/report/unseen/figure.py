@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rislam_rt.report.style import TRUTH, styled
-from rislam_rt.report.swept.error_curves import mark_metres
+from rislam_rt.report.swept.error_curves import log_metres
 from rislam_rt.report.unseen.score_cards import CLASSES, SchemeRun, column, in_order
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -24,8 +24,7 @@ def draw_unseen(runs: Mapping[str, Sequence[SchemeRun]]) -> Figure:
             _draw_division(axis, division, runs)
         for axis in axes[::2]:
             axis.set_ylabel("RMSE relative to the true start [m]")
-        axes[0].set_yscale("log")
-        mark_metres(axes[0].yaxis)
+        log_metres(axes[0])
         handles = [
             axes[0].plot([], [], ls="none", marker="o", ms=5, color=COLOURS[k % len(COLOURS)], label=name)[0]
             for k, name in enumerate(runs)

@@ -43,7 +43,7 @@ def write_unseen(
     there = sum(row.state == "done" for row in rows)
     about = about_lines(spec, record, tests, there, len(rows))
     # the page first: the others are known as the program's by it
-    files = {f"{spec.name}.md": unseen_page(content, runs, spec, about, figure).encode()}
+    files = {f"{spec.name}.md": unseen_page(content, runs, about, figure).encode()}
     if figure is not None:
         files[figure] = to_png(draw_unseen(runs))
     files[f"{spec.name}.csv"] = csv_bytes(run_entries(runs))

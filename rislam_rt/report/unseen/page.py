@@ -18,9 +18,8 @@ WORST = 12
 
 
 def unseen_page(
-    content: Mapping[str, Any], runs: Mapping[str, Sequence[SchemeRun]], spec: UnseenSpec, about: Sequence[str],
-    figure: str | None,
-) -> str:  # fmt: skip
+    content: Mapping[str, Any], runs: Mapping[str, Sequence[SchemeRun]], about: Sequence[str], figure: str | None
+) -> str:
     """Markdown page of a study in unseen rooms."""
     lines = ["# Unseen rooms", "", *about, "", *_meaning(), ""]
     lines += picture(figure, "Relative error of every run, by class of room and motion")
@@ -30,7 +29,9 @@ def unseen_page(
     for name, classes in content["classes"].items():
         rows = [[entry["division"], entry["class"], *(show(entry) for show in COLUMNS.values())] for entry in classes]
         lines += [f"## By class: {name}", "", *table_lines(["class of", "", *COLUMNS], rows), ""]
-    lines += ["## Worst runs", "", *_worst(runs), "", "## Failures", "", *_failures(runs)]
+    failed = [(name, run) for name, members in runs.items() for run in members if run.failed]
+    failures = [f"- room {run.room}, {name}: {run.failed}" for name, run in failed] or ["None."]
+    lines += ["## Worst runs", "", *_worst(runs), "", "## Failures", "", *failures]
     return "\n".join(lines) + "\n"
 
 
@@ -79,14 +80,12 @@ def _series(spec: UnseenSpec) -> list[str]:
     schemes = spec.run.get("schemes", [])
     lines = [f"- all: schemes {', '.join(f'`{name}`' for name in schemes)} (without a panel, what needs none)"]
     for variant in spec.variants:
-        settings = ", ".join(f"`{key} = {_toml(value)}`" for key, value in variant.set.items())
+        told = {
+            key: str(value).lower() if isinstance(value, bool) else repr(value) for key, value in variant.set.items()
+        }
+        settings = ", ".join(f"`{key} = {value}`" for key, value in told.items())
         lines.append(f"- `{variant.name}`: {settings or 'the defaults'}{f'; {variant.note}' if variant.note else ''}")
     return ["", *lines]
-
-
-def _toml(value: Any) -> str:
-    """A setting's value as in TOML, on the page of unseen rooms."""
-    return str(value).lower() if isinstance(value, bool) else f"{value!r}"
 
 
 def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
@@ -104,12 +103,6 @@ def _worst(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
              traits["panel"]]
         )  # fmt: skip
     return table_lines(head, rows)
-
-
-def _failures(runs: Mapping[str, Sequence[SchemeRun]]) -> list[str]:
-    """Lines of the page of unseen rooms on the runs that failed."""
-    found = [(name, run) for name, members in runs.items() for run in members if run.failed]
-    return [f"- room {run.room}, {name}: {run.failed}" for name, run in found] or ["None."]
 
 
 def _median(name: str, scale: float = 1.0, digits: int = 2) -> Any:

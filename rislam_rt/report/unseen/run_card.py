@@ -52,14 +52,6 @@ def _yes(name: str) -> Show:
     return lambda entry: "yes" if entry[name] else "no"
 
 
-def _lost(entry: Mapping[str, Any]) -> str:
-    return f"from {entry['lost_at_s']:.1f} s on" if entry["lost"] else "no"
-
-
-def _panel(entry: Mapping[str, Any]) -> str:
-    return _yes("panel_found")(entry) if entry["panel_heard"] else "not heard"
-
-
 ROWS: dict[str, Show] = {
     "RMSE [mm]": _value("rmse_m", MILLI, 1),
     "RMSE / bound": _value("ratio"),
@@ -71,7 +63,7 @@ ROWS: dict[str, Show] = {
     "dead reckoning [mm]": _value("dead_reckoning_m", MILLI, 0),
     "NEES per degree of freedom": _value("nees"),
     "NEES across (x and y) per degree of freedom": _value("horizontal_nees"),
-    "lost": _lost,
+    "lost": lambda entry: f"from {entry['lost_at_s']:.1f} s on" if entry["lost"] else "no",
     "silently lost": _yes("silent"),
     "births": _over_time("births"),
     "births of the right kind": _of("births_right", "births_judged"),
@@ -83,7 +75,7 @@ ROWS: dict[str, Show] = {
     "landmarks (with panel) found of those heard": _of("points_found", "points_heard"),
     "error of those found [mm]": _value("point_m", MILLI, 1),
     "delay of landmarks [s]": _over_time("point_delay_s"),
-    "panel found": _panel,
+    "panel found": lambda entry: _yes("panel_found")(entry) if entry["panel_heard"] else "not heard",
     "delay of the panel [s]": _over_time("panel_delay_s"),
     "ghost walls": _value("ghost_walls", digits=0),
     "ghost landmarks": _value("ghost_points", digits=0),

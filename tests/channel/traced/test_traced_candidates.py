@@ -5,16 +5,15 @@ import itertools
 import numpy as np
 import pytest
 
+from rislam_rt.channel.specular_legs import NO_WALL, turned_round
 from rislam_rt.channel.traced import TracedChannel, wall_sequences
 from rislam_rt.channel.traced.wall_sequences import (
     BACK,
     FRONT,
-    NO_WALL,
     CandidateIndices,
     in_blocks,
     point_sides,
     possible_sequences,
-    turned_round,
     wall_sides,
 )
 from rislam_rt.channel.walls import build_walls
