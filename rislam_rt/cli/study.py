@@ -184,6 +184,8 @@ def run_classifier(spec: ClassifierSpec, given: StudyOptions) -> None:
     files = (f"{PAGE}.md", f"{PAGE}.json", WEIGHTS, *(PICTURES if given.page else ()))
     folder = study_folder(given.out, f"{spec.name}-{spec.seed}", record, files)
     prepare_channel(spec.channel)
+    for one in opened:
+        one.warn()
     with show_progress() as progress:
         found = train_and_score(gather_sets(scenes, spec, progress=progress), spec)
     content = {**record, **classifier.classifier_table(found)}

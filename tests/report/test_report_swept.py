@@ -176,6 +176,18 @@ def test_rooms_say_which_aims_are_missed(tmp_path):
     assert entry["ghost_walls"] == 2.0
 
 
+def test_walls_that_are_found_though_none_is_heard_for_long_have_no_share(tmp_path):
+    """As in a run of half a second: the table used to end in a traceback."""
+    cells = rows([{"scene": "../scenes/paper_room"}], lambda p, f: 0.02 * f)
+    for row in cells:
+        for scheme in row.result["schemes"].values():
+            scheme["walls"] = {name: {**wall, "audible_s": 0.6} for name, wall in scheme["walls"].items()}
+    spec = RoomsSpec(kind="rooms", name="rooms", repetitions=6, scenes=["../scenes/paper_room"])
+    page = write_swept(cells, spec, RECORD, tmp_path).read_text()
+    assert "| 1.00, bound 0.50 |" in page
+    assert "None" not in page
+
+
 def test_what_has_not_run_is_not_counted_as_not_found():
     """Of a sweep that goes on, each share is of the runs that there are."""
     points = [{"scene": "../scenes/paper_room"}]

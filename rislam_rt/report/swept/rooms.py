@@ -143,12 +143,14 @@ NAMES = {
 
 
 def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> str:
-    """Table cell of the study in many rooms: error and bound of landmarks or walls, and the share that was found."""
-    bound = entry[BOUND_OF[name]]
-    known = "" if bound is None else f"bound {bound:.{digits}f}"
-    if entry[name] is None:
-        return "-" if entry[share] is None else ", ".join(part for part in ("none found", known) if part)
-    return ", ".join(part for part in (f"{entry[name]:.{digits}f}", known) if part) + f" ({share_text(entry[share])})"
+    """Table cell of the study in many rooms: error and bound of landmarks or walls, and the share found of those that
+    count; no share where none counts, as none is heard for long."""
+    error, bound, found = entry[name], entry[BOUND_OF[name]], entry[share]
+    if error is None and found is None:
+        return "-"
+    parts = ["none found" if error is None else f"{error:.{digits}f}"]
+    parts += [] if bound is None else [f"bound {bound:.{digits}f}"]
+    return ", ".join(parts) + ("" if error is None or found is None else f" ({share_text(found)})")
 
 
 def _since(entry: Mapping[str, Any]) -> str:
