@@ -9,7 +9,7 @@ from rislam_rt.model import Occluder, RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, winding
 from rislam_rt.scene.check.meshes import degenerate_errors
 from rislam_rt.scene.check.triangle_array import TriangleArray
-from rislam_rt.scene.findings import Finding, error_at, warning_at
+from rislam_rt.scene.findings import Finding
 
 
 def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
@@ -25,19 +25,18 @@ def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
         inside = _inside(marks, shade)
         if number is not None and not inside[number]:
             message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
-            yield error_at(room.file, field, message, "give a closed mesh in the room's frame, about the position")
+            yield room.error(field, message, "give a closed mesh in the room's frame, about the position")
             continue
         if number is not None:
             inside[number] = False
         if inside.any():
             message = f"'{room.scene.landmarks[int(np.argmax(inside))]}' lies inside it, where no ray reaches it"
-            yield error_at(room.file, field, message, "move one of the two")
+            yield room.error(field, message, "move one of the two")
         for part, points in (("the agent", motion.position), ("Tx", motion.tx), ("Rx", motion.rx)):
             cycle = _enters(points, shade)
             if cycle is not None:
-                yield error_at(
-                    room.file, field, f"{part} is inside it at or after cycle {cycle}", "keep the agent away from it"
-                )
+                what = f"{part} is inside it at or after cycle {cycle}"
+                yield room.error(field, what, "keep the agent away from it")
                 break
 
 
@@ -54,7 +53,7 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
             field = f"scatterer[{number}].height_m ({scatterer.name})"
             near_field = np.pi * (scatterer.radius or 0.0) * nearest  # a long one's, by geometrical optics
             mend = f"take a shorter one, or give 'rcs_m2': pi r times the distance, {near_field:.2g} m^2 there"
-            yield warning_at(room.file, field, message, mend)
+            yield room.warning(field, message, mend)
 
 
 def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:

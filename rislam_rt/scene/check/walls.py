@@ -14,7 +14,7 @@ from rislam_rt.geometry.triangles import triangle_areas, triangle_planes
 from rislam_rt.input_messages import counted
 from rislam_rt.scene.check.mesh_queries import crossings, free_ways, sphere_directions, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
-from rislam_rt.scene.findings import Finding, note_at, warning_at
+from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
 """Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat."""
@@ -63,12 +63,12 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
         if number == several[0]:
             others = f", and {counted(len(several) - 1, 'other reflector')} more than one" if len(several) > 1 else ""
             mend = f"its walls are {name}#0 to {name}#{count - 1}"
-            yield note_at(room.file, field, f"the mesh has {count} planes{others}", mend)
+            yield Finding("note", room.file, field, f"the mesh has {count} planes{others}", mend)
         angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
             mend = f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
-            yield warning_at(room.file, field, message, mend)
+            yield room.warning(field, message, mend)
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
@@ -93,10 +93,10 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
         if not why:
             mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm"
-            yield warning_at(room.file, field, message, f"where they overlap '{names[0]}' reflects; {mend}")
+            yield room.warning(field, message, f"where they overlap '{names[0]}' reflects; {mend}")
         elif left[why]:
             message += f", and {counted(left[why] - 1, 'other pair')} likewise" if left[why] > 1 else ""
-            yield note_at(room.file, field, message, why)
+            yield Finding("note", room.file, field, message, why)
             left[why] = 0
 
 

@@ -124,13 +124,9 @@ def plan_stops(
     times = inner if turn_rate is None else np.abs(turns) / turn_rate
     if (times > (1.0 + 1e-9) * inner).any():
         late = int(np.argmax(times / inner))
-        fault = Fault(
-            f"{inner[late]:g} s, and the turn of {np.degrees(abs(turns[late])):.3g} degrees there takes "
-            f"{times[late]:.3g} s",
-            "halt longer, or raise agent.turn_deg_s",
-        )
-        fault.key = f"halt_s[{stops[late + 1]}]"
-        raise fault
+        turn = f"the turn of {np.degrees(abs(turns[late])):.3g} degrees there takes {times[late]:.3g} s"
+        mend = "halt longer, or raise agent.turn_deg_s"
+        raise Fault(f"{inner[late]:g} s, and {turn}", mend, f"halt_s[{stops[late + 1]}]")
     return StopAndGo(stretches, halts[stops], turns, times)
 
 

@@ -96,8 +96,7 @@ def _made(**values: Any) -> Material:
     try:
         return Material(**values)
     except SceneError as error:
-        what, _, mend = str(error).partition("; ")
-        raise Fault(what, mend) from None
+        raise Fault.of(error) from None
 
 
 def material_word(material: Material | None) -> str:
