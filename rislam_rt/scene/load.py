@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -75,7 +76,9 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
 
 def _unit_findings(draft: SceneDraft) -> list[Finding]:
     """Warnings of a loaded scene folder about units: of its file, its recording, and each of its meshes."""
-    table, scene, bounds = _plain_table(Path(draft.file)), draft.scene, draft.bounds
+    scene, bounds, table = draft.scene, draft.bounds, {}
+    with suppress(OSError, ValueError):  # what cannot be read has been said
+        table = parse_toml(Path(draft.file).read_bytes()[: MAX_SCENE_BYTES + 1].decode())
     lone = [] if scene is None else list(units.lone_mesh_warnings(draft.file, scene.reflectors))
     found = [*lone, *units.unit_warnings(draft.file, table, None if lone else bounds)]
     if scene is not None and bounds is not None and "trajectory" in table.get("agent", {}):
@@ -90,14 +93,6 @@ def _check_read(scene: Scene, file: str, start_key: str, radio: RadioConfig | No
         errors += material_errors(scene, file, radio)
     faint = [] if radio is None else faint_slabs(scene, file, radio)
     return errors or [*find_warnings(scene, file, radio or RadioConfig()), *faint]
-
-
-def _plain_table(file: Path) -> dict[str, Any]:
-    """Content of a scene file to load as TOML gives it, not validated; empty if it cannot be read."""
-    try:
-        return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
-    except (OSError, ValueError):
-        return {}
 
 
 def read_draft(path: str | Path) -> SceneDraft:
@@ -155,7 +150,9 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
         spec.name, tuple(reflectors), tuple(scatterers), join_panels(tuple(panels)), agent, digest.hexdigest(),
         tuple(occluders),
     )  # fmt: skip
-    return SceneDraft(str(file), scene, _idle_keys(spec.agent, str(file)), bounds, _start_key(spec.agent))
+    start = {"waypoints": "agent.waypoints[0]", "trajectory": "agent.trajectory"}
+    start_key = next((key for motion, key in start.items() if getattr(spec.agent, motion) is not None), START_KEY)
+    return SceneDraft(str(file), scene, _idle_keys(spec.agent, str(file)), bounds, start_key)
 
 
 def _idle_keys(agent: AgentSection, file: str) -> list[Finding]:
@@ -164,13 +161,6 @@ def _idle_keys(agent: AgentSection, file: str) -> list[Finding]:
         return []
     message = "it changes nothing without a halt between the ends, where the agent would turn on the spot"
     return [warning_at(file, "agent.turn_deg_s", message, "give one in 'halt_s', or leave it out")]
-
-
-def _start_key(agent: AgentSection) -> str:
-    """Key of the scene file to load that says where the agent starts."""
-    if agent.waypoints is not None:
-        return "agent.waypoints[0]"
-    return START_KEY if agent.trajectory is None else "agent.trajectory"
 
 
 def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:

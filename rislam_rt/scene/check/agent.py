@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import MAX_SPEED
-from rislam_rt.geometry.connected_parts import connected_triangles
+from rislam_rt.geometry.triangles import connected_triangles
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions, touching, winding
 from rislam_rt.scene.check.triangle_array import KEEP_AWAY, MIN_CLEARANCE, TriangleArray

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.model.itu import ITU_MATERIALS, itu_parameters
 from rislam_rt.model.slab import normal_reflection
 from rislam_rt.scene.check.mesh_queries import touching
+from rislam_rt.scene.check.occluders import occluder_fields
 from rislam_rt.scene.check.triangle_array import KEEP_AWAY, MIN_CLEARANCE, TriangleArray, without_area
 from rislam_rt.scene.check.units import ROOM_FIELD
 from rislam_rt.scene.findings import Finding, error_at, warning_at
@@ -29,17 +29,14 @@ def name_errors(room: TriangleArray) -> Iterator[Finding]:
 
 
 def face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of reflectors with faces without area."""
-    for number, reflector in enumerate(room.scene.reflectors):
-        yield from degenerate_errors(room, f"reflector[{number}].mesh ({reflector.name})", reflector.triangles)
-
-
-def degenerate_errors(room: TriangleArray, field: str, triangles: Floats) -> Iterator[Finding]:
-    """Scene check: error of a mesh, triangles (T, 3, 3), that has faces without area."""
-    bad = without_area(triangles)
-    if bad.any():
-        message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
-        yield room.error(field, message, "remove degenerate faces from the mesh")
+    """Scene check: errors of reflectors and occluders with faces without area."""
+    reflectors = enumerate(room.scene.reflectors)
+    parts = [(f"reflector[{number}].mesh ({one.name})", one.triangles) for number, one in reflectors]
+    for field, triangles in [*parts, *((field, shade.triangles) for field, _, shade in occluder_fields(room))]:
+        bad = without_area(triangles)
+        if bad.any():
+            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
+            yield room.error(field, message, "remove degenerate faces from the mesh")
 
 
 def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:

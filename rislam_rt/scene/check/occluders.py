@@ -7,21 +7,14 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Occluder, RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, winding
-from rislam_rt.scene.check.meshes import degenerate_errors
 from rislam_rt.scene.check.triangle_array import TriangleArray
 from rislam_rt.scene.findings import Finding
-
-
-def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of occluders with faces without area."""
-    for field, _, shade in _occluders(room):
-        yield from degenerate_errors(room, field, shade.triangles)
 
 
 def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
     """Scene check: errors of an occluder off its own scatterer, or about another landmark or the agent."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
-    for field, number, shade in _occluders(room):
+    for field, number, shade in occluder_fields(room):
         inside = _inside(marks, shade)
         if number is not None and not inside[number]:
             message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
@@ -56,8 +49,8 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
             yield room.warning(field, message, mend)
 
 
-def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
-    """Field in the scene file, number of the scatterer (None: stands alone), and mesh of every occluder."""
+def occluder_fields(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
+    """Scene check: field in the file, number of the scatterer (None: stands alone), and mesh of every occluder."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade

@@ -12,7 +12,7 @@ from rislam_rt.geometry.coplanar import ALIKE, CoplanarPair, lies_within, stack_
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_areas, triangle_planes
 from rislam_rt.input_messages import counted
-from rislam_rt.scene.check.mesh_queries import crossings, free_ways, sphere_directions, touching
+from rislam_rt.scene.check.mesh_queries import free_ways, is_blocked, sphere_directions, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
 from rislam_rt.scene.findings import Finding
 
@@ -126,8 +126,8 @@ def _is_seen(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: f
     upper, lower = (room.triangles[room.owner == parts.reflector(number)] for number in (pair.upper, pair.lower))
     seen = sides[np.arange(len(views)) % len(sides)]  # each by its own share of the views
     for triangles in (upper, lower, room.triangles):  # the nearest hide most
-        blocked = np.unique(crossings(views, seen, triangles)[0])
-        views, seen = np.delete(views, blocked, axis=0), np.delete(seen, blocked, axis=0)
+        free = ~is_blocked(views, seen, triangles)
+        views, seen = views[free], seen[free]
     return len(views) > 0
 
 

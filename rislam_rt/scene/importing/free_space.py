@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross, triangle_planes
-from rislam_rt.scene.check.mesh_queries import crossings, hit_shares, sphere_directions
+from rislam_rt.scene.check.mesh_queries import crossings, hit_shares, is_blocked, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
 """Heights [m] above the floor that are tried for the agent: that of a trolley or a hand, then higher, then lower."""
@@ -121,8 +121,7 @@ def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
     while stations and not reached.all():
         here = stations.pop()
         rows = np.flatnonzero(~reached)
-        blocked, _ = crossings(np.broadcast_to(here, (len(rows), 3)), points[rows], triangles)
-        rows = np.delete(rows, np.unique(blocked))
+        rows = rows[~is_blocked(here, points[rows], triangles)]
         reached[rows] = True
         stations += list(points[rows])
     return reached
@@ -159,9 +158,7 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
         looks = 0
         for eye in eyes:
             side = np.sign(np.einsum("pi,pi->p", eye - points, normal))[:, None]
-            ends = points + OFF_SURFACE * side * normal
-            blocked, _ = crossings(np.broadcast_to(eye, ends.shape), ends, triangles)
-            looks += len(ends) - len(np.unique(blocked))
+            looks += int(np.sum(~is_blocked(eye, points + OFF_SURFACE * side * normal, triangles)))
             if looks >= ENOUGH:
                 break
         seen[number] = looks >= ENOUGH or _stood_before(points, normal, eyes, triangles) >= ENOUGH
@@ -175,8 +172,7 @@ def _stood_before(points: Floats, normal: Floats, eyes: Floats, triangles: Float
     before = before[distance_to_triangles(before, triangles) >= CLEARANCES[-1] - OFF_SURFACE]
     met = np.zeros(len(before), dtype=np.bool_)
     for eye in eyes:
-        blocked, _ = crossings(np.broadcast_to(eye, before.shape), before, triangles)
-        met |= ~np.isin(np.arange(len(before)), blocked)
+        met |= ~is_blocked(eye, before, triangles)
     directions = sphere_directions(_RAYS)
     share = hit_shares(np.concatenate([eyes[:1], before[met]]), directions, triangles)
     return int(np.sum(share[1:] >= CLOSED * share[0]))
@@ -199,8 +195,7 @@ def _eyes(stations: Floats, triangles: Floats) -> Floats:
     for share in (0.1, 0.5, 0.9):
         moved = stations.copy()
         moved[:, 2] = low + share * (high - low)
-        blocked, _ = crossings(stations, moved, triangles)
-        found.append(np.delete(moved, np.unique(blocked), axis=0))
+        found.append(moved[~is_blocked(stations, moved, triangles)])
     return np.concatenate(found)
 
 

@@ -72,8 +72,7 @@ def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], list[Surfac
     if free is None:
         return found.surfaces, []
     seen = is_seen(free.stations, [s.mesh.triangles for s in found.surfaces], triangles)
-    kept = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if visible]
-    hidden = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if not visible]
+    kept, hidden = ([found.surfaces[k] for k in np.flatnonzero(seen == wanted)] for wanted in (True, False))
     return (kept, hidden) if kept else (found.surfaces, [])
 
 
@@ -115,10 +114,10 @@ def _reflectors(
             entries.append((piece.name, joined([s.mesh for s in mine if s.part == part]), part))
             given.append(bool(piece.node))
     names = numbered([name for name, _, _ in entries], given)
-    return {
-        name: (mesh, palette.material(name, parts[number].node, parts[number].material))
-        for name, (_, mesh, number) in zip(names, entries, strict=True)
-    }
+    found = {}
+    for name, (_, mesh, number) in zip(names, entries, strict=True):
+        found[name] = (mesh, palette.material(name, parts[number].node, parts[number].material))
+    return found
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:

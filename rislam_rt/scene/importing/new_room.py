@@ -19,8 +19,7 @@ from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
 from rislam_rt.scene.load import check_scene
 from rislam_rt.scene.mesh_placement import UNITS
 from rislam_rt.scene.room_files import room_files
-from rislam_rt.scene.templates import room_name
-from rislam_rt.scene.write import write_files
+from rislam_rt.scene.write import room_name, write_files
 
 PLANS = (".svg", ".geojson", ".json")
 """Endings of the files that are imported as floor plans."""

@@ -12,11 +12,10 @@ from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.check.triangle_array import KEEP_AWAY, MIN_CLEARANCE
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
 from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv, parse_tum
 from rislam_rt.scene.motion.stop_and_go import plan_stops
-from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
+from rislam_rt.scene.motion.waypoints import RoundedPath, along_heading, round_corners
 from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.schema import AgentSection
 

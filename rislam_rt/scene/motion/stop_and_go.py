@@ -10,8 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.headings import along_heading, short_turn
-from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
+from rislam_rt.scene.motion.waypoints import RoundedPath, along_heading, round_corners, short_turn
 
 
 class Stretch(NamedTuple):

@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.model.ris import ElementPattern
-from rislam_rt.scene.check.mesh_queries import crossings
+from rislam_rt.scene.check.mesh_queries import is_blocked
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
 from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
@@ -68,11 +68,10 @@ def draw_scatterer(
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
     """Share of the agent's path (K, 3) from which furniture hides a random landmark (3,), at every tenth position."""
     seen_from = way[::10]
-    triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
+    triangles = [piece.mesh().triangles for piece in pieces]
     if not triangles:
         return 0.0
-    cycles, _ = crossings(seen_from, np.broadcast_to(point, seen_from.shape), np.concatenate(triangles))
-    return len(np.unique(cycles)) / len(seen_from)
+    return float(np.mean(is_blocked(seen_from, point, np.concatenate(triangles))))
 
 
 def draw_panel(

@@ -19,8 +19,7 @@ from rislam_rt.scene.motion.agent_motion import straight_motion
 from rislam_rt.scene.motion.suggested_motion import suggest_agent
 from rislam_rt.scene.scene_folder import SCENE_FILE
 from rislam_rt.scene.schema import RisSection
-from rislam_rt.scene.templates import room_name
-from rislam_rt.scene.write import write_scene
+from rislam_rt.scene.write import room_name, write_scene
 from rislam_rt.scene.xml.materials import material_element, read_material
 from rislam_rt.scene.xml.read_scene import find_xml, read_xml
 from rislam_rt.scene.xml.write import SHADE_OF
@@ -73,17 +72,13 @@ def scene_of_xml(
     beside = path.with_name(SCENE_FILE)
     whole = load_scene(beside) if beside.is_file() else None
     exact = {r.name: r.material for r in whole.reflectors} if whole else {}
-    reflectors = tuple(
-        Reflector(p.name, p.mesh.vertices, p.mesh.faces, _exact(p.material, exact.get(p.name)))
-        for p in found.parts
-        if p.material is not None
-    )
+    solid = [(part, part.material) for part in found.parts if part.material is not None]
+    reflectors = tuple(Reflector(p.name, *p.mesh, _exact(material, exact.get(p.name))) for p, material in solid)
     if not reflectors:
         raise SceneError(f"{path}: nothing in it reflects; give a scene with radio materials")
     own = {SHADE_OF + s.name for s in whole.scatterers} if whole else set()
-    occluders = tuple(
-        Occluder(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
-    )
+    hiding = [part for part in found.parts if part.material is None and part.name not in own]
+    occluders = tuple(Occluder(*part.mesh, part.name) for part in hiding)
     if whole is not None:
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
         return replace(whole, name=name, reflectors=reflectors, occluders=occluders, digest=""), notes
@@ -106,7 +101,7 @@ def _window(within: Sequence[float]) -> Floats | None:
 
 def _exact(read: Material, exact: Material | None) -> Material:
     """An XML scene's material as the scene file beside it has it, if it was written so; else as read."""
-    if exact is not None and read_material(material_element(exact, "written")).material == read:
+    if exact is not None and read_material(material_element(exact, "written"))[0] == read:
         return exact
     return read
 

@@ -152,9 +152,8 @@ def build_plan(shapes: list[PlanShape], unit: float, height: float) -> FloorPlan
         try:
             _add(plan, shape, unit, height)
         except RislamError as error:
-            label = one_line(str(shape.about.get("name", number)))[:40]
-            raise Fault(f"{shape.kind} {label}: {one_line(str(error)).rpartition('; ')[0]}",
-                        one_line(str(error)).rpartition("; ")[2]) from None  # fmt: skip
+            label, (what, _, mend) = shape.about.get("name", number), one_line(str(error)).rpartition("; ")
+            raise Fault(f"{shape.kind} {one_line(str(label))[:40]}: {what}", mend) from None
     return plan
 
 

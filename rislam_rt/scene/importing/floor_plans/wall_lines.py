@@ -56,9 +56,8 @@ def wall_lines(plan: FloorPlan) -> list[Line]:
         for other in mine:
             if other.material == material and other.name == name:
                 continue
-            a, b = sorted(float(x) for x in (other.start + np.outer([s for p in other.spans for s in p], other.along)
-                                             - ends[0]) @ along)[:: max(2 * len(other.spans) - 1, 1)]  # fmt: skip
-            places = without_span(places, a, b)
+            there = (other.start + np.outer(np.ravel(other.spans), other.along) - ends[0]) @ along
+            places = without_span(places, float(there.min()), float(there.max()))
         same = next((k for k in mine if k.material == material and k.name == name), None)
         if same is None:
             if places:

@@ -7,8 +7,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.connected_parts import connected
-from rislam_rt.geometry.triangles import triangle_cross, triangle_heights
+from rislam_rt.geometry.triangles import connected, triangle_cross, triangle_heights
 
 FLAT_ANGLE = np.radians(0.5)
 """Angle [rad] of neighbouring triangles below which they are one plane: half a degree looks flat to whoever drew it."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
-from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.geometry.triangles import connected
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, bounds_of
 
 SPAN = 0.6
