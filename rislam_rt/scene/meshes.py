@@ -8,7 +8,7 @@ import struct
 import warnings
 from codecs import BOM_UTF8
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
@@ -58,6 +58,16 @@ def as_mesh(triangles: Floats) -> Mesh:
     """Make triangles (T, 3, 3) a mesh with shared corners."""
     vertices, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Join several meshes into one, their vertices and faces in order."""
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+_EMPTY = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 
 
 class MeshReader:
@@ -182,13 +192,7 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
             raise Fault(f"no node '{one_line(node)[:40]}' in the file", f"give one of: {one_line(known)}")
         below = graph.transforms.successors(node)
         nodes = [n for n in nodes if n in below]
-    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
-    for name in nodes:
-        mesh, _ = node_mesh(loaded, name)
-        vertices.append(mesh.vertices)
-        faces.append(mesh.faces + count)
-        count += len(mesh.vertices)
-    return Mesh(np.concatenate(vertices), np.concatenate(faces))
+    return joined([_EMPTY, *(node_mesh(loaded, name)[0] for name in nodes)])
 
 
 def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
@@ -197,7 +201,7 @@ def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
     geometry = loaded.geometry[name]
     faces = getattr(geometry, "faces", None)
     if faces is None or not len(faces):
-        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), geometry
+        return _EMPTY, geometry
     vertices = np.asarray(geometry.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     return Mesh(vertices, np.asarray(faces, dtype=np.int64)), geometry
 

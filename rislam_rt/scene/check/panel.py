@@ -81,10 +81,8 @@ def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioCon
         yield room.warning(f"{key}.element", message, "take 'energy', unless the paper's model is wanted")
     widest = max((float(d) for d, n in zip(spec.spacing, (spec.cols, spec.rows), strict=True) if n > 1), default=0.0)
     if widest >= radio.wavelength:
-        message = (
-            f"elements {widest:g} m apart, a wavelength or more ({radio.wavelength:.4g} m at "
-            f"{radio.carrier / 1e9:g} GHz): whatever the code, another direction is met as strongly"
-        )
+        wave = f"a wavelength or more ({radio.wavelength:.4g} m at {radio.carrier / 1e9:g} GHz)"
+        message = f"elements {widest:g} m apart, {wave}: whatever the code, another direction is met as strongly"
         yield room.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
@@ -156,10 +154,9 @@ def _off_host(triangles: Floats, panel: RisPanel) -> tuple[str, str]:
 def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
     """Scene check: error of a RIS panel with nothing before it but something behind, unless the agent is before it."""
     ahead, behind = (
-        ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
-                 room.triangles)[0] >= 0
-        for side in (1.0, -1.0)
-    )  # fmt: skip
+        ray_hits(panel.center + 2.0 * MIN_CLEARANCE * look, look[None], room.triangles)[0] >= 0
+        for look in (panel.spec.normal, -panel.spec.normal)
+    )
     before = ((room.scene.agent.position - panel.center) @ panel.spec.normal > 0.0).any()
     if behind and not ahead and not before:
         yield room.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")

@@ -101,9 +101,8 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
     longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
     if longest > LARGEST_ROOM:
         for unit, name in NAMES.items():
-            factor = UNITS[name]
-            if USUAL_ROOM[0] <= longest * factor <= USUAL_ROOM[1]:
-                meant = " x ".join(f"{side * factor:.3g}" for side in size)
+            if USUAL_ROOM[0] <= longest * UNITS[name] <= USUAL_ROOM[1]:
+                meant = " x ".join(f"{side * UNITS[name]:.3g}" for side in size)
                 mend = f'say units = "{name}" in the table [meshes]'
                 return f"the room is {words} m; in {unit} it would be {meant} m", mend
         return f"the room is {words} m", "give metres"
@@ -119,11 +118,10 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
     if away <= FAR * size:
         return
     for unit, name in NAMES.items():
-        factor = UNITS[name]
-        meant = point * factor
+        meant = point * UNITS[name]
         if (meant >= bounds[0]).all() and (meant <= bounds[1]).all():
             message = f"{point.tolist()} is far outside the room; in {unit} it would be {np.round(meant, 6).tolist()} m"
-            yield warning_at(file, field, message, f"give metres: multiply by {factor:g}")
+            yield warning_at(file, field, message, f"give metres: multiply by {UNITS[name]:g}")
             return
 
 

@@ -21,8 +21,7 @@ from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.meshes import Mesh, as_mesh
-from rislam_rt.scene.shapes import joined
+from rislam_rt.scene.meshes import Mesh, as_mesh, joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:

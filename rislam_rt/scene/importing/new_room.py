@@ -109,8 +109,5 @@ def write_room(
         place = f"{errors[0].field}: " if errors[0].field else ""
         raise Fault(f"the room would not pass its check: {place}{errors[0].message}", mend)
     write_files(files, folder, overwrite=overwrite)
-    return remarks + [
-        f"{f.field}: {f.message}; {f.mend} (--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"
-        for f in findings
-        if ".material." in f.field
-    ]
+    how = "(--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"
+    return remarks + [f"{f.field}: {f.message}; {f.mend} {how}" for f in findings if ".material." in f.field]

@@ -114,10 +114,12 @@ def plan_stops(
     last = len(waypoints) - 1
     stops = [0, *(int(row) for row in np.flatnonzero(halts[1:-1]) + 1), last]
     stretches = []
-    for start, end in pairwise(stops):
+    for start, end in pairwise(stops):  # each grows to that speed, or as far as its length lets it
         way = round_corners(waypoints[start : end + 1], speed**2 / acceleration, start)
         rests = [from_rest or halts[stop] > 0.0 or 0 < stop < last for stop in (start, end)]
-        stretches.append(_stretch(way, speed, acceleration, *rests))
+        peak = min(speed, float(np.sqrt(2.0 * acceleration * way.total / sum(rests)))) if any(rests) else speed
+        ramps = (peak / acceleration if rest else 0.0 for rest in rests)
+        stretches.append(Stretch(way, peak, acceleration, *ramps))
     turns = _turns([stretch.way for stretch in stretches])
     inner = halts[stops[1:-1]]
     times = inner if turn_rate is None else np.abs(turns) / turn_rate
@@ -127,14 +129,6 @@ def plan_stops(
         mend = "halt longer, or raise agent.turn_deg_s"
         raise Fault(f"{inner[late]:g} s, and {turn}", mend, f"halt_s[{stops[late + 1]}]")
     return StopAndGo(stretches, halts[stops], turns, times)
-
-
-def _stretch(way: RoundedPath, speed: float, acceleration: float, from_rest: bool, to_rest: bool) -> Stretch:
-    """Stretch of a stop-and-go motion that grows to that speed [m/s], or as far as its length lets it."""
-    ramps = int(from_rest) + int(to_rest)
-    peak = min(speed, float(np.sqrt(2.0 * acceleration * way.total / ramps))) if ramps else speed
-    ramp = peak / acceleration
-    return Stretch(way, peak, acceleration, ramp if from_rest else 0.0, ramp if to_rest else 0.0)
 
 
 def _turns(ways: Sequence[RoundedPath]) -> Floats:

@@ -67,10 +67,11 @@ def round_corners(waypoints: Floats, radius: float, first: int = 0) -> RoundedPa
     turn = np.arctan2(np.linalg.norm(cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
     if (turn > SHARPEST).any():
         corner = first + int(np.argmax(turn)) + 1
-        raise Fault(
-            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner} (the first is 0)",
-            f"give a way round (up to {np.degrees(SHARPEST):.0f} degrees at a waypoint), or a halt there: agent.halt_s",
+        mend = (
+            f"give a way round (up to {np.degrees(SHARPEST):.0f} degrees at a waypoint), or a halt there: agent.halt_s"
         )
+        what = f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner} (the first is 0)"
+        raise Fault(what, mend)
     cut = np.concatenate([[0.0], np.where(turn > STRAIGHT, radius * np.tan(turn / 2.0), 0.0), [0.0]])
     left = length - cut[:-1] - cut[1:]
     if (left < 0.0).any():
@@ -113,9 +114,8 @@ def along_heading(course: Floats) -> Floats:
     neighbour's."""
     length = np.linalg.norm(course, axis=1)
     # beside a millionth of the highest speed there is only rounding, which points anywhere
-    level = np.hypot(course[:, 0], course[:, 1]) > np.maximum(
-        1e-9 * length, max(1e-6 * length.max(initial=0.0), 1e-300)
-    )
+    least = np.maximum(1e-9 * length, max(1e-6 * length.max(initial=0.0), 1e-300))
+    level = np.hypot(course[:, 0], course[:, 1]) > least
     if not level.any():
         return np.zeros(len(course))
     last = np.maximum.accumulate(np.where(level, np.arange(len(course)), -1))

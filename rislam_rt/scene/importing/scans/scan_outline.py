@@ -10,9 +10,8 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 from rislam_rt.scene.importing.scans.scan_planes import ScanPlane
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, joined
 from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.shapes import joined
 
 CELL = 0.1
 """Side [m] of the cells in which the points of a scanned plane are counted."""
