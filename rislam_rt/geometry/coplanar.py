@@ -76,8 +76,7 @@ def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floa
 
 
 def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
-    """Whether coplanar triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by more than `depth` [m]
-    anywhere.
+    """Whether coplanar triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by over `depth` [m].
 
     Two triangles are apart if their shadows on a normal to one of their six edges are (separating axes).
     """

@@ -100,8 +100,7 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Object around the agent, of the scene check: name of the reflector with a small piece around a point (3,) that
-    holds no mark (H, 3); empty without one."""
+    """Scene check: name of the object around a point (3,) that holds no mark (H, 3), a reflector; empty without one."""
     scene_box = np.prod(room.bounds[1] - room.bounds[0])
     for number, reflector in enumerate(room.scene.reflectors):
         mine = room.triangles[room.owner == number]

@@ -60,8 +60,7 @@ def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:
 
 
 def _overlap(one: RisPanel, other: RisPanel) -> bool:
-    """Scene check: whether two RIS panels overlap, that is look the same way from one plane, and no axis of either
-    separates them."""
+    """Scene check: whether two RIS panels overlap: they look the same way from one plane, and no axis parts them."""
     gap = other.center - one.center
     if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > THICKEST:
         return False
@@ -99,8 +98,7 @@ def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Fin
 
 
 def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """Scene check: errors of a RIS panel that does not lie flat on the wall that is named as its host, or just before
-    it."""
+    """Scene check: errors of a RIS panel that does not lie flat on the wall named as its host, or just before it."""
     names = [r.name for r in room.scene.reflectors]
     _, near = touching(panel.center[None], room.triangles, MIN_CLEARANCE)
     behind = sorted({room.name(t) for t in near})

@@ -126,8 +126,7 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Numbers that the scene check of units looks at: dotted field and largest number wherever a path of keys leads in
-    a scene file."""
+    """Scene check of units: dotted field and largest number wherever a path of keys leads in a scene file."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):
@@ -135,8 +134,7 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
-    """Points that the scene check of units looks at: dotted field and point (3,) wherever a path of keys leads in a
-    scene file; of a list, each."""
+    """Scene check of units: dotted field and point (3,), or each of several, where a path of keys leads in a file."""
     for field, value in _places(table, path, ""):
         listed = isinstance(value, list) and value and isinstance(value[0], list)
         for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:
@@ -145,8 +143,7 @@ def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:
-    """Fields that the scene check of units looks at: dotted field and value wherever a path of keys leads; in lists of
-    tables, of each."""
+    """Scene check of units: dotted field and value wherever a path of keys leads; in lists of tables, of each."""
     if isinstance(part, list) and path:
         for number, item in enumerate(part):
             yield from _places(item, path, f"{field}[{number}]")

@@ -30,7 +30,7 @@ HIDDEN, WITHIN = (
 
 
 class WallParts(NamedTuple):
-    """The walls (planar regions) of a scene's meshes, reflector by reflector."""
+    """The walls (planar regions) of a scene's meshes, reflector by reflector, as the channels part them."""
 
     flat: list[PlanarRegions]
     """Planar regions of each reflector."""
@@ -44,17 +44,12 @@ class WallParts(NamedTuple):
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
-def build_parts(room: TriangleArray) -> WallParts:
-    """Part every reflector's mesh into walls (planar regions), as the channels do."""
+def wall_findings(room: TriangleArray) -> Iterator[Finding]:
+    """Scene check: findings on meshes that lie on each other, are nearly flat, or have several walls."""
     flat = [planar_regions(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
-    return WallParts(flat, first, owner)
-
-
-def wall_findings(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: findings on meshes that lie on each other, are nearly flat, or have several walls."""
-    parts = build_parts(room)
+    parts = WallParts(flat, first, owner)
     yield from _stacked(room, parts)
     several = [number for number, part in enumerate(parts.flat) if len(part.offset) > 1]
     for number in several:

@@ -101,8 +101,7 @@ def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, c
 
 
 def _largest_part(places: Floats, headroom: Floats, share: Floats, triangles: Floats) -> Booleans:
-    """Which of a room's places (N, 3) are in the part of most volume that free straight lines join, of those from which
-    few rays escape."""
+    """Which of a room's places (N, 3) are in the largest part that free straight lines join and few rays leave."""
     best, volume, left = np.arange(0), -1.0, np.ones(len(places), dtype=np.bool_)
     for start in np.argsort(-headroom, kind="stable"):
         if not left[start]:
@@ -179,8 +178,7 @@ def _stood_before(points: Floats, normal: Floats, eyes: Floats, triangles: Float
 
 
 def _far_apart(stations: Floats, count: int) -> Floats:
-    """Viewpoints in free space (count, 3) among stations (S, 3), the first, and then ever the one farthest from all
-    before it."""
+    """Viewpoints in free space (count, 3) among stations (S, 3): the first, then ever the farthest from all before."""
     chosen, gap = [0], np.linalg.norm(stations - stations[0], axis=1)
     while len(chosen) < min(count, len(stations)):
         chosen.append(int(np.argmax(gap)))

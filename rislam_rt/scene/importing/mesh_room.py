@@ -25,7 +25,7 @@ from rislam_rt.scene.meshes import Mesh, as_mesh, joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
-    """Import a mesh file as the draft of a room.
+    """Import a mesh file as the draft of a room, by flat regions or a scan's planes: reflectors, materials, occluders.
 
     Raises
     ------
@@ -39,11 +39,6 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
     facets = find_facets(weld(placed))
     if not len(facets.area):
         raise Fault("no triangle of the file has an area", "export it again")
-    return build_draft(facets, parts, [*notes, *more], options)
-
-
-def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from an imported mesh, by flat regions or a scan's planes: reflectors, materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64))]
@@ -60,8 +55,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     occluders = _occluders(found, pieces, list(reflectors))
     palette.check_used([*reflectors, *sorted({p.material for p in parts if p.material})])
     said = _summary(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
-    remarks = [*notes, *about, *said]
-    return RoomDraft(reflectors, occluders, remarks + palette.remarks())
+    return RoomDraft(reflectors, occluders, [*notes, *more, *about, *said, *palette.remarks()])
 
 
 def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], list[Surface]]:

@@ -144,8 +144,7 @@ def _walk(agent: AgentSection, triangles: Floats, body: Body) -> Trajectory:
 
 
 def _cycle_times(steps: float, length: float, cycle_s: float, cycles: int | None) -> Floats:
-    """Times (K,) [s] of the cycles of the agent's motion along a way of that length [m], which takes so many steps of a
-    cycle."""
+    """Times (K,) [s] of the cycles of the agent's motion along a way of that length [m], and of so many steps."""
     most = int(steps + 1e-9) + 1
     if cycles is not None and cycles > most:
         what = f"{cycles} cycles wanted, the way of {length:.3g} m ends after {most}"

@@ -97,7 +97,7 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
     if "heading" in table:
         heading = table["heading"]
-        if not has_unit("heading", header[place["heading"].column]):
+        if not has_unit("heading", header[place["heading"][0]]):
             _check_radians(heading, time, position)
         return RecordedPoses(time, position, wrap(heading) if np.abs(heading).max() > MAX_HEADING else heading)
     turned = all(part in table for part in QUATERNION)

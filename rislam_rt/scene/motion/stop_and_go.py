@@ -33,8 +33,7 @@ class Stretch(NamedTuple):
         return self.rise + steady / self.peak + self.fall
 
     def at(self, time: Floats) -> tuple[Floats, Floats]:
-        """Distances (K,) [m] along a stretch between two halts, and speeds (K,) [m/s], at times (K,) [s] from its
-        start."""
+        """Distances (K,) [m] along a stretch between two halts, speeds (K,) [m/s], at times (K,) [s] from its start."""
         left = self.duration - time
         grows, falls = time < self.rise, left < self.fall
         speed = self.acceleration * np.where(grows, time, left)

@@ -124,7 +124,6 @@ def along_heading(course: Floats) -> Floats:
 
 
 def short_turn(before: Floats, after: Floats) -> Floats:
-    """Turns (N,) [rad] on the spot from headings (N,) to headings (N,) [rad], the short way; half a turn to the
-    left."""
+    """Turns (N,) [rad] on the spot from headings (N,) to others (N,) [rad], the short way; half a turn to the left."""
     turn = wrap(after - before)
     return np.where(np.abs(turn) > np.pi - HALF_TURN, np.pi, turn)

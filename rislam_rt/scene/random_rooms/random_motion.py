@@ -161,8 +161,7 @@ def _wander(rng: np.random.Generator) -> Floats:
 
 
 def _corners(angles: tuple[float, float], rng: np.random.Generator) -> Floats:
-    """Draw the rate of turn (K,) [rad/s] of a random motion with corners at random times, 4 to 10 s apart, of angles
-    in a range [rad]."""
+    """Draw the rate of turn (K,) [rad/s] of a random motion with corners 4 to 10 s apart, by angles in a range."""
     rate, at = np.zeros(CYCLES), rng.uniform(2.0, 6.0)
     while at < TIME[-1]:
         turn = rng.uniform(*angles) * rng.choice([-1.0, 1.0])

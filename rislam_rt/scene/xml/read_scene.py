@@ -129,8 +129,7 @@ class _XmlMaterials:
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """Material, as an XML scene is read, of one of its shapes: its own, or the one it refers to; None where nothing
-        reflects."""
+        """Material of a shape of an XML scene: its own, or the one that it refers to; None where nothing reflects."""
         for own in children(shape, "bsdf"):
             return self._noted(own)
         for reference in children(shape, "ref"):

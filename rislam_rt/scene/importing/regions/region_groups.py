@@ -136,8 +136,7 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
 
 
 def compass_side(direction: Floats) -> str:
-    """Side of the compass, for the name of a group of flat regions, of a horizontal direction, `east` along x, in
-    eighths."""
+    """Side of the compass, in eighths, of a horizontal direction, `east` along x: for names of groups of regions."""
     return _SIDES[int(np.round(np.degrees(np.arctan2(direction[1], direction[0])) / 45.0)) % 8]
 
 
