@@ -104,20 +104,16 @@ class MeshReader:
         elif suffix == ".glb":
             check_glb(content, max_faces, max_nodes)
         mesh = _own_ply(content) if suffix == ".ply" else None
-        return sound_mesh(mesh or self._by_trimesh(content, suffix[1:], node), max_faces, reach)
-
-    def _by_trimesh(self, content: bytes, file_type: str, node: str | None) -> Mesh:
-        """Mesh from a file's content in any format that trimesh reads."""
-        if self._key != (file_type, content):
-            self._loaded = unfold(content, file_type)
-            self._key = (file_type, content)
-        with _errors_as_faults(file_type):
-            return _flatten(self._loaded, node)
+        if mesh is None:
+            if self._key != (suffix, content):
+                self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
+            with _errors_as_faults(suffix[1:]):
+                mesh = _flatten(self._loaded, node)
+        return sound_mesh(mesh, max_faces, reach)
 
 
 def unfold(content: bytes, file_type: str) -> Any:
-    """Parse a mesh file's content into trimesh's scene of nodes. It gets bytes, not a path, so it can follow no
-    reference to another file.
+    """Parse a mesh file's content into trimesh's scene of nodes; of bytes, so that it follows no reference to a file.
 
     Raises
     ------
@@ -245,8 +241,7 @@ def too_many_faces(count: int, limit: int) -> Fault:
 
 
 def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
-    """Refuse a GLB mesh file whose nodes are too many, or, each mesh counted as often as a node names it, have too many
-    faces.
+    """Refuse a GLB mesh file of too many nodes or, each mesh counted as often as a node names it, too many faces.
 
     What cannot be read as a GLB file passes: the reader will say what is wrong with it.
 
@@ -255,12 +250,13 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
     Fault
         There are too many.
     """
-    document = _document(content)
     try:
+        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
+        document = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}
         nodes, meshes, accessors = (list(document.get(key, [])) for key in ("nodes", "meshes", "accessors"))
         uses = Counter(node["mesh"] for node in nodes if isinstance(node, dict) and "mesh" in node)
         faces = sum(times * _num_faces(meshes[mesh], accessors) for mesh, times in uses.items())
-    except (TypeError, KeyError, IndexError, AttributeError, ValueError, OverflowError):
+    except (struct.error, RecursionError, TypeError, LookupError, AttributeError, ValueError, OverflowError):
         return
     if len(nodes) > max_nodes:
         mend = f"join them, or raise limits.nodes = {max_nodes} in the scene file"
@@ -269,20 +265,8 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
         raise too_many_faces(faces, max_faces)
 
 
-def _document(content: bytes) -> dict[str, Any]:
-    """Table of contents (JSON chunk) of a GLB mesh file; empty if there is none."""
-    try:
-        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
-        found = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}
-    except (struct.error, ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) else {}
-
-
 def _num_faces(mesh: Any, accessors: list[Any]) -> int:
     """Triangles of a mesh in a scene's GLB file, counted: a third of its indices, or of its corners without any."""
-    total = 0
-    for part in mesh["primitives"]:
-        number = part["indices"] if "indices" in part else part["attributes"]["POSITION"]
-        total += max(int(accessors[number]["count"]), 0) // 3
-    return total
+    parts = mesh["primitives"]
+    rows = [part["indices"] if "indices" in part else part["attributes"]["POSITION"] for part in parts]
+    return sum(max(int(accessors[row]["count"]), 0) // 3 for row in rows)

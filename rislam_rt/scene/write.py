@@ -83,8 +83,7 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
 
 
 def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write files (relative name -> content) under a folder, such as a scene's: a new folder appears complete, by one
-    rename.
+    """Write files (relative name -> content) under a folder, such as a scene's: a new one appears whole, by one rename.
 
     With `overwrite`, files of an existing folder are replaced one by one, if this program made the room there
     (`check_made`), and others in it stay.
@@ -157,8 +156,7 @@ def _content(path: Path) -> str:
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
-    """Content of the path file written with a scene (TUM), lines `timestamp x y z qx qy qz qw`; the quaternion is the
-    heading about z."""
+    """Path file to write (TUM), `timestamp x y z qx qy qz qw` a line; the quaternion is the heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
         row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]

@@ -143,8 +143,7 @@ def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Float
 
 
 def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Booleans:
-    """Whether each group of triangles (T, 3, 3) is visible from any station (S, 3) in the free space, past all
-    `triangles` (A, 3, 3).
+    """Whether each group of triangles (T, 3, 3) is seen from any free station (S, 3), past all `triangles` (A, 3, 3).
 
     Looked at are points spread over each group, and, for the sides of things that stand close to a wall, where an agent
     can be before it; from some twenty stations far from each other and what is freely above and below them: a wall of

@@ -135,8 +135,7 @@ class MaterialAssignment:
         return [*remarks, f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def check_used(self, names: Iterable[str]) -> None:
-        """Check that every material that the user gave for an import has been used; `names`: some that could have been
-        meant.
+        """Check that every material given for an import has been used; `names`: some that could have been meant.
 
         Raises
         ------

@@ -1,5 +1,6 @@
 """Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) as triangles with names of node and material."""
 
+import base64
 import json
 import os
 import struct
@@ -37,8 +38,7 @@ class MeshPart:
 
 
 def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
-    """Read the parts of a mesh file to import, one for each node and material, and remarks on what it names and does
-    not hold.
+    """Read the parts of a mesh file to import, one a node and material, and remarks on what it names and lacks.
 
     Raises
     ------
@@ -158,8 +158,6 @@ def _joined_glb(content: bytes, folder: Path) -> bytes:
 
 def _embedded(uri: str) -> bytes:
     """Decode a buffer that stands inside a glTF mesh file in base64."""
-    import base64
-
     try:
         return base64.b64decode(uri.partition(",")[2], validate=True)
     except ValueError:

@@ -68,8 +68,7 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
 
 
 def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
-    """Motion along a path with rounded corners at constant speed [m/s], heading along it; to its end, or for so many
-    cycles.
+    """Motion along a path with rounded corners at constant speed [m/s], heading along it, to its end, or for `cycles`.
 
     Raises
     ------

@@ -53,8 +53,7 @@ def read_material(bsdf: Element) -> tuple[Material | None, list[str]]:
 
 
 def material_element(material: Material | None, name: str) -> Element:
-    """Material in a Sionna scene file (XML), a `<bsdf>` element: its own ITU slab, a slab of given permittivity, or air
-    for None.
+    """Material in a Sionna scene file (XML), a `<bsdf>`: its own ITU slab, a slab of given permittivity, air for None.
 
     A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
     only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no

@@ -79,8 +79,7 @@ def sionna_scenes() -> dict[str, Path]:
 
 
 def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = None) -> XmlScene:
-    """Read the shapes of a Mitsuba or Sionna scene file, with radio materials; where a window is given, what lies in
-    it.
+    """Read the shapes of a Mitsuba or Sionna scene file, with radio materials; of a window, what lies in it.
 
     Parameters
     ----------

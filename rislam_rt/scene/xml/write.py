@@ -32,8 +32,7 @@ also holds what Sionna's file format has no place for:
 
 
 def write_xml(scene: Scene, folder: str | Path) -> list[str]:
-    """Write a scene into a new folder, as `scene.xml` with meshes for Sionna's `load_scene`; returns what it cannot
-    carry.
+    """Write a scene as a new folder, `scene.xml` with meshes for Sionna's `load_scene`; returns what it cannot carry.
 
     Raises
     ------

@@ -81,8 +81,7 @@ def parse_corners(text: str) -> list[PlanShape]:
 
 
 def parse_geojson(content: bytes) -> list[PlanShape]:
-    """Parse a GeoJSON file into the shapes of a floor plan: polygons are rooms, lines are walls, unless a feature's
-    `kind` says else.
+    """Parse a GeoJSON file into the shapes of a floor plan: polygons are rooms, lines walls, unless `kind` says else.
 
     Raises
     ------

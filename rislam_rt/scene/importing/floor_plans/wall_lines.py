@@ -104,13 +104,10 @@ def snapped_spans(line: Line, lines: list[Line]) -> Spans:
             on = float((line.start + place * line.along - other.start) @ other.along)
             if any(low - SNAP <= on <= high + SNAP for low, high in other.spans):
                 meets.append(place)
-    near = np.array(meets)
     found = []
     for span in line.spans:
-        ends = []
-        for end in span:
-            best = near[np.argmin(np.abs(near - end))] if len(near) else end
-            ends.append(float(best) if abs(best - end) <= SNAP else end)
-        if ends[1] - ends[0] > SAME_LINE:
-            found.append((ends[0], ends[1]))
+        nearest = [min(meets, key=lambda place: abs(place - end), default=end) for end in span]
+        low, high = (best if abs(best - end) <= SNAP else end for best, end in zip(nearest, span, strict=True))
+        if high - low > SAME_LINE:
+            found.append((low, high))
     return found

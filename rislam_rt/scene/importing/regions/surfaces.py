@@ -188,8 +188,7 @@ def _with_clutter(
 
 
 def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
-    """Simplify an imported mesh's surfaces of clutter in the smallest cells [m] that leave few triangles; also the
-    error [m] and the cell."""
+    """Simplify an imported mesh's clutter in the smallest cells that leave few triangles; also error and cell [m]."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
         if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:
