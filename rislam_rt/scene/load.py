@@ -146,10 +146,8 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     digest = hashlib.sha256()
     for name, data in [("", content), *sorted(mesh_files.contents.items())]:  # name and length before each
         digest.update(f"{name}\0{len(data)}\0".encode() + data)
-    scene = Scene(
-        spec.name, tuple(reflectors), tuple(scatterers), join_panels(tuple(panels)), agent, digest.hexdigest(),
-        tuple(occluders),
-    )  # fmt: skip
+    ris = join_panels(tuple(panels))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest.hexdigest(), tuple(occluders))
     start = {"waypoints": "agent.waypoints[0]", "trajectory": "agent.trajectory"}
     start_key = next((key for motion, key in start.items() if getattr(spec.agent, motion) is not None), START_KEY)
     return SceneDraft(str(file), scene, _idle_keys(spec.agent, str(file)), bounds, start_key)
@@ -200,8 +198,6 @@ def build_panel(section: RisSection) -> RisPanel:
         angle = np.degrees(np.arccos(np.clip(normal @ up, -1.0, 1.0)))
         raise Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it", "up")
     up = unit(up - (normal @ up) * normal)
-    spec = RisSpec(
-        section.rows, section.cols, np.array(section.spacing_m), normal, up, section.levels, section.element,
-        section.amplitude,
-    )  # fmt: skip
+    size = section.rows, section.cols, np.array(section.spacing_m)
+    spec = RisSpec(*size, normal, up, section.levels, section.element, section.amplitude)
     return RisPanel(spec, np.array(section.center), section.host, section.name)

@@ -106,9 +106,7 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
     return RecordedPoses(recording.time[0] + np.arange(count) * cycle_s, position, heading)
 
 
-def _waypoint_motion(
-    agent: AgentSection, waypoints: list[list[float]], triangles: Floats, body: Body
-) -> Trajectory:  # fmt: skip
+def _waypoint_motion(agent: AgentSection, waypoints: list[list[float]], triangles: Floats, body: Body) -> Trajectory:
     """Motion of the agent along waypoints, off all triangles (T, 3, 3) [m]: at constant speed, unless halts or rest are
     asked for."""
     points, speed, cycle_s = np.array(waypoints, dtype=np.float64), agent.speed_m_s or 0.0, agent.cycle_s or 0.0

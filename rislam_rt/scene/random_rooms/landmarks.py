@@ -85,17 +85,12 @@ def draw_panel(
         host, center, normal, up = found
         apart = np.linalg.norm(landmarks - center, axis=1).min(initial=np.inf) >= APART
         if apart and not any(piece.holds(center, OFF_SURFACES) for piece in pieces):
-            return RisPanel(_data_sheet(normal, up, rng), center, host)
+            rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
+            cols = rows if rng.uniform() < SQUARE else cols
+            levels, element = int(rng.choice(LEVELS)), PATTERNS[rng.choice(len(PATTERNS))]
+            spec = RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
+            return RisPanel(spec, center, host)
     return None
-
-
-def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec:
-    """Draw the data sheet of a random RIS panel with this normal and up: size, levels, and element pattern."""
-    rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
-    if rng.uniform() < SQUARE:
-        cols = rows
-    levels, element = int(rng.choice(LEVELS)), PATTERNS[rng.choice(len(PATTERNS))]
-    return RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:

@@ -82,7 +82,12 @@ def scene_of_xml(
     if whole is not None:
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
         return replace(whole, name=name, reflectors=reflectors, occluders=occluders, digest=""), notes
-    agent = _motion(path, reflectors, occluders)
+    try:
+        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in occluders]))
+    except Fault as fault:
+        raise SceneError(fault.at(str(path), "").line) from None
+    body = Body(np.array(table["tx_offset_m"]), np.array(table["rx_offset_m"]))
+    agent = straight_motion(table["start"], table["velocity"], table["cycles"], table["cycle_s"], body)
     panel, about = _panel(reflectors, occluders, agent, carrier_ghz)
     way = float(np.linalg.norm(agent.position[-1] - agent.position[0]))
     notes.append(f"proposed way: {way:.2g} m in {agent.time[-1]:.0f} s, to be edited in [agent]; {about}")
@@ -115,13 +120,3 @@ def _panel(
     way = agent.position[[0, -1]]
     table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0), carrier_ghz)
     return (build_panel(RisSection(**table)) if table else None), about
-
-
-def _motion(path: Path, reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Trajectory:
-    """Suggested trajectory of an agent through the reflectors and occluders of an XML scene."""
-    try:
-        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in occluders]))
-    except Fault as fault:
-        raise SceneError(fault.at(str(path), "").line) from None
-    body = Body(np.array(table["tx_offset_m"]), np.array(table["rx_offset_m"]))
-    return straight_motion(table["start"], table["velocity"], table["cycles"], table["cycle_s"], body)

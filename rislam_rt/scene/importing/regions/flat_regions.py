@@ -57,6 +57,13 @@ class FlatRegions(NamedTuple):
     """(R,) part of the mesh connected by edges that each region is in; one that touches at a corner is none of it."""
     edges: Edges
 
+    @property
+    def part(self) -> Integers:
+        """Part (R,) of the file that each flat region of a mesh comes from."""
+        part = np.zeros(len(self.area), dtype=np.int64)
+        part[self.region] = self.mesh.part
+        return part
+
     def faces_of(self, regions: Integers) -> Integers:
         """Triangles (T, 3) of a mesh in given flat regions."""
         return self.mesh.faces[np.isin(self.region, regions)]

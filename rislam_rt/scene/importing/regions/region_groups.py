@@ -40,10 +40,8 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
 
     A node with a name of its own is one object; whatever has none is parted into what hangs together.
     """
-    part = np.zeros(len(facets.area), dtype=np.int64)
-    part[facets.region] = facets.mesh.part
-    node = np.array([plain_name(nodes[p]) for p in range(len(nodes))], dtype=object)[part]
-    box = bounds_of(facets, np.arange(len(part)))
+    node = np.array([plain_name(name) for name in nodes], dtype=object)[facets.part]
+    box = bounds_of(facets, np.arange(len(node)))
     shell: list[int] = []
     others: list[RegionGroup] = []
     whole = node == ""
