@@ -145,7 +145,8 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
         return SceneDraft(str(file), None, findings, bounds)
     digest = hashlib.sha256()
     for name, data in [("", content), *sorted(mesh_files.contents.items())]:  # name and length before each
-        digest.update(f"{name}\0{len(data)}\0".encode() + data)
+        digest.update(f"{name}\0{len(data)}\0".encode())
+        digest.update(data)
     ris = join_panels(tuple(panels))
     scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest.hexdigest(), tuple(occluders))
     start = {"waypoints": "agent.waypoints[0]", "trajectory": "agent.trajectory"}
