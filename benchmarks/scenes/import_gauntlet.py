@@ -27,7 +27,8 @@ import numpy as np
 
 from rislam_rt.channel.walls import build_walls
 from rislam_rt.scene import load_scene
-from rislam_rt.scene.shapes import block, box_corners, hexahedron, joined
+from rislam_rt.scene.meshes import joined
+from rislam_rt.scene.shapes import block, box_corners, hexahedron
 
 SIZE = (6.0, 4.5, 2.7)
 TABLE, CHAIRS = np.array([3.0, 2.2]), 6

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers, cross
 from rislam_rt.constants import COPLANAR_ANGLE, RAY_OFFSET
 from rislam_rt.geometry.planes import signed_distance
-from rislam_rt.geometry.triangles import edge_planes, inside_any, outline_edges, triangle_areas
+from rislam_rt.geometry.triangles import connected, edge_planes, inside_any, outline_edges, triangle_areas
 
 ALIKE = 1e-6
 """Relative difference below which the areas of two walls count as equal: corners in float32 say no more."""
@@ -76,8 +76,7 @@ def stack_walls(triangles: Floats, owner: Integers, normal: Floats, offset: Floa
 
 
 def overlap(a: Floats, b: Floats, normal: Floats, depth: float) -> bool:
-    """Whether coplanar triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by more than `depth` [m]
-    anywhere.
+    """Whether coplanar triangles (A, 3, 3) and (B, 3, 3), seen along a normal (3,), overlap by over `depth` [m].
 
     Two triangles are apart if their shadows on a normal to one of their six edges are (separating axes).
     """
@@ -142,12 +141,6 @@ def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) 
 
 def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:
     """Number (W,) of the largest wall among all coplanar walls that overlapping pairs connect with each wall."""
-    plane = np.arange(len(area))
-    for _ in pairs:  # a chain of n pairs settles within n rounds
-        before = plane.copy()
-        for upper, lower, _gap in pairs:
-            best = max(plane[upper], plane[lower], key=lambda w: (area[w], -w))
-            plane[upper] = plane[lower] = best
-        if np.array_equal(before, plane):
-            break
-    return plane
+    part = connected(np.array([pair[:2] for pair in pairs], dtype=np.int64).reshape(-1, 2), len(area))
+    largest = np.argsort(-area, kind="stable")  # first, of two alike the one with the lower number
+    return largest[np.unique(part[largest], return_index=True)[1]][part]

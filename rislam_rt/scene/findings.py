@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rislam_rt.errors import SceneError
+from rislam_rt.errors import RislamError, SceneError
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +31,18 @@ class Finding:
 class Fault(SceneError):
     """Error in a scene's file or mesh, raised where its place (file and field) is not known; the caller adds that."""
 
-    def __init__(self, message: str, mend: str) -> None:
+    def __init__(self, message: str, mend: str, key: str = "") -> None:
         super().__init__(one_line(f"{message}; {mend}"))
-        self.message = message
-        self.mend = mend
-        self.key = ""
+        self.message, self.mend = message, mend
+        self.key = key
         """Key below the field that the caller names, where one key is at fault."""
         self.faults: list[Fault] = [self]
+
+    @classmethod
+    def of(cls, error: RislamError) -> "Fault":
+        """Fault with what another error says, which may have a part on how to mend it."""
+        what, _, mend = str(error).partition("; ")
+        return cls(what, mend)
 
     def at(self, file: str, field: str) -> Finding:
         """Make this fault a finding of the scene check: an error at the file and field that the caller names."""
@@ -61,11 +66,6 @@ def error_at(file: str, field: str, message: str, mend: str) -> Finding:
 def warning_at(file: str, field: str, message: str, mend: str) -> Finding:
     """Make a warning of the scene check at a key of the scene file."""
     return Finding("warning", file, field, message, mend)
-
-
-def note_at(file: str, field: str, message: str, mend: str) -> Finding:
-    """Make a note of the scene check, on something worth knowing, at a key of the scene file."""
-    return Finding("note", file, field, message, mend)
 
 
 def panel_key(number: int, panels: int) -> str:

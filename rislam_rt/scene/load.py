@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,28 +12,13 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import expect
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import Material, Occluder, RadioConfig, Reflector, RisPanel, RisSpec, Scatterer, Scene, join_panels
-from rislam_rt.scene.check import faint_slabs, find_errors, find_warnings, material_errors
+from rislam_rt.scene.check import faint_slabs, find_errors, find_warnings, material_errors, units
 from rislam_rt.scene.check.triangle_array import START_KEY
-from rislam_rt.scene.check.units import (
-    ROOM_FIELD,
-    SPEED_FIELD,
-    lone_mesh_warnings,
-    recording_unit_warnings,
-    unit_warnings,
-)
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors, warning_at
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
 from rislam_rt.scene.scene_folder import scene_file
-from rislam_rt.scene.schema import (
-    MAX_SCENE_BYTES,
-    AgentSection,
-    MaterialSection,
-    RisSection,
-    ScattererSection,
-    SceneSpec,
-    read_spec,
-)
+from rislam_rt.scene.schema import MAX_SCENE_BYTES, AgentSection, RisSection, ScattererSection, SceneSpec, read_spec
 from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.toml import parse_toml
 
@@ -79,21 +65,24 @@ def check_scene(scene: Scene | str | Path, radio: RadioConfig | None = None) -> 
     findings = draft.findings
     if draft.scene is not None:
         findings = findings + _check_read(draft.scene, draft.file, draft.start_key, radio)
-    units = _unit_findings(draft)
+    of_units = _unit_findings(draft)
     if any(finding.severity == "error" for finding in findings):
-        return findings + units
-    if any(".units" in finding.field for finding in units):
-        findings = [finding for finding in findings if finding.field != ROOM_FIELD]  # they know the unit
-    return findings + [finding for finding in units if finding.field != SPEED_FIELD]  # the motion's own warning says it
+        return findings + of_units
+    if any(".units" in finding.field for finding in of_units):
+        findings = [finding for finding in findings if finding.field != units.ROOM_FIELD]  # they know the unit
+    # of a speed, the motion's own warning says it
+    return findings + [finding for finding in of_units if finding.field != units.SPEED_FIELD]
 
 
 def _unit_findings(draft: SceneDraft) -> list[Finding]:
     """Warnings of a loaded scene folder about units: of its file, its recording, and each of its meshes."""
-    table, scene, bounds = _plain_table(Path(draft.file)), draft.scene, draft.bounds
-    lone = [] if scene is None else list(lone_mesh_warnings(draft.file, scene.reflectors))
-    found = [*lone, *unit_warnings(draft.file, table, None if lone else bounds)]
+    scene, bounds, table = draft.scene, draft.bounds, {}
+    with suppress(OSError, ValueError):  # what cannot be read has been said
+        table = parse_toml(Path(draft.file).read_bytes()[: MAX_SCENE_BYTES + 1].decode())
+    lone = [] if scene is None else list(units.lone_mesh_warnings(draft.file, scene.reflectors))
+    found = [*lone, *units.unit_warnings(draft.file, table, None if lone else bounds)]
     if scene is not None and bounds is not None and "trajectory" in table.get("agent", {}):
-        found += recording_unit_warnings(draft.file, scene.agent, bounds)
+        found += units.recording_unit_warnings(draft.file, scene.agent, bounds)
     return found
 
 
@@ -104,14 +93,6 @@ def _check_read(scene: Scene, file: str, start_key: str, radio: RadioConfig | No
         errors += material_errors(scene, file, radio)
     faint = [] if radio is None else faint_slabs(scene, file, radio)
     return errors or [*find_warnings(scene, file, radio or RadioConfig()), *faint]
-
-
-def _plain_table(file: Path) -> dict[str, Any]:
-    """Content of a scene file to load as TOML gives it, not validated; empty if it cannot be read."""
-    try:
-        return parse_toml(file.read_bytes()[: MAX_SCENE_BYTES + 1].decode())
-    except (OSError, ValueError):
-        return {}
 
 
 def read_draft(path: str | Path) -> SceneDraft:
@@ -142,7 +123,10 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
         return found
 
     def reflector(one: Any) -> Reflector:
-        return Reflector(one.name, *mesh_files.mesh(one.mesh, one), _material(one.material))
+        units = {"thickness_m": "thickness", "conductivity_s_m": "conductivity"}
+        given = one.material.model_dump(exclude_none=True)
+        material = Material(**{units.get(key, key): value for key, value in given.items()})
+        return Reflector(one.name, *mesh_files.mesh(one.mesh, one), material)
 
     reflectors = made("reflector", spec.reflector, reflector)
     scatterers = made("scatterer", spec.scatterer, lambda one: _scatterer(one, mesh_files))
@@ -159,10 +143,15 @@ def assemble(spec: SceneSpec, file: Path, content: bytes) -> SceneDraft:
     bounds = np.stack([corners.min(axis=0), corners.max(axis=0)]) if len(corners) else None
     if findings:
         return SceneDraft(str(file), None, findings, bounds)
+    digest = hashlib.sha256()
+    for name, data in [("", content), *sorted(mesh_files.contents.items())]:  # name and length before each
+        digest.update(f"{name}\0{len(data)}\0".encode())
+        digest.update(data)
     ris = join_panels(tuple(panels))
-    digest = _digest(content, mesh_files.contents)
-    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest, tuple(occluders))
-    return SceneDraft(str(file), scene, _idle_keys(spec.agent, str(file)), bounds, _start_key(spec.agent))
+    scene = Scene(spec.name, tuple(reflectors), tuple(scatterers), ris, agent, digest.hexdigest(), tuple(occluders))
+    start = {"waypoints": "agent.waypoints[0]", "trajectory": "agent.trajectory"}
+    start_key = next((key for motion, key in start.items() if getattr(spec.agent, motion) is not None), START_KEY)
+    return SceneDraft(str(file), scene, _idle_keys(spec.agent, str(file)), bounds, start_key)
 
 
 def _idle_keys(agent: AgentSection, file: str) -> list[Finding]:
@@ -171,23 +160,6 @@ def _idle_keys(agent: AgentSection, file: str) -> list[Finding]:
         return []
     message = "it changes nothing without a halt between the ends, where the agent would turn on the spot"
     return [warning_at(file, "agent.turn_deg_s", message, "give one in 'halt_s', or leave it out")]
-
-
-def _start_key(agent: AgentSection) -> str:
-    """Key of the scene file to load that says where the agent starts."""
-    if agent.waypoints is not None:
-        return "agent.waypoints[0]"
-    return START_KEY if agent.trajectory is None else "agent.trajectory"
-
-
-def _material(section: MaterialSection) -> Material:
-    """Material of a reflector, loaded from its section of the scene file."""
-    given = {} if section.thickness_m is None else {"thickness": section.thickness_m}
-    return Material(
-        section.reflection, section.itu, permittivity=section.permittivity,
-        conductivity=section.conductivity_s_m or 0.0, reflection_te=section.reflection_te,
-        reflection_tm=section.reflection_tm, scattering=section.scattering, **given,
-    )  # fmt: skip
 
 
 def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:
@@ -203,12 +175,11 @@ def _scatterer(section: ScattererSection, mesh_files: MeshFiles) -> Scatterer:
         law, rcs = "cylinder", np.pi * (radius or 0.0) * height / 2.0
     elif rcs is None:
         rcs = np.pi * (radius or 0.0) ** 2
-    mesh = None
+    shade = None
     if section.mesh is not None:
-        mesh = mesh_files.mesh(section.mesh, section)
+        shade = Occluder(*mesh_files.mesh(section.mesh, section))
     elif section.shadow:
-        mesh = solid_mesh(position, radius or 0.0, height, axis)
-    shade = None if mesh is None else Occluder(*mesh)
+        shade = Occluder(*solid_mesh(position, radius or 0.0, height, axis))
     return Scatterer(section.name, position, rcs, radius, law, height, axis, shade)
 
 
@@ -223,28 +194,11 @@ def build_panel(section: RisSection) -> RisPanel:
     normal, up = unit(np.array(section.normal)), unit(np.array(section.up))
     for key, direction in (("normal", normal), ("up", up)):
         if not direction.any():
-            raise _of_key(key, Fault(f"{getattr(section, key)} has no length", "give a direction"))
+            raise Fault(f"{getattr(section, key)} has no length", "give a direction", key)
     if abs(normal @ up) > 1e-6:
         angle = np.degrees(np.arccos(np.clip(normal @ up, -1.0, 1.0)))
-        raise _of_key("up", Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it"))
+        raise Fault(f"{angle:.3f} degrees from ris.normal", "give a direction at right angles to it", "up")
     up = unit(up - (normal @ up) * normal)
-    spec = RisSpec(
-        section.rows, section.cols, np.array(section.spacing_m), normal, up, section.levels, section.element,
-        section.amplitude,
-    )  # fmt: skip
+    size = section.rows, section.cols, np.array(section.spacing_m)
+    spec = RisSpec(*size, normal, up, section.levels, section.element, section.amplitude)
     return RisPanel(spec, np.array(section.center), section.host, section.name)
-
-
-def _of_key(key: str, fault: Fault) -> Fault:
-    """Fault of one key of a table of the scene to load."""
-    fault.key = key
-    return fault
-
-
-def _digest(content: bytes, contents: dict[str, bytes]) -> str:
-    """SHA-256 of a loaded scene: over the scene file and every file it names, name and length before each."""
-    digest = hashlib.sha256()
-    for name, data in [("", content), *sorted(contents.items())]:
-        digest.update(f"{name}\0{len(data)}\0".encode())
-        digest.update(data)
-    return digest.hexdigest()

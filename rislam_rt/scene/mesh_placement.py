@@ -39,8 +39,7 @@ class MeshFiles:
 
 
 def place_points(points: Floats, up: str, unit: float, origin: Floats) -> Floats:
-    """Turn, scale and move points (..., 3) of a mesh file into the room's frame: its axis `up` becomes z, and `origin`
-    zero.
+    """Turn, scale and move points (..., 3) of a mesh file into the room's frame: axis `up` becomes z, `origin` zero.
 
     Parameters
     ----------

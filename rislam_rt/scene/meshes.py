@@ -8,7 +8,7 @@ import struct
 import warnings
 from codecs import BOM_UTF8
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
@@ -60,6 +60,16 @@ def as_mesh(triangles: Floats) -> Mesh:
     return Mesh(vertices, index.reshape(-1, 3).astype(np.int64))
 
 
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Join several meshes into one, their vertices and faces in order."""
+    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+_EMPTY = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+
+
 class MeshReader:
     """Parser of mesh files that keeps the last file parsed: a scene picks many nodes of one GLB file."""
 
@@ -94,20 +104,16 @@ class MeshReader:
         elif suffix == ".glb":
             check_glb(content, max_faces, max_nodes)
         mesh = _own_ply(content) if suffix == ".ply" else None
-        return sound_mesh(mesh or self._by_trimesh(content, suffix[1:], node), max_faces, reach)
-
-    def _by_trimesh(self, content: bytes, file_type: str, node: str | None) -> Mesh:
-        """Mesh from a file's content in any format that trimesh reads."""
-        if self._key != (file_type, content):
-            self._loaded = unfold(content, file_type)
-            self._key = (file_type, content)
-        with _errors_as_faults(file_type):
-            return _flatten(self._loaded, node)
+        if mesh is None:
+            if self._key != (suffix, content):
+                self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
+            with _errors_as_faults(suffix[1:]):
+                mesh = _flatten(self._loaded, node)
+        return sound_mesh(mesh, max_faces, reach)
 
 
 def unfold(content: bytes, file_type: str) -> Any:
-    """Parse a mesh file's content into trimesh's scene of nodes. It gets bytes, not a path, so it can follow no
-    reference to another file.
+    """Parse a mesh file's content into trimesh's scene of nodes; of bytes, so that it follows no reference to a file.
 
     Raises
     ------
@@ -182,13 +188,7 @@ def _flatten(loaded: Any, node: str | None) -> Mesh:
             raise Fault(f"no node '{one_line(node)[:40]}' in the file", f"give one of: {one_line(known)}")
         below = graph.transforms.successors(node)
         nodes = [n for n in nodes if n in below]
-    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
-    for name in nodes:
-        mesh, _ = node_mesh(loaded, name)
-        vertices.append(mesh.vertices)
-        faces.append(mesh.faces + count)
-        count += len(mesh.vertices)
-    return Mesh(np.concatenate(vertices), np.concatenate(faces))
+    return joined([_EMPTY, *(node_mesh(loaded, name)[0] for name in nodes)])
 
 
 def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
@@ -197,7 +197,7 @@ def node_mesh(loaded: Any, node: str) -> tuple[Mesh, Any]:
     geometry = loaded.geometry[name]
     faces = getattr(geometry, "faces", None)
     if faces is None or not len(faces):
-        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), geometry
+        return _EMPTY, geometry
     vertices = np.asarray(geometry.vertices, dtype=np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     return Mesh(vertices, np.asarray(faces, dtype=np.int64)), geometry
 
@@ -241,8 +241,7 @@ def too_many_faces(count: int, limit: int) -> Fault:
 
 
 def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
-    """Refuse a GLB mesh file whose nodes are too many, or, each mesh counted as often as a node names it, have too many
-    faces.
+    """Refuse a GLB mesh file of too many nodes or, each mesh counted as often as a node names it, too many faces.
 
     What cannot be read as a GLB file passes: the reader will say what is wrong with it.
 
@@ -251,12 +250,13 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
     Fault
         There are too many.
     """
-    document = _document(content)
     try:
+        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
+        document = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}
         nodes, meshes, accessors = (list(document.get(key, [])) for key in ("nodes", "meshes", "accessors"))
         uses = Counter(node["mesh"] for node in nodes if isinstance(node, dict) and "mesh" in node)
         faces = sum(times * _num_faces(meshes[mesh], accessors) for mesh, times in uses.items())
-    except (TypeError, KeyError, IndexError, AttributeError, ValueError, OverflowError):
+    except (struct.error, RecursionError, TypeError, LookupError, AttributeError, ValueError, OverflowError):
         return
     if len(nodes) > max_nodes:
         mend = f"join them, or raise limits.nodes = {max_nodes} in the scene file"
@@ -265,20 +265,8 @@ def check_glb(content: bytes, max_faces: int, max_nodes: int) -> None:
         raise too_many_faces(faces, max_faces)
 
 
-def _document(content: bytes) -> dict[str, Any]:
-    """Table of contents (JSON chunk) of a GLB mesh file; empty if there is none."""
-    try:
-        magic, _, _, length, kind = struct.unpack_from("<4sIII4s", content)
-        found = json.loads(content[20 : 20 + length]) if (magic, kind) == (b"glTF", b"JSON") else {}
-    except (struct.error, ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) else {}
-
-
 def _num_faces(mesh: Any, accessors: list[Any]) -> int:
     """Triangles of a mesh in a scene's GLB file, counted: a third of its indices, or of its corners without any."""
-    total = 0
-    for part in mesh["primitives"]:
-        number = part["indices"] if "indices" in part else part["attributes"]["POSITION"]
-        total += max(int(accessors[number]["count"]), 0) // 3
-    return total
+    parts = mesh["primitives"]
+    rows = [part["indices"] if "indices" in part else part["attributes"]["POSITION"] for part in parts]
+    return sum(max(int(accessors[row]["count"]), 0) // 3 for row in rows)

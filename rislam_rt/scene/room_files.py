@@ -31,14 +31,9 @@ def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, An
 
 
 def panel(
-    center: list[float],
-    normal: list[float],
-    up: list[float],
-    host: str = "ceiling",
-    size: int = 6,
-    element: str = "tang",
-    spacing: float = 0.015,
-) -> dict[str, Any]:
+    center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6,
+    element: str = "tang", spacing: float = 0.015,
+) -> dict[str, Any]:  # fmt: skip
     """Table of a new room's scene file for a RIS panel like the paper's, anywhere; its elements, too, are the paper's
     (`tang`) or reflect as a perfect plate does (`energy`), and their `spacing` [m] is half a wavelength at 10 GHz."""
     lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [spacing, spacing]}

@@ -22,8 +22,7 @@ BELOW = "give a relative path below it, with / between folders"
 
 
 def scene_file(path: str | Path) -> Path:
-    """Path of the scene file in a scene folder, where the folder, the file itself or the name of a built-in room may be
-    given."""
+    """Path of the scene file in a scene folder, given by the folder, the file itself or the name of a built-in room."""
     path = find_room(path)
     return path if path.suffix == ".toml" and not path.is_dir() else path / SCENE_FILE
 

@@ -62,9 +62,8 @@ class MaterialSection(SceneSection):
     def _one_kind(self) -> "MaterialSection":
         if sum(kind is not None for kind in (self.reflection, self.itu, self.permittivity, self.reflection_te)) != 1:
             raise ValueError("give one of 'reflection', 'itu', 'permittivity' and 'reflection_te'")
-        if (self.reflection_te is None) != (self.reflection_tm is None) or 0.0 in (
-            self.reflection_te, self.reflection_tm
-        ):  # fmt: skip
+        polarised = (self.reflection_te, self.reflection_tm)
+        if polarised.count(None) == 1 or 0.0 in polarised:
             raise ValueError("give 'reflection_te' and 'reflection_tm' together, neither of them 0")
         if self.itu is None and self.permittivity is None and self.thickness_m is not None:
             raise ValueError("'thickness_m' has a meaning with 'itu' or 'permittivity' only")
@@ -219,9 +218,8 @@ class AgentSection(SceneSection):
 
     def _check_stops(self, motion: str) -> None:
         """Check the agent's keys of halts and headings against its motion and each other."""
-        keys = [
-            name for name in ("halt_s", "from_rest", "heading_deg", "turn_deg_s") if getattr(self, name) is not None
-        ]
+        of_waypoints = ("halt_s", "from_rest", "heading_deg", "turn_deg_s")
+        keys = [name for name in of_waypoints if getattr(self, name) is not None]
         if keys and self.waypoints is None:
             raise ValueError(f"'{keys[0]}' means nothing with '{motion}'; leave it out, or give 'waypoints' instead")
         if self.halt_s is not None and len(self.halt_s) != len(self.waypoints or ()):
@@ -331,10 +329,8 @@ def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
     if not path.is_file():
         known = {*shipped_rooms(), *(one.name for one in path.parent.parent.glob("*"))} - {path.parent.name}
         hint = did_you_mean(nearest(path.parent.name, sorted(known)))
-        gone = shipped_missing("scenes")
         wanted = f"{hint} give a scene folder, its scene.toml, or the name of a built-in room".lstrip()
-        wanted = f"{wanted}; {gone}" if gone else wanted
-        raise Fault("no such scene file", wanted)
+        raise Fault("no such scene file", "; ".join(filter(None, [wanted, shipped_missing("scenes")])))
     try:
         with path.open("rb") as file:
             content = file.read(MAX_SCENE_BYTES + 1)
@@ -348,8 +344,8 @@ def _fault(item: Any, lone_panel: bool) -> Fault:
     where = item["loc"]
     if lone_panel and where[:2] == ("ris", 0):  # the file has `[ris]`
         where = ("ris", *where[2:])
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).lstrip(".")
-    place = _short(place, 80)
+    dotted = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where)
+    place = _short(dotted.lstrip("."), 80)
     if item["type"] == "missing":
         return Fault(f"{place}: missing", "add it")
     if item["type"] == "extra_forbidden":

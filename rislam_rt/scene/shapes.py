@@ -11,7 +11,7 @@ from rislam_rt.arrays import Floats, cross
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.geometry.triangles import triangle_areas
-from rislam_rt.scene.meshes import Mesh, as_mesh
+from rislam_rt.scene.meshes import Mesh, as_mesh, joined
 
 
 def quad(corners: Floats | Sequence[Floats] | Sequence[Sequence[float]]) -> Mesh:
@@ -43,13 +43,6 @@ def block(low: Sequence[float], high: Sequence[float], without: Sequence[str] = 
     faces = hexahedron(box_corners(low, high))
     mesh = joined([face for name, face in faces.items() if name not in without])
     return Mesh(mesh.vertices, mesh.faces[:, ::-1])
-
-
-def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Join the meshes of several shapes into one, their vertices and faces in order."""
-    starts = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 CYLINDER_SIDES = 32

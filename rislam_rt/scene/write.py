@@ -1,4 +1,4 @@
-"""Writing of a `Scene` as a scene folder, whole or not at all."""
+"""Writing of a scene folder, whole or not at all: of a `Scene`, or of a room that comes with the package."""
 
 import os
 import re
@@ -16,6 +16,7 @@ from rislam_rt.model import Material, RisPanel, Scatterer, Scene, Trajectory
 from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.scene_folder import README, SCENE_FILE, mesh_file
 from rislam_rt.scene.shapes import solid_mesh
+from rislam_rt.shipped import shipped_missing, shipped_rooms
 from rislam_rt.toml import parse_toml, toml_bytes
 
 TRAJECTORY_FILE = "path.tum"
@@ -40,14 +41,41 @@ def write_scene(scene: Scene, folder: str | Path, *, overwrite: bool = False, ab
     return write_files(scene_files(scene) | readme, folder, overwrite=overwrite)
 
 
+def new_scene(template: str, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Copy one of the rooms that come with the package into a new scene folder, named after it. Returns the folder.
+
+    Raises
+    ------
+    SceneError
+        No such template, or the folder exists and `overwrite` is False.
+    StoreError
+        The disk refused.
+    """
+    rooms = shipped_rooms()
+    if not rooms:
+        raise SceneError(f"template: '{template}' received; {shipped_missing('scenes')}")
+    if template not in rooms:
+        raise SceneError(f"template: '{template}' received; give one of {', '.join(rooms)}")
+    room = rooms[template]
+    files = {file.relative_to(room).as_posix(): file.read_bytes() for file in sorted(room.rglob("*")) if file.is_file()}
+    name = room_name(Path(folder), template)
+    files[SCENE_FILE] = toml_bytes(parse_toml(files[SCENE_FILE].decode()) | {"name": name})
+    _, about, _ = files[README].decode().split("\n\n", 2)
+    files[README] = f"# {name}\n\n{about}\n\nMade by `rislam-rt new --template {template}`.\n".encode()
+    return write_files(files, folder, overwrite=overwrite)
+
+
+def room_name(folder: Path, template: str) -> str:
+    """Name of a room from the folder that it lies in: the folder's name, with what a room's name cannot hold as `_`."""
+    name = re.sub(r"[^A-Za-z0-9_.\-]", "_", os.path.basename(os.path.realpath(folder)))[:64]
+    return name if name.strip("._-") else template
+
+
 def scene_files(scene: Scene) -> dict[str, bytes]:
     """Files of a scene folder to write, by name: `scene.toml`, a PLY mesh a reflector, the path unless straight."""
-    files = {mesh_file(r.name): ply_bytes(r.vertices, r.faces) for r in scene.reflectors}
-    for scatterer in scene.scatterers:
-        if scatterer.shade is not None and not _has_own_shadow(scatterer):
-            files[mesh_file(scatterer.name)] = ply_bytes(scatterer.shade.vertices, scatterer.shade.faces)
-    for shade in scene.occluders:
-        files[mesh_file(shade.name)] = ply_bytes(shade.vertices, shade.faces)
+    shades = [(s.name, s.shade) for s in scene.scatterers if s.shade is not None and not _has_own_shadow(s)]
+    meshes = [(r.name, r) for r in scene.reflectors] + shades + [(shade.name, shade) for shade in scene.occluders]
+    files = {mesh_file(name): ply_bytes(mesh.vertices, mesh.faces) for name, mesh in meshes}
     agent = _agent_table(scene.agent)
     if "trajectory" in agent:
         files[TRAJECTORY_FILE] = tum_bytes(scene.agent.time, scene.agent.position, scene.agent.heading)
@@ -55,8 +83,7 @@ def scene_files(scene: Scene) -> dict[str, bytes]:
 
 
 def write_files(files: Mapping[str, bytes], folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Write files (relative name -> content) under a folder, such as a scene's: a new folder appears complete, by one
-    rename.
+    """Write files (relative name -> content) under a folder, such as a scene's: a new one appears whole, by one rename.
 
     With `overwrite`, files of an existing folder are replaced one by one, if this program made the room there
     (`check_made`), and others in it stay.
@@ -105,7 +132,8 @@ def check_made(folder: Path, names: Iterable[str]) -> None:
     SceneError
         One of them is of another's making, or cannot be read.
     """
-    there = [name for name in names if os.path.lexists(folder / name) and not _is_empty(folder / name)]
+    empty = {name for name in names if (folder / name).is_file() and (folder / name).stat().st_size == 0}
+    there = [name for name in names if os.path.lexists(folder / name) and name not in empty]
     if not there or MADE.search(_content(folder / README)):
         return
     text = _content(folder / SCENE_FILE)
@@ -115,15 +143,8 @@ def check_made(folder: Path, names: Iterable[str]) -> None:
         written = False
     foreign = README if README in there else "" if written else SCENE_FILE if SCENE_FILE in there else there[0]
     if foreign:
-        raise SceneError(
-            f"{folder}: '{foreign}' there is not of this program's making, and would be replaced; give another folder, "
-            "or move it away"
-        )
-
-
-def _is_empty(path: Path) -> bool:
-    """Whether a file that a written scene would replace holds nothing."""
-    return path.is_file() and path.stat().st_size == 0
+        what = f"'{foreign}' there is not of this program's making, and would be replaced"
+        raise SceneError(f"{folder}: {what}; give another folder, or move it away")
 
 
 def _content(path: Path) -> str:
@@ -135,8 +156,7 @@ def _content(path: Path) -> str:
 
 
 def tum_bytes(time: Floats, position: Floats, heading: Floats) -> bytes:
-    """Content of the path file written with a scene (TUM), lines `timestamp x y z qx qy qz qw`; the quaternion is the
-    heading about z."""
+    """Path file to write (TUM), `timestamp x y z qx qy qz qw` a line; the quaternion is the heading about z."""
     lines = ["# timestamp x y z qx qy qz qw"]
     for t, point, angle in zip(time, position, heading, strict=True):
         row = [*point, 0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)]
@@ -211,9 +231,8 @@ def _has_own_shadow(scatterer: Scatterer) -> bool:
     """Whether a scatterer's occluder, as the scene is written, is the mesh of its own solid: `shadow = true`."""
     if scatterer.shade is None or scatterer.radius is None:
         return False
-    mesh = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis)
-    shade = scatterer.shade
-    return np.array_equal(mesh.vertices, shade.vertices) and np.array_equal(mesh.faces, shade.faces)
+    own, shade = solid_mesh(scatterer.position, scatterer.radius, scatterer.height, scatterer.axis), scatterer.shade
+    return np.array_equal(own.vertices, shade.vertices) and np.array_equal(own.faces, shade.faces)
 
 
 def _material_table(material: Material) -> dict[str, Any]:

@@ -10,12 +10,12 @@ import pytest
 from built_in_rooms.parts import box_walls, grid
 
 from rislam_rt.errors import SceneError
-from rislam_rt.geometry.connected_parts import connected_triangles
+from rislam_rt.geometry.triangles import connected_triangles
 from rislam_rt.model import Body, RadioConfig, Reflector, RisPanel, RxArray, Scatterer, Scene, Trajectory
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.check.mesh_queries import ray_hits, sphere_directions, touching, winding
-from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.shapes import block, joined
+from rislam_rt.scene.meshes import Mesh, joined
+from rislam_rt.scene.shapes import block
 
 Change = Callable[[Scene], Scene]
 

@@ -13,10 +13,9 @@ from rislam_rt.scene import load_scene
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import ply_bytes
 from rislam_rt.scene.motion.agent_motion import at_cycles
-from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
 from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv
-from rislam_rt.scene.motion.waypoints import round_corners
+from rislam_rt.scene.motion.waypoints import along_heading, round_corners
 from rislam_rt.scene.shapes import block
 
 EPOCH = 1_700_000_000.0

@@ -8,9 +8,9 @@ from built_in_rooms.parts import box_walls, sphere
 from built_in_rooms.paths import curved_agent
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import rotation_z
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, joined
 from rislam_rt.scene.room_files import RoomFiles, panel, reflector
-from rislam_rt.scene.shapes import block, joined, quad
+from rislam_rt.scene.shapes import block, quad
 
 GLB_FILE = "room.glb"
 

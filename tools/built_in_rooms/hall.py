@@ -7,9 +7,9 @@ import numpy as np
 from built_in_rooms.parts import grid, refined, sphere
 from built_in_rooms.paths import curved_agent
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, joined
 from rislam_rt.scene.room_files import RoomFiles, panel, reflector
-from rislam_rt.scene.shapes import block, joined
+from rislam_rt.scene.shapes import block
 
 LENGTH, WIDTH, EAVES, RIDGE = 40.0, 25.0, 6.0, 8.0
 """[m]: the vault rises from the eaves to the ridge, so the hall is 8 m high."""

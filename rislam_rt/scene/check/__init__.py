@@ -4,7 +4,7 @@ from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.scene.check import meshes
 from rislam_rt.scene.check.agent import agent_errors, agent_warnings
 from rislam_rt.scene.check.meshes import faint_slabs, material_errors
-from rislam_rt.scene.check.occluders import cylinder_warnings, occluder_errors, occluder_face_errors
+from rislam_rt.scene.check.occluders import cylinder_warnings, occluder_errors
 from rislam_rt.scene.check.panel import panel_errors, panel_warnings
 from rislam_rt.scene.check.triangle_array import START_KEY, build_triangle_array
 from rislam_rt.scene.check.walls import wall_findings
@@ -22,7 +22,7 @@ def find_errors(scene: Scene, file: str, start_key: str = START_KEY) -> list[Fin
         Key of the scene file that says where the agent starts.
     """
     room = build_triangle_array(scene, file, start_key)
-    return [*meshes.name_errors(room), *meshes.face_errors(room), *occluder_face_errors(room)] or [
+    return [*meshes.name_errors(room), *meshes.face_errors(room)] or [
         *meshes.scatterer_errors(room), *occluder_errors(room), *panel_errors(room), *agent_errors(room),
     ]  # fmt: skip
 

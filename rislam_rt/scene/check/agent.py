@@ -6,11 +6,11 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import MAX_SPEED
-from rislam_rt.geometry.connected_parts import connected_triangles
+from rislam_rt.geometry.triangles import connected_triangles
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, ray_hits, sphere_directions, touching, winding
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
-from rislam_rt.scene.findings import Finding, error_at, warning_at
+from rislam_rt.scene.check.triangle_array import KEEP_AWAY, MIN_CLEARANCE, TriangleArray
+from rislam_rt.scene.findings import Finding
 
 NUM_PROBES = 400
 """Rays cast from the agent's start to look for holes of the room: one of 0.03 sr, 30 cm wide at 2 m, is found."""
@@ -26,12 +26,20 @@ def agent_errors(room: TriangleArray) -> Iterator[Finding]:
     for part, points in places.items():
         outside = room.outside(points)
         if len(outside):
-            message = f"{_where(part, int(outside[0]), points)} lies outside the meshes' bounds {room.box}"
-            yield error_at(room.file, _field(room, int(outside[0])), message, "move the start or change the motion")
+            message = f"{_where(part, outside[0], points)} lies outside the meshes' bounds {room.box}"
+            yield room.error(_field(room, outside[0]), message, "move the start or change the motion")
             return
-    yield from _on_surface(room, places)
+    for part, points in places.items():
+        cycles, near = touching(points, room.triangles, MIN_CLEARANCE)
+        if len(cycles):
+            message = f"{_where(part, cycles[0], points)} lies on '{room.name(near[0])}'"
+            yield room.error(_field(room, cycles[0]), message, KEEP_AWAY)
+            break
     yield from _through_wall(room)
-    yield from _inside_object(room)
+    name = _enclosing(room, motion.position[0], holding=room.scene.landmark_positions)
+    if name:  # as the path crosses no surface, all of it is inside
+        message = f"{motion.position[0].tolist()} lies inside the object '{name}'"
+        yield room.error(room.start_key, message, "move the start out of it")
 
 
 def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
@@ -42,22 +50,22 @@ def agent_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
     if lost.any():
         mean = np.round(directions[lost].mean(axis=0), 2) + 0.0
         message = f"{lost.mean():.1%} of rays from the start leave the room, towards {mean.tolist()} in the mean"
-        yield warning_at(room.file, "reflector", message, "close the room, if it is not meant to be open")
+        yield room.warning("reflector", message, "close the room, if it is not meant to be open")
     yield from _odd_steps(room)
     for number, scatterer in enumerate(room.scene.scatterers):
         field = f"scatterer[{number}].position ({scatterer.name})"
         away = np.linalg.norm(np.stack([motion.tx, motion.rx]) - scatterer.position, axis=-1).min(axis=0)
         radius = max(scatterer.radius or 0.0, MIN_CLEARANCE)
         if away.min() < radius:
-            at = f"at cycle {int(np.argmin(away))}"
-            message = f"the agent comes within {away.min():.2g} m of its centre {at}, and its radius is {radius:g} m"
-            yield warning_at(room.file, field, message, "lead the agent around it")
+            near = f"within {away.min():.2g} m of its centre at cycle {np.argmin(away)}"
+            message = f"the agent comes {near}, and its radius is {radius:g} m"
+            yield room.warning(field, message, "lead the agent around it")
         if radio.array.pattern == "upper" and (motion.rx[:, 2] >= scatterer.position[2]).all():
             message = "it lies below the array, which hears from above only"
-            yield warning_at(room.file, field, message, "it will not be heard: fine if that is meant, else raise it")
+            yield room.warning(field, message, "it will not be heard: fine if that is meant, else raise it")
         name = _enclosing(room, scatterer.position, holding=motion.position[:1])
         if name:
-            yield warning_at(room.file, field, f"it lies inside '{name}', where no ray reaches it", "move it out")
+            yield room.warning(field, f"it lies inside '{name}', where no ray reaches it", "move it out")
 
 
 def _odd_steps(room: TriangleArray) -> Iterator[Finding]:
@@ -70,24 +78,11 @@ def _odd_steps(room: TriangleArray) -> Iterator[Finding]:
     fast, gap, usual = int(np.argmax(speed)), int(np.argmax(step)), float(np.median(step))
     if speed[fast] > MAX_SPEED:
         message = f"it moves at up to {speed[fast]:.3g} m/s (after cycle {fast})"
-        yield warning_at(room.file, "agent", message, "give metres and seconds, and mend what jumps there")
+        yield room.warning("agent", message, "give metres and seconds, and mend what jumps there")
     if step[gap] > max(LONGEST_GAP, MANY_STEPS * usual):
-        message = (
-            f"{step[gap]:.3g} s without a pose after cycle {gap}, where else there are {usual:.3g} s between poses"
-        )
-        yield warning_at(room.file, "agent.trajectory", message, "cut the file there, unless it is meant")
-
-
-def _on_surface(room: TriangleArray, places: dict[str, Floats]) -> Iterator[Finding]:
-    """Scene check: error of an agent, Tx or Rx that lies on a surface."""
-    for part, points in places.items():
-        cycles, near = touching(points, room.triangles, MIN_CLEARANCE)
-        if len(cycles):
-            message = f"{_where(part, int(cycles[0]), points)} lies on '{room.name(int(near[0]))}'"
-            yield error_at(
-                room.file, _field(room, int(cycles[0])), message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces"
-            )
-            return
+        rest = f"where else there are {usual:.3g} s between poses"
+        message = f"{step[gap]:.3g} s without a pose after cycle {gap}, {rest}"
+        yield room.warning("agent.trajectory", message, "cut the file there, unless it is meant")
 
 
 def _through_wall(room: TriangleArray) -> Iterator[Finding]:
@@ -95,28 +90,17 @@ def _through_wall(room: TriangleArray) -> Iterator[Finding]:
     motion = room.scene.agent
     cycles, walls = crossings(motion.position[:-1], motion.position[1:], room.triangles)
     if len(cycles):
-        message = f"the path goes through '{room.name(int(walls[0]))}' after cycle {int(cycles[0])}"
-        yield error_at(room.file, "agent", message, "lead it around the object")
+        message = f"the path goes through '{room.name(walls[0])}' after cycle {cycles[0]}"
+        yield room.error("agent", message, "lead it around the object")
         return
     cycles, walls = crossings(motion.tx, motion.rx, room.triangles)
     if len(cycles):
-        message = f"'{room.name(int(walls[0]))}' stands between Tx and Rx at cycle {int(cycles[0])}"
-        yield error_at(room.file, _field(room, int(cycles[0])), message, "keep further away from it")
-
-
-def _inside_object(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: error of an agent whose start is inside an object; the path crosses no surface."""
-    start = room.scene.agent.position[0]
-    name = _enclosing(room, start, holding=room.scene.landmark_positions)
-    if name:
-        yield error_at(
-            room.file, room.start_key, f"{start.tolist()} lies inside the object '{name}'", "move the start out of it"
-        )
+        message = f"'{room.name(walls[0])}' stands between Tx and Rx at cycle {cycles[0]}"
+        yield room.error(_field(room, cycles[0]), message, "keep further away from it")
 
 
 def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
-    """Object around the agent, of the scene check: name of the reflector with a small piece around a point (3,) that
-    holds no mark (H, 3); empty without one."""
+    """Scene check: name of the object around a point (3,) that holds no mark (H, 3), a reflector; empty without one."""
     scene_box = np.prod(room.bounds[1] - room.bounds[0])
     for number, reflector in enumerate(room.scene.reflectors):
         mine = room.triangles[room.owner == number]
@@ -134,11 +118,11 @@ def _enclosing(room: TriangleArray, point: Floats, holding: Floats) -> str:
     return ""
 
 
-def _where(part: str, cycle: int, points: Floats) -> str:
+def _where(part: str, cycle: np.int64, points: Floats) -> str:
     """Position of a part of the agent at a cycle, in words for a finding of the scene check."""
     return f"{part} at {np.round(points[cycle], 4).tolist()} (cycle {cycle})"
 
 
-def _field(room: TriangleArray, cycle: int) -> str:
+def _field(room: TriangleArray, cycle: np.int64) -> str:
     """Key of the scene file that says where the agent is at a cycle; how it moves on, several can say."""
     return room.start_key if cycle == 0 else "agent"

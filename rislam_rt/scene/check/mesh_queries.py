@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers, cross, row_blocks
+from rislam_rt.arrays import Booleans, Floats, Integers, cross, row_blocks
 from rislam_rt.geometry.triangles import edge_planes, triangle_cross, triangle_planes
 
 
@@ -33,6 +33,12 @@ def crossings(start: Floats, end: Floats, triangles: Floats) -> tuple[Integers, 
         inside = _depth(point, edges, t) >= 0.0
         found.append((k[inside] + rows.start, place[t[inside]]))
     return _joined(found)
+
+
+def is_blocked(start: Floats, end: Floats, triangles: Floats) -> Booleans:
+    """Query to a mesh: whether (K,) a triangle (T, 3, 3) stands between `start` and `end`, (K, 3) each or one (3,)."""
+    start, end = np.broadcast_arrays(start, end)
+    return np.isin(np.arange(len(start)), crossings(start, end, triangles)[0])
 
 
 def ray_hits(origin: Floats, directions: Floats, triangles: Floats, slack: float = 1e-6) -> Integers:

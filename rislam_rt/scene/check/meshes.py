@@ -5,13 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.model.itu import ITU_MATERIALS, itu_parameters
 from rislam_rt.model.slab import normal_reflection
 from rislam_rt.scene.check.mesh_queries import touching
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray, without_area
+from rislam_rt.scene.check.occluders import occluder_fields
+from rislam_rt.scene.check.triangle_array import KEEP_AWAY, MIN_CLEARANCE, TriangleArray, without_area
 from rislam_rt.scene.check.units import ROOM_FIELD
 from rislam_rt.scene.findings import Finding, error_at, warning_at
 
@@ -25,21 +25,18 @@ def name_errors(room: TriangleArray) -> Iterator[Finding]:
     names += [shade.name for shade in room.scene.occluders]
     for name, count in Counter(names).items():
         if count > 1:
-            yield error_at(room.file, "name", f"{count} parts are called '{name}'", "give every part a name of its own")
+            yield room.error("name", f"{count} parts are called '{name}'", "give every part a name of its own")
 
 
 def face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of reflectors with faces without area."""
-    for number, reflector in enumerate(room.scene.reflectors):
-        yield from degenerate_errors(room, f"reflector[{number}].mesh ({reflector.name})", reflector.triangles)
-
-
-def degenerate_errors(room: TriangleArray, field: str, triangles: Floats) -> Iterator[Finding]:
-    """Scene check: error of a mesh, triangles (T, 3, 3), that has faces without area."""
-    bad = without_area(triangles)
-    if bad.any():
-        message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
-        yield error_at(room.file, field, message, "remove degenerate faces from the mesh")
+    """Scene check: errors of reflectors and occluders with faces without area."""
+    reflectors = enumerate(room.scene.reflectors)
+    parts = [(f"reflector[{number}].mesh ({one.name})", one.triangles) for number, one in reflectors]
+    for field, triangles in [*parts, *((field, shade.triangles) for field, _, shade in occluder_fields(room))]:
+        bad = without_area(triangles)
+        if bad.any():
+            message = f"{int(bad.sum())} faces without area, the first is face {int(np.argmax(bad))}"
+            yield room.error(field, message, "remove degenerate faces from the mesh")
 
 
 def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
@@ -49,19 +46,13 @@ def scatterer_errors(room: TriangleArray) -> Iterator[Finding]:
         field, at = f"scatterer[{number}].position ({scatterer.name})", scatterer.position
         if scatterer.radius is not None and scatterer.radius > diagonal:
             message = f"{scatterer.radius:g} m, and the room measures {diagonal:.3g} m across"
-            yield error_at(
-                room.file, f"scatterer[{number}].radius ({scatterer.name})", message, "give its radius in metres"
-            )
-            continue
-        if len(room.outside(at[None])):
-            yield error_at(
-                room.file, field, f"{at.tolist()} lies outside the meshes' bounds {room.box}", "move it inside"
-            )
-            continue
-        _, near = touching(at[None], room.triangles, MIN_CLEARANCE)
-        if len(near):
-            message = f"{at.tolist()} lies on '{room.name(int(near[0]))}'"
-            yield error_at(room.file, field, message, f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
+            yield room.error(f"scatterer[{number}].radius ({scatterer.name})", message, "give its radius in metres")
+        elif len(room.outside(at[None])):
+            yield room.error(field, f"{at.tolist()} lies outside the meshes' bounds {room.box}", "move it inside")
+        else:
+            _, near = touching(at[None], room.triangles, MIN_CLEARANCE)
+            if len(near):
+                yield room.error(field, f"{at.tolist()} lies on '{room.name(near[0])}'", KEEP_AWAY)
 
 
 def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
@@ -69,15 +60,15 @@ def mesh_warnings(room: TriangleArray) -> Iterator[Finding]:
     diagonal = float(np.linalg.norm(room.bounds[1] - room.bounds[0]))
     if diagonal > 200.0 or diagonal < 0.2:
         mend = f"metres wanted: is it in {'millimetres' if diagonal > 200.0 else 'kilometres'}?"
-        yield warning_at(room.file, ROOM_FIELD, f"the room measures {diagonal:.3g} m across", mend)
+        yield room.warning(ROOM_FIELD, f"the room measures {diagonal:.3g} m across", mend)
     corners = np.round(room.triangles, 6) + 0.0
     order = np.lexsort(np.moveaxis(corners, -1, 0)[::-1], axis=-1)
     keys = np.take_along_axis(corners, order[..., None], axis=1).reshape(len(corners), 9)
     _, first, count = np.unique(np.column_stack([keys, room.owner]), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
-        name = room.name(int(first[np.argmax(count > 1)]))
+        name = room.name(first[np.argmax(count > 1)])
         message = f"{int((count - 1).sum())} faces lie exactly on others of their mesh, the first in '{name}'"
-        yield warning_at(room.file, "reflector", message, "leave the doubles out")
+        yield room.warning("reflector", message, "leave the doubles out")
 
 
 def material_errors(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Finding]:

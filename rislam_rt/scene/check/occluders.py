@@ -7,37 +7,29 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.model import Occluder, RadioConfig
 from rislam_rt.scene.check.mesh_queries import crossings, winding
-from rislam_rt.scene.check.meshes import degenerate_errors
 from rislam_rt.scene.check.triangle_array import TriangleArray
-from rislam_rt.scene.findings import Finding, error_at, warning_at
-
-
-def occluder_face_errors(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: errors of occluders with faces without area."""
-    for field, _, shade in _occluders(room):
-        yield from degenerate_errors(room, field, shade.triangles)
+from rislam_rt.scene.findings import Finding
 
 
 def occluder_errors(room: TriangleArray) -> Iterator[Finding]:
     """Scene check: errors of an occluder off its own scatterer, or about another landmark or the agent."""
     marks, motion = room.scene.landmark_positions, room.scene.agent
-    for field, number, shade in _occluders(room):
+    for field, number, shade in occluder_fields(room):
         inside = _inside(marks, shade)
         if number is not None and not inside[number]:
             message = f"it does not enclose the scatterer's position {marks[number].tolist()}"
-            yield error_at(room.file, field, message, "give a closed mesh in the room's frame, about the position")
+            yield room.error(field, message, "give a closed mesh in the room's frame, about the position")
             continue
         if number is not None:
             inside[number] = False
         if inside.any():
             message = f"'{room.scene.landmarks[int(np.argmax(inside))]}' lies inside it, where no ray reaches it"
-            yield error_at(room.file, field, message, "move one of the two")
+            yield room.error(field, message, "move one of the two")
         for part, points in (("the agent", motion.position), ("Tx", motion.tx), ("Rx", motion.rx)):
             cycle = _enters(points, shade)
             if cycle is not None:
-                yield error_at(
-                    room.file, field, f"{part} is inside it at or after cycle {cycle}", "keep the agent away from it"
-                )
+                what = f"{part} is inside it at or after cycle {cycle}"
+                yield room.error(field, what, "keep the agent away from it")
                 break
 
 
@@ -54,11 +46,11 @@ def cylinder_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Findi
             field = f"scatterer[{number}].height_m ({scatterer.name})"
             near_field = np.pi * (scatterer.radius or 0.0) * nearest  # a long one's, by geometrical optics
             mend = f"take a shorter one, or give 'rcs_m2': pi r times the distance, {near_field:.2g} m^2 there"
-            yield warning_at(room.file, field, message, mend)
+            yield room.warning(field, message, mend)
 
 
-def _occluders(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
-    """Field in the scene file, number of the scatterer (None: stands alone), and mesh of every occluder."""
+def occluder_fields(room: TriangleArray) -> Iterator[tuple[str, int | None, Occluder]]:
+    """Scene check: field in the file, number of the scatterer (None: stands alone), and mesh of every occluder."""
     for number, scatterer in enumerate(room.scene.scatterers):
         if scatterer.shade is not None:
             yield f"scatterer[{number}].mesh ({scatterer.name})", number, scatterer.shade

@@ -12,7 +12,7 @@ from rislam_rt.model import RadioConfig, RisPanel
 from rislam_rt.model.delay_spread import delay_spread_remark
 from rislam_rt.scene.check.mesh_queries import ray_hits, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
-from rislam_rt.scene.findings import Finding, error_at, panel_key, warning_at
+from rislam_rt.scene.findings import Finding, panel_key
 
 MAX_TURN = 1e-2
 """Largest angle [rad] between the normals of a RIS panel and of its host."""
@@ -27,7 +27,7 @@ def panel_errors(room: TriangleArray) -> Iterator[Finding]:
         tolerant = room._replace(bounds=room.bounds + MIN_CLEARANCE * np.array([[-1.0], [1.0]]))
         if len(tolerant.outside(at[None])):
             message = f"{at.tolist()} lies outside the meshes' bounds {room.box}"
-            yield error_at(room.file, f"{key}.center", message, "move the panel onto its host")
+            yield room.error(f"{key}.center", message, "move the panel onto its host")
             continue
         findings = list(_on_host(room, panel, key))
         yield from findings
@@ -36,7 +36,7 @@ def panel_errors(room: TriangleArray) -> Iterator[Finding]:
     for (one, _), (other, key) in combinations(_keyed(room), 2):
         if _overlap(one, other):
             message = f"'{other.name}' covers a part of '{one.name}'"
-            yield error_at(room.file, f"{key}.center", message, "move the panels apart")
+            yield room.error(f"{key}.center", message, "move the panels apart")
 
 
 def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]:
@@ -45,12 +45,12 @@ def panel_warnings(room: TriangleArray, radio: RadioConfig) -> Iterator[Finding]
         spec, motion = panel.spec, room.scene.agent
         if ((motion.position - panel.center) @ spec.normal <= 0.0).all():
             message = "the agent is never in front of the panel"
-            yield warning_at(room.file, f"{key}.normal", message, "turn the panel or the path")
+            yield room.warning(f"{key}.normal", message, "turn the panel or the path")
         yield from _implausible(room, panel, key, radio)
         yield from _beyond_room(room, panel, key)
         spread = _delay_spread(room, panel)
         if spread * radio.bandwidth > 1.0:
-            yield warning_at(room.file, f"{key}.rows", *delay_spread_remark(spread, radio.bandwidth))
+            yield room.warning(f"{key}.rows", *delay_spread_remark(spread, radio.bandwidth))
 
 
 def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:
@@ -60,8 +60,7 @@ def _keyed(room: TriangleArray) -> list[tuple[RisPanel, str]]:
 
 
 def _overlap(one: RisPanel, other: RisPanel) -> bool:
-    """Scene check: whether two RIS panels overlap, that is look the same way from one plane, and no axis of either
-    separates them."""
+    """Scene check: whether two RIS panels overlap: they look the same way from one plane, and no axis parts them."""
     gap = other.center - one.center
     if one.spec.normal @ other.spec.normal < np.cos(MAX_TURN) or abs(gap @ one.spec.normal) > THICKEST:
         return False
@@ -78,14 +77,12 @@ def _implausible(room: TriangleArray, panel: RisPanel, key: str, radio: RadioCon
     excess = 10.0 * np.log10(2.0 * radio.wavelength**2 / (np.pi * area))
     if spec.element == "tang" and excess > 0.5:
         message = f"at {radio.carrier / 1e9:g} GHz 'tang' elements reflect {excess:.2f} dB more than a perfect plate"
-        yield warning_at(room.file, f"{key}.element", message, "take 'energy', unless the paper's model is wanted")
+        yield room.warning(f"{key}.element", message, "take 'energy', unless the paper's model is wanted")
     widest = max((float(d) for d, n in zip(spec.spacing, (spec.cols, spec.rows), strict=True) if n > 1), default=0.0)
     if widest >= radio.wavelength:
-        message = (
-            f"elements {widest:g} m apart, a wavelength or more ({radio.wavelength:.4g} m at "
-            f"{radio.carrier / 1e9:g} GHz): whatever the code, another direction is met as strongly"
-        )
-        yield warning_at(room.file, f"{key}.spacing_m", message, "take half a wavelength or less")
+        wave = f"a wavelength or more ({radio.wavelength:.4g} m at {radio.carrier / 1e9:g} GHz)"
+        message = f"elements {widest:g} m apart, {wave}: whatever the code, another direction is met as strongly"
+        yield room.warning(f"{key}.spacing_m", message, "take half a wavelength or less")
 
 
 def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
@@ -97,35 +94,32 @@ def _beyond_room(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Fin
     over = float(np.maximum(low - (panel.center - half), panel.center + half - high).max())
     if over > MIN_CLEARANCE:
         message = f"the panel of {sides[0]:.3g} m x {sides[1]:.3g} m reaches {over:.3g} m beyond the room"
-        yield warning_at(room.file, f"{key}.rows", message, "take fewer elements, put them closer, or move its center")
+        yield room.warning(f"{key}.rows", message, "take fewer elements, put them closer, or move its center")
 
 
 def _on_host(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
-    """Scene check: errors of a RIS panel that does not lie flat on the wall that is named as its host, or just before
-    it."""
+    """Scene check: errors of a RIS panel that does not lie flat on the wall named as its host, or just before it."""
     names = [r.name for r in room.scene.reflectors]
     _, near = touching(panel.center[None], room.triangles, MIN_CLEARANCE)
-    behind = sorted({room.name(int(t)) for t in near})
+    behind = sorted({room.name(t) for t in near})
     if panel.host is None:
         if behind:
             message = f"missing, and the panel lies on '{behind[0]}'"
-            yield error_at(room.file, f"{key}.host", message, f'add host = "{behind[0]}"')
+            yield room.error(f"{key}.host", message, f'add host = "{behind[0]}"')
         return
     if panel.host not in names:
-        yield error_at(
-            room.file, f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}"
-        )
+        yield room.error(f"{key}.host", f"'{panel.host}' is no reflector", f"give one of {', '.join(names[:12])}")
         return
     triangles = room.triangles[room.owner == names.index(panel.host)]
     hung = _hung(triangles, panel)
     if not len(hung):
-        yield error_at(room.file, f"{key}.center", *_off_host(triangles, panel))
+        yield room.error(f"{key}.center", *_off_host(triangles, panel))
         return
     turn = np.linalg.norm(cross(triangle_planes(triangles[hung])[0], panel.spec.normal), axis=-1).min()
     if turn > MAX_TURN:
         angle = np.degrees(np.arcsin(min(turn, 1.0)))
         message = f"{angle:.2f} degrees from the normal of '{panel.host}'"
-        yield error_at(room.file, f"{key}.normal", message, "lay it flat on its host")
+        yield room.error(f"{key}.normal", message, "lay it flat on its host")
 
 
 def _hung(triangles: Floats, panel: RisPanel) -> Integers:
@@ -158,13 +152,12 @@ def _off_host(triangles: Floats, panel: RisPanel) -> tuple[str, str]:
 def _facing(room: TriangleArray, panel: RisPanel, key: str) -> Iterator[Finding]:
     """Scene check: error of a RIS panel with nothing before it but something behind, unless the agent is before it."""
     ahead, behind = (
-        ray_hits(panel.center + side * 2.0 * MIN_CLEARANCE * panel.spec.normal, np.array([side * panel.spec.normal]),
-                 room.triangles)[0] >= 0
-        for side in (1.0, -1.0)
-    )  # fmt: skip
+        ray_hits(panel.center + 2.0 * MIN_CLEARANCE * look, look[None], room.triangles)[0] >= 0
+        for look in (panel.spec.normal, -panel.spec.normal)
+    )
     before = ((room.scene.agent.position - panel.center) @ panel.spec.normal > 0.0).any()
     if behind and not ahead and not before:
-        yield error_at(room.file, f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
+        yield room.error(f"{key}.normal", f"{panel.spec.normal.tolist()} points out of the room", "reverse it")
 
 
 def _delay_spread(room: TriangleArray, panel: RisPanel) -> float:

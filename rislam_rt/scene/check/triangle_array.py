@@ -7,9 +7,12 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import triangle_heights
 from rislam_rt.model import Scene
+from rislam_rt.scene.findings import Finding, error_at, warning_at
 
 MIN_CLEARANCE = 1e-3
 """Least distance [m] of a device or scatterer from a surface: a nearer one loses that surface's reflection."""
+KEEP_AWAY = f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces"
+"""How to mend the place of a device or scatterer on a surface."""
 MIN_ALTITUDE = 1e-6
 """Least height [m] of a triangle: one with a smaller height has no usable normal."""
 START_KEY = "agent.start"
@@ -31,7 +34,15 @@ class TriangleArray(NamedTuple):
     start_key: str = START_KEY
     """Key of the scene file that says where the agent starts, for findings."""
 
-    def name(self, triangle: int) -> str:
+    def error(self, field: str, message: str, mend: str) -> Finding:
+        """Error of the scene check at a key of the scene file."""
+        return error_at(self.file, field, message, mend)
+
+    def warning(self, field: str, message: str, mend: str) -> Finding:
+        """Warning of the scene check at a key of the scene file."""
+        return warning_at(self.file, field, message, mend)
+
+    def name(self, triangle: int | np.int64) -> str:
         """Name of the reflector that a triangle of the scene belongs to."""
         return self.scene.reflectors[self.owner[triangle]].name
 

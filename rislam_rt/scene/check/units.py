@@ -101,9 +101,8 @@ def _room_unit(bounds: Floats) -> tuple[str, str] | None:
     longest, words = float(size.max()), " x ".join(f"{side:.3g}" for side in size)
     if longest > LARGEST_ROOM:
         for unit, name in NAMES.items():
-            factor = UNITS[name]
-            if USUAL_ROOM[0] <= longest * factor <= USUAL_ROOM[1]:
-                meant = " x ".join(f"{side * factor:.3g}" for side in size)
+            if USUAL_ROOM[0] <= longest * UNITS[name] <= USUAL_ROOM[1]:
+                meant = " x ".join(f"{side * UNITS[name]:.3g}" for side in size)
                 mend = f'say units = "{name}" in the table [meshes]'
                 return f"the room is {words} m; in {unit} it would be {meant} m", mend
         return f"the room is {words} m", "give metres"
@@ -119,17 +118,15 @@ def _far_point(file: str, field: str, point: Floats, bounds: Floats) -> Iterator
     if away <= FAR * size:
         return
     for unit, name in NAMES.items():
-        factor = UNITS[name]
-        meant = point * factor
+        meant = point * UNITS[name]
         if (meant >= bounds[0]).all() and (meant <= bounds[1]).all():
             message = f"{point.tolist()} is far outside the room; in {unit} it would be {np.round(meant, 6).tolist()} m"
-            yield warning_at(file, field, message, f"give metres: multiply by {factor:g}")
+            yield warning_at(file, field, message, f"give metres: multiply by {UNITS[name]:g}")
             return
 
 
 def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, float]]:
-    """Numbers that the scene check of units looks at: dotted field and largest number wherever a path of keys leads in
-    a scene file."""
+    """Scene check of units: dotted field and largest number wherever a path of keys leads in a scene file."""
     for field, value in _places(table, path, ""):
         numbers = value if isinstance(value, list) else [value]
         if numbers and all(_is_number(number) for number in numbers):
@@ -137,8 +134,7 @@ def _values(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str, Floats]]:
-    """Points that the scene check of units looks at: dotted field and point (3,) wherever a path of keys leads in a
-    scene file; of a list, each."""
+    """Scene check of units: dotted field and point (3,), or each of several, where a path of keys leads in a file."""
     for field, value in _places(table, path, ""):
         listed = isinstance(value, list) and value and isinstance(value[0], list)
         for place, point in ((f"{field}[{n}]", item) for n, item in enumerate(value)) if listed else [(field, value)]:
@@ -147,8 +143,7 @@ def _points(table: Mapping[str, Any], path: Sequence[str]) -> Iterator[tuple[str
 
 
 def _places(part: Any, path: Sequence[str], field: str) -> Iterator[tuple[str, Any]]:
-    """Fields that the scene check of units looks at: dotted field and value wherever a path of keys leads; in lists of
-    tables, of each."""
+    """Scene check of units: dotted field and value wherever a path of keys leads; in lists of tables, of each."""
     if isinstance(part, list) and path:
         for number, item in enumerate(part):
             yield from _places(item, path, f"{field}[{number}]")

@@ -12,9 +12,9 @@ from rislam_rt.geometry.coplanar import ALIKE, CoplanarPair, lies_within, stack_
 from rislam_rt.geometry.plane_segmentation import PlanarRegions, planar_regions
 from rislam_rt.geometry.triangles import triangle_areas, triangle_planes
 from rislam_rt.input_messages import counted
-from rislam_rt.scene.check.mesh_queries import crossings, free_ways, sphere_directions, touching
+from rislam_rt.scene.check.mesh_queries import free_ways, is_blocked, sphere_directions, touching
 from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE, TriangleArray
-from rislam_rt.scene.findings import Finding, note_at, warning_at
+from rislam_rt.scene.findings import Finding
 
 NEARLY_FLAT = 1e-2
 """Angle [rad] below which walls of one mesh that meet are taken to be meant as one: half a degree looks flat."""
@@ -30,7 +30,7 @@ HIDDEN, WITHIN = (
 
 
 class WallParts(NamedTuple):
-    """The walls (planar regions) of a scene's meshes, reflector by reflector."""
+    """The walls (planar regions) of a scene's meshes, reflector by reflector, as the channels part them."""
 
     flat: list[PlanarRegions]
     """Planar regions of each reflector."""
@@ -44,17 +44,12 @@ class WallParts(NamedTuple):
         return int(np.searchsorted(self.first, wall, side="right")) - 1
 
 
-def build_parts(room: TriangleArray) -> WallParts:
-    """Part every reflector's mesh into walls (planar regions), as the channels do."""
+def wall_findings(room: TriangleArray) -> Iterator[Finding]:
+    """Scene check: findings on meshes that lie on each other, are nearly flat, or have several walls."""
     flat = [planar_regions(r.triangles, COPLANAR_ANGLE, COPLANAR_OFFSET) for r in room.scene.reflectors]
     first = np.cumsum([0, *(len(part.offset) for part in flat)])
     owner = np.concatenate([part.group + start for part, start in zip(flat, first, strict=False)])
-    return WallParts(flat, first, owner)
-
-
-def wall_findings(room: TriangleArray) -> Iterator[Finding]:
-    """Scene check: findings on meshes that lie on each other, are nearly flat, or have several walls."""
-    parts = build_parts(room)
+    parts = WallParts(flat, first, owner)
     yield from _stacked(room, parts)
     several = [number for number, part in enumerate(parts.flat) if len(part.offset) > 1]
     for number in several:
@@ -63,12 +58,12 @@ def wall_findings(room: TriangleArray) -> Iterator[Finding]:
         if number == several[0]:
             others = f", and {counted(len(several) - 1, 'other reflector')} more than one" if len(several) > 1 else ""
             mend = f"its walls are {name}#0 to {name}#{count - 1}"
-            yield note_at(room.file, field, f"the mesh has {count} planes{others}", mend)
+            yield Finding("note", room.file, field, f"the mesh has {count} planes{others}", mend)
         angle = _flattest(room.triangles[room.owner == number], part)
         if angle < NEARLY_FLAT:
             message = f"splits into {count} walls, of which neighbours meet at only {angle:.1e} rad"
             mend = f"if that is one wall, make it flat to {COPLANAR_OFFSET} m and {COPLANAR_ANGLE} rad"
-            yield warning_at(room.file, field, message, mend)
+            yield room.warning(field, message, mend)
 
 
 def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
@@ -93,10 +88,10 @@ def _stacked(room: TriangleArray, parts: WallParts) -> Iterator[Finding]:
         message = f"'{names[0]}' lies in the plane of '{names[1]}', {apart}"
         if not why:
             mend = f"leave one out, or part them by more than {limit * 1e3:.2g} mm"
-            yield warning_at(room.file, field, message, f"where they overlap '{names[0]}' reflects; {mend}")
+            yield room.warning(field, message, f"where they overlap '{names[0]}' reflects; {mend}")
         elif left[why]:
             message += f", and {counted(left[why] - 1, 'other pair')} likewise" if left[why] > 1 else ""
-            yield note_at(room.file, field, message, why)
+            yield Finding("note", room.file, field, message, why)
             left[why] = 0
 
 
@@ -126,8 +121,8 @@ def _is_seen(room: TriangleArray, parts: WallParts, pair: CoplanarPair, limit: f
     upper, lower = (room.triangles[room.owner == parts.reflector(number)] for number in (pair.upper, pair.lower))
     seen = sides[np.arange(len(views)) % len(sides)]  # each by its own share of the views
     for triangles in (upper, lower, room.triangles):  # the nearest hide most
-        blocked = np.unique(crossings(views, seen, triangles)[0])
-        views, seen = np.delete(views, blocked, axis=0), np.delete(seen, blocked, axis=0)
+        free = ~is_blocked(views, seen, triangles)
+        views, seen = views[free], seen[free]
     return len(views) > 0
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_cross, triangle_planes
-from rislam_rt.scene.check.mesh_queries import crossings, hit_shares, sphere_directions
+from rislam_rt.scene.check.mesh_queries import crossings, hit_shares, is_blocked, sphere_directions
 
 HEIGHTS = (1.0, 1.4, 0.6)
 """Heights [m] above the floor that are tried for the agent: that of a trolley or a hand, then higher, then lower."""
@@ -101,8 +101,7 @@ def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, c
 
 
 def _largest_part(places: Floats, headroom: Floats, share: Floats, triangles: Floats) -> Booleans:
-    """Which of a room's places (N, 3) are in the part of most volume that free straight lines join, of those from which
-    few rays escape."""
+    """Which of a room's places (N, 3) are in the largest part that free straight lines join and few rays leave."""
     best, volume, left = np.arange(0), -1.0, np.ones(len(places), dtype=np.bool_)
     for start in np.argsort(-headroom, kind="stable"):
         if not left[start]:
@@ -121,8 +120,7 @@ def reachable(start: Floats, points: Floats, triangles: Floats) -> Booleans:
     while stations and not reached.all():
         here = stations.pop()
         rows = np.flatnonzero(~reached)
-        blocked, _ = crossings(np.broadcast_to(here, (len(rows), 3)), points[rows], triangles)
-        rows = np.delete(rows, np.unique(blocked))
+        rows = rows[~is_blocked(here, points[rows], triangles)]
         reached[rows] = True
         stations += list(points[rows])
     return reached
@@ -145,8 +143,7 @@ def _longest_way(stations: Floats, triangles: Floats, clearance: float) -> Float
 
 
 def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Booleans:
-    """Whether each group of triangles (T, 3, 3) is visible from any station (S, 3) in the free space, past all
-    `triangles` (A, 3, 3).
+    """Whether each group of triangles (T, 3, 3) is seen from any free station (S, 3), past all `triangles` (A, 3, 3).
 
     Looked at are points spread over each group, and, for the sides of things that stand close to a wall, where an agent
     can be before it; from some twenty stations far from each other and what is freely above and below them: a wall of
@@ -159,9 +156,7 @@ def is_seen(stations: Floats, groups: list[Floats], triangles: Floats) -> Boolea
         looks = 0
         for eye in eyes:
             side = np.sign(np.einsum("pi,pi->p", eye - points, normal))[:, None]
-            ends = points + OFF_SURFACE * side * normal
-            blocked, _ = crossings(np.broadcast_to(eye, ends.shape), ends, triangles)
-            looks += len(ends) - len(np.unique(blocked))
+            looks += int(np.sum(~is_blocked(eye, points + OFF_SURFACE * side * normal, triangles)))
             if looks >= ENOUGH:
                 break
         seen[number] = looks >= ENOUGH or _stood_before(points, normal, eyes, triangles) >= ENOUGH
@@ -175,16 +170,14 @@ def _stood_before(points: Floats, normal: Floats, eyes: Floats, triangles: Float
     before = before[distance_to_triangles(before, triangles) >= CLEARANCES[-1] - OFF_SURFACE]
     met = np.zeros(len(before), dtype=np.bool_)
     for eye in eyes:
-        blocked, _ = crossings(np.broadcast_to(eye, before.shape), before, triangles)
-        met |= ~np.isin(np.arange(len(before)), blocked)
+        met |= ~is_blocked(eye, before, triangles)
     directions = sphere_directions(_RAYS)
     share = hit_shares(np.concatenate([eyes[:1], before[met]]), directions, triangles)
     return int(np.sum(share[1:] >= CLOSED * share[0]))
 
 
 def _far_apart(stations: Floats, count: int) -> Floats:
-    """Viewpoints in free space (count, 3) among stations (S, 3), the first, and then ever the one farthest from all
-    before it."""
+    """Viewpoints in free space (count, 3) among stations (S, 3): the first, then ever the farthest from all before."""
     chosen, gap = [0], np.linalg.norm(stations - stations[0], axis=1)
     while len(chosen) < min(count, len(stations)):
         chosen.append(int(np.argmax(gap)))
@@ -199,8 +192,7 @@ def _eyes(stations: Floats, triangles: Floats) -> Floats:
     for share in (0.1, 0.5, 0.9):
         moved = stations.copy()
         moved[:, 2] = low + share * (high - low)
-        blocked, _ = crossings(stations, moved, triangles)
-        found.append(np.delete(moved, np.unique(blocked), axis=0))
+        found.append(moved[~is_blocked(stations, moved, triangles)])
     return np.concatenate(found)
 
 

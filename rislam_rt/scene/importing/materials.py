@@ -126,11 +126,8 @@ class MaterialAssignment:
 
     def remarks(self) -> list[str]:
         """Remarks on the walls of an import whose material was assumed or replaced, a line each; none without any."""
-        ghz = self.carrier / 1e9
-        remarks = [
-            f"'{itu}' is not specified at {ghz:g} GHz, taken as {other} (--material NAME=...)"
-            for itu, other in self.replaced.items()
-        ]
+        at = f"is not specified at {self.carrier / 1e9:g} GHz, taken as"
+        remarks = [f"'{itu}' {at} {other} (--material NAME=...)" for itu, other in self.replaced.items()]
         if not self.assumed:
             return remarks
         names, what = sorted(self.assumed), ", ".join(f"{value}" for value in self.rest.values())
@@ -138,8 +135,7 @@ class MaterialAssignment:
         return [*remarks, f"material unknown, taken as {what}: {', '.join(names[:8])}{more} (--material NAME=...)"]
 
     def check_used(self, names: Iterable[str]) -> None:
-        """Check that every material that the user gave for an import has been used; `names`: some that could have been
-        meant.
+        """Check that every material given for an import has been used; `names`: some that could have been meant.
 
         Raises
         ------

@@ -21,12 +21,11 @@ from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.importing.scans.scan_room import looks_scanned, sort_scan
-from rislam_rt.scene.meshes import Mesh, as_mesh
-from rislam_rt.scene.shapes import joined
+from rislam_rt.scene.meshes import Mesh, as_mesh, joined
 
 
 def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
-    """Import a mesh file as the draft of a room.
+    """Import a mesh file as the draft of a room, by flat regions or a scan's planes: reflectors, materials, occluders.
 
     Raises
     ------
@@ -40,11 +39,6 @@ def import_mesh(path: Path, options: ImportOptions) -> RoomDraft:
     facets = find_facets(weld(placed))
     if not len(facets.area):
         raise Fault("no triangle of the file has an area", "export it again")
-    return build_draft(facets, parts, [*notes, *more], options)
-
-
-def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], options: ImportOptions) -> RoomDraft:
-    """Draft of a room from an imported mesh, by flat regions or a scan's planes: reflectors, materials, occluders."""
     if options.scan or (options.scan is None and looks_scanned(facets, options)):
         found, about = sort_scan(facets.mesh, options)
         pieces = [RegionGroup("", "", np.zeros(0, dtype=np.int64))]
@@ -61,8 +55,7 @@ def build_draft(facets: FlatRegions, parts: list[MeshPart], notes: list[str], op
     occluders = _occluders(found, pieces, list(reflectors))
     palette.check_used([*reflectors, *sorted({p.material for p in parts if p.material})])
     said = _summary(facets, found, surfaces, unseen, reflectors, occluders, options, scanned=bool(about))
-    remarks = [*notes, *about, *said]
-    return RoomDraft(reflectors, occluders, remarks + palette.remarks())
+    return RoomDraft(reflectors, occluders, [*notes, *more, *about, *said, *palette.remarks()])
 
 
 def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], list[Surface]]:
@@ -72,8 +65,7 @@ def _visible_surfaces(found: SortedSurfaces) -> tuple[list[Surface], list[Surfac
     if free is None:
         return found.surfaces, []
     seen = is_seen(free.stations, [s.mesh.triangles for s in found.surfaces], triangles)
-    kept = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if visible]
-    hidden = [surface for surface, visible in zip(found.surfaces, seen, strict=True) if not visible]
+    kept, hidden = ([found.surfaces[k] for k in np.flatnonzero(seen == wanted)] for wanted in (True, False))
     return (kept, hidden) if kept else (found.surfaces, [])
 
 
@@ -115,10 +107,10 @@ def _reflectors(
             entries.append((piece.name, joined([s.mesh for s in mine if s.part == part]), part))
             given.append(bool(piece.node))
     names = numbered([name for name, _, _ in entries], given)
-    return {
-        name: (mesh, palette.material(name, parts[number].node, parts[number].material))
-        for name, (_, mesh, number) in zip(names, entries, strict=True)
-    }
+    found = {}
+    for name, (_, mesh, number) in zip(names, entries, strict=True):
+        found[name] = (mesh, palette.material(name, parts[number].node, parts[number].material))
+    return found
 
 
 def _occluders(found: SortedSurfaces, pieces: list[RegionGroup], taken: list[str]) -> dict[str, Mesh]:

@@ -1,5 +1,6 @@
 """Source of imported meshes: files (GLB, glTF, OBJ, PLY, STL) as triangles with names of node and material."""
 
+import base64
 import json
 import os
 import struct
@@ -37,8 +38,7 @@ class MeshPart:
 
 
 def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
-    """Read the parts of a mesh file to import, one for each node and material, and remarks on what it names and does
-    not hold.
+    """Read the parts of a mesh file to import, one a node and material, and remarks on what it names and lacks.
 
     Raises
     ------
@@ -57,7 +57,8 @@ def read_source(path: Path) -> tuple[list[MeshPart], list[str]]:
         parts = _from_gltf(content, suffix, path.parent)
     elif suffix == ".obj":
         found, library = read_obj(content)
-        parts = [MeshPart(node, material, _sound(triangles)) for node, material, triangles in found]
+        loose = [Mesh(t.reshape(-1, 3), np.arange(3 * len(t)).reshape(-1, 3)) for _, _, t in found]
+        parts = [_part(group, material, mesh) for (group, material, _), mesh in zip(found, loose, strict=True)]
         if library and not (path.parent / library).is_file():
             notes.append(f"'{library[:60]}' is not there: materials are known by their names in the OBJ file alone")
     else:
@@ -95,11 +96,9 @@ def read_content(path: Path, limit: int = MAX_MESH_BYTES) -> bytes:
     return content
 
 
-def _sound(triangles: Floats) -> Floats:
-    """Triangles (T, 3, 3) of a part of an imported mesh file after a check of their coordinates."""
-    corners = triangles.reshape(-1, 3)
-    faces = np.arange(len(corners)).reshape(-1, 3)
-    return sound_mesh(Mesh(corners, faces), MAX_IMPORT_FACES, ANY_UNIT).vertices[faces]
+def _part(node: str, material: str, mesh: Mesh) -> MeshPart:
+    """Part of an imported mesh file after a check of its coordinates."""
+    return MeshPart(node, material, sound_mesh(mesh, MAX_IMPORT_FACES, ANY_UNIT).triangles)
 
 
 def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
@@ -112,8 +111,7 @@ def _from_gltf(content: bytes, suffix: str, folder: Path) -> list[MeshPart]:
         mesh, geometry = node_mesh(loaded, name)
         if len(mesh.faces):
             material = getattr(getattr(geometry.visual, "material", None), "name", None)
-            triangles = sound_mesh(mesh, MAX_IMPORT_FACES, ANY_UNIT).triangles
-            parts.append(MeshPart(str(name), str(material or ""), triangles))
+            parts.append(_part(str(name), str(material or ""), mesh))
     return parts
 
 
@@ -160,8 +158,6 @@ def _joined_glb(content: bytes, folder: Path) -> bytes:
 
 def _embedded(uri: str) -> bytes:
     """Decode a buffer that stands inside a glTF mesh file in base64."""
-    import base64
-
     try:
         return base64.b64decode(uri.partition(",")[2], validate=True)
     except ValueError:

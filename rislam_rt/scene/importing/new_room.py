@@ -19,8 +19,7 @@ from rislam_rt.scene.importing.room_draft import RoomDraft, finish_room
 from rislam_rt.scene.load import check_scene
 from rislam_rt.scene.mesh_placement import UNITS
 from rislam_rt.scene.room_files import room_files
-from rislam_rt.scene.templates import room_name
-from rislam_rt.scene.write import write_files
+from rislam_rt.scene.write import room_name, write_files
 
 PLANS = (".svg", ".geojson", ".json")
 """Endings of the files that are imported as floor plans."""
@@ -110,8 +109,5 @@ def write_room(
         place = f"{errors[0].field}: " if errors[0].field else ""
         raise Fault(f"the room would not pass its check: {place}{errors[0].message}", mend)
     write_files(files, folder, overwrite=overwrite)
-    return remarks + [
-        f"{f.field}: {f.message}; {f.mend} (--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"
-        for f in findings
-        if ".material." in f.field
-    ]
+    how = "(--material NAME=itu:MATERIAL:THICKNESS_M or NAME=reflection:VALUE)"
+    return remarks + [f"{f.field}: {f.message}; {f.mend} {how}" for f in findings if ".material." in f.field]

@@ -11,8 +11,7 @@ Polygons = dict[tuple[str, str], list[list[int]]]
 
 
 def read_obj(content: bytes) -> tuple[list[tuple[str, str, Floats]], str]:
-    """Read an OBJ mesh file: (group, material, triangles (T, 3, 3)) of each part, and the library of materials that it
-    names.
+    """Read an OBJ mesh file: (group, material, triangles (T, 3, 3)) of each part, and the library of materials named.
 
     Raises
     ------

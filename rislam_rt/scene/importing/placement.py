@@ -52,9 +52,9 @@ def check_near(points: Floats, origin: Floats) -> None:
     far = float(np.abs(points).max())
     if far > MAX_COORDINATE:
         low = [f"{value:.0f}" for value in np.floor(points.min(axis=0) + origin) + 0.0] + ["0"] * (3 - points.shape[1])
+        mend = f"give --origin {','.join(low)}, a point beside it that becomes the room's zero"
         raise Fault(
-            f"it lies {far:.7g} m from the zero of its coordinates, and {MAX_COORDINATE:.0f} m are the most",
-            f"give --origin {','.join(low)}, a point beside it that becomes the room's zero",
+            f"it lies {far:.7g} m from the zero of its coordinates, and {MAX_COORDINATE:.0f} m are the most", mend
         )
 
 

@@ -41,8 +41,7 @@ class RoomDraft:
 
 
 def finish_room(draft: RoomDraft, name: str, origin: str, carrier_ghz: float) -> tuple[RoomFiles, list[str]]:
-    """Finish the draft of an imported room, with an agent on a free line and a RIS panel for the carrier above it: its
-    files, and all remarks.
+    """Finish an imported room's draft, with an agent on a free line and a RIS panel above it: its files, all remarks.
 
     Raises
     ------
@@ -100,11 +99,9 @@ def _fits(
 ) -> bool:
     """Whether the corners of a RIS panel proposed for the draft, `half` a side [m] from its centre, lie on one host and
     are seen from the middle of the agent's line."""
-    mesh, _ = draft.reflectors[host]
     down = cross(normal, right)
     corners = center + half * np.array([right + down, right - down, -right + down, -right - down])
     middle = free.way.mean(axis=0)
     hits = ray_hits(middle, unit(corners - middle), draft.triangles)
-    seen = draft.triangles[hits]
-    own = mesh.triangles
+    own, seen = draft.reflectors[host][0].triangles, draft.triangles[hits]
     return bool((hits >= 0).all()) and all((own == triangle).all(axis=(1, 2)).any() for triangle in seen)

@@ -10,13 +10,12 @@ from rislam_rt.arrays import Floats
 from rislam_rt.errors import GeometryError
 from rislam_rt.geometry.triangles import distance_to_triangles
 from rislam_rt.model import Body, Trajectory
-from rislam_rt.scene.check.triangle_array import MIN_CLEARANCE
+from rislam_rt.scene.check.triangle_array import KEEP_AWAY, MIN_CLEARANCE
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.headings import along_heading
 from rislam_rt.scene.motion.random_walk import draw_walk
 from rislam_rt.scene.motion.recorded_poses import RecordedPoses, parse_csv, parse_tum
-from rislam_rt.scene.motion.stop_and_go import StopAndGo, plan_stops
-from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
+from rislam_rt.scene.motion.stop_and_go import plan_stops
+from rislam_rt.scene.motion.waypoints import RoundedPath, along_heading, round_corners
 from rislam_rt.scene.scene_folder import read_inside
 from rislam_rt.scene.schema import AgentSection
 
@@ -52,25 +51,11 @@ def build_motion(agent: AgentSection, folder: Path, triangles: Floats) -> tuple[
             return _recorded_motion(agent, content, body), content
         except Fault as fault:
             name = agent.trajectory[:80]
-            if name not in fault.message:
-                fault = Fault(f"'{name}': {fault.message}", fault.mend)
-            fault.key = "trajectory"
-            raise fault from None
+            message = fault.message if name in fault.message else f"'{name}': {fault.message}"
+            raise Fault(message, fault.mend, "trajectory") from None
     if agent.waypoints is not None:
-        _check_waypoints(agent.waypoints, triangles)
-        return _waypoint_motion(agent, body), b""
+        return _waypoint_motion(agent, agent.waypoints, triangles, body), b""
     return _walk(agent, triangles, body), b""
-
-
-def _check_waypoints(waypoints: list[list[float]], triangles: Floats) -> None:
-    """Raise an error for a waypoint of the agent on a surface, triangles (T, 3, 3) [m]; the scene check looks at the
-    cycles, the first of which is at the first waypoint, and the last seldom at the last."""
-    away = distance_to_triangles(np.array(waypoints[1:], dtype=np.float64), triangles)
-    if away.min(initial=np.inf) < MIN_CLEARANCE:
-        number = int(np.argmin(away)) + 1
-        fault = Fault(f"{waypoints[number]} lies on a surface", f"keep {MIN_CLEARANCE * 1e3:g} mm away from surfaces")
-        fault.key = f"waypoints[{number}]"
-        raise fault
 
 
 def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body: Body) -> Trajectory:
@@ -83,8 +68,7 @@ def straight_motion(start: Any, velocity: Any, cycles: int, cycle_s: float, body
 
 
 def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
-    """Motion along a path with rounded corners at constant speed [m/s], heading along it; to its end, or for so many
-    cycles.
+    """Motion along a path with rounded corners at constant speed [m/s], heading along it, to its end, or for `cycles`.
 
     Raises
     ------
@@ -94,18 +78,6 @@ def travel(way: RoundedPath, speed: float, cycle_s: float, cycles: int | None, b
     time = _cycle_times(way.total / (speed * cycle_s), way.total, cycle_s, cycles)
     position, along = way.at(speed * time)
     return Trajectory(time, position, speed * along, along_heading(along), body)
-
-
-def stop_and_go(plan: StopAndGo, cycle_s: float, cycles: int | None, body: Body) -> Trajectory:
-    """Motion along waypoints with halts, heading along it and turning on the spot; to its end, or for so many cycles.
-
-    Raises
-    ------
-    Fault
-        The way is too short for the cycles, or takes too long.
-    """
-    time = _cycle_times(plan.duration / cycle_s, plan.total, cycle_s, cycles)
-    return Trajectory(time, *plan.at(time), body)
 
 
 def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
@@ -134,20 +106,24 @@ def at_cycles(recording: RecordedPoses, cycle_s: float) -> RecordedPoses:
     return RecordedPoses(recording.time[0] + np.arange(count) * cycle_s, position, heading)
 
 
-def _waypoint_motion(agent: AgentSection, body: Body) -> Trajectory:
-    """Motion of the agent along the waypoints of its section: at constant speed, unless halts or rest are asked for."""
-    assert agent.speed_m_s is not None
-    assert agent.cycle_s is not None
-    points = np.array(agent.waypoints, dtype=np.float64)
+def _waypoint_motion(agent: AgentSection, waypoints: list[list[float]], triangles: Floats, body: Body) -> Trajectory:
+    """Motion of the agent along waypoints, off all triangles (T, 3, 3) [m]: at constant speed, unless halts or rest are
+    asked for."""
+    points, speed, cycle_s = np.array(waypoints, dtype=np.float64), agent.speed_m_s or 0.0, agent.cycle_s or 0.0
+    # the scene check looks at the cycles, the first of which is at the first waypoint, and the last seldom at the last
+    away = distance_to_triangles(points[1:], triangles)
+    if away.min(initial=np.inf) < MIN_CLEARANCE:
+        number = int(np.argmin(away)) + 1
+        raise Fault(f"{waypoints[number]} lies on a surface", KEEP_AWAY, f"waypoints[{number}]")
     from_rest = agent.halt_s is not None if agent.from_rest is None else agent.from_rest
     if agent.halt_s is None and not from_rest:
-        way = round_corners(points, agent.speed_m_s**2 / agent.acceleration_m_s2)
-        motion = travel(way, agent.speed_m_s, agent.cycle_s, agent.cycles, body)
+        motion = travel(round_corners(points, speed**2 / agent.acceleration_m_s2), speed, cycle_s, agent.cycles, body)
     else:
         halts = np.zeros(len(points)) if agent.halt_s is None else np.array(agent.halt_s, dtype=np.float64)
         rate = None if agent.turn_deg_s is None else float(np.radians(agent.turn_deg_s))
-        plan = plan_stops(points, halts, agent.speed_m_s, agent.acceleration_m_s2, from_rest, rate)
-        motion = stop_and_go(plan, agent.cycle_s, agent.cycles, body)
+        plan = plan_stops(points, halts, speed, agent.acceleration_m_s2, from_rest, rate)
+        time = _cycle_times(plan.duration / cycle_s, plan.total, cycle_s, agent.cycles)
+        motion = Trajectory(time, *plan.at(time), body)
     if agent.heading_deg is None:
         return motion
     return replace(motion, heading=np.full(len(motion), np.radians(agent.heading_deg)))
@@ -156,20 +132,16 @@ def _waypoint_motion(agent: AgentSection, body: Body) -> Trajectory:
 def _walk(agent: AgentSection, triangles: Floats, body: Body) -> Trajectory:
     """Motion of the agent on a random walk that keeps away from triangles (T, 3, 3) [m]."""
     assert agent.random_walk is not None
-    assert agent.cycles is not None
-    assert agent.speed_m_s is not None
-    assert agent.cycle_s is not None
-    length = agent.speed_m_s * agent.cycle_s * (agent.cycles - 1)
-    radius = agent.speed_m_s**2 / agent.acceleration_m_s2
+    speed, cycle_s, cycles = agent.speed_m_s or 0.0, agent.cycle_s or 0.0, agent.cycles or 0
+    length, radius = speed * cycle_s * (cycles - 1), speed**2 / agent.acceleration_m_s2
     rng = np.random.default_rng(agent.random_walk.seed)
     start = np.array(agent.start, dtype=np.float64)
     way = draw_walk(start, length, radius, agent.random_walk.clearance_m, triangles, rng=rng)
-    return travel(way, agent.speed_m_s, agent.cycle_s, agent.cycles, body)
+    return travel(way, speed, cycle_s, cycles, body)
 
 
 def _cycle_times(steps: float, length: float, cycle_s: float, cycles: int | None) -> Floats:
-    """Times (K,) [s] of the cycles of the agent's motion along a way of that length [m], which takes so many steps of a
-    cycle."""
+    """Times (K,) [s] of the cycles of the agent's motion along a way of that length [m], and of so many steps."""
     most = int(steps + 1e-9) + 1
     if cycles is not None and cycles > most:
         what = f"{cycles} cycles wanted, the way of {length:.3g} m ends after {most}"
@@ -208,5 +180,4 @@ def _body(agent: AgentSection) -> Body:
     try:
         return Body(**{name: np.array(value) for name, value in offsets.items() if value is not None})
     except GeometryError as error:
-        what, _, mend = str(error).partition("; ")
-        raise Fault(what, mend) from None
+        raise Fault.of(error) from None

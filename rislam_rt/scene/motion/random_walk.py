@@ -44,10 +44,8 @@ def draw_walk(
         else:
             points, given_up = points[: max(1, len(points) - STEPS_BACK)], given_up + 1
             if given_up > GIVE_UP:
-                raise Fault(
-                    f"no way of {length:.3g} m found that stays {clearance:g} m from all surfaces",
-                    "lower agent.random_walk.clearance_m or agent.speed_m_s, or start where there is room",
-                )
+                mend = "lower agent.random_walk.clearance_m or agent.speed_m_s, or start where there is room"
+                raise Fault(f"no way of {length:.3g} m found that stays {clearance:g} m from all surfaces", mend)
         if len(points) > 2:
             way = round_corners(np.array(points), radius)
             # the last leg may be cut by the next corner: it does not count

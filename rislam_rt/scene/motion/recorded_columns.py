@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,17 +29,9 @@ NO_HEADING = ("rate", "vel", "speed", "acc", "dot", "std", "sigma", "var", "cov"
 """Parts of names of what is told about a heading and is none."""
 
 
-class PoseColumn(NamedTuple):
-    """Column of a recording: where one quantity of the poses stands."""
-
-    column: int
-    """From 0."""
-    unit: float
-    """In SI."""
-
-
-def find_columns(header: Sequence[str], named: Mapping[str, str]) -> dict[str, PoseColumn]:
-    """Find the column of each quantity of a recording by its line of names; `named` are those that the scene names.
+def find_columns(header: Sequence[str], named: Mapping[str, str]) -> dict[str, tuple[int, float]]:
+    """Find the column of each quantity of a recording by its line of names, from 0, and its unit in SI; `named` are
+    those that the scene names.
 
     Raises
     ------
@@ -77,18 +68,18 @@ def few_names(header: Sequence[str]) -> str:
     return ", ".join(f"'{name[:20]}'" for name in header[:12]) or "no columns"
 
 
-def _find(what: str, header: Sequence[str], named: Mapping[str, str]) -> PoseColumn | None:
-    """Column of a recording that holds one quantity; None for one that may be left out."""
-    if what in named:
-        if named[what] not in header:
-            raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {few_names(header)}")
-        return PoseColumn(header.index(named[what]), UNITS.get(what, {}).get(_words(named[what])[-1], 1.0))
+def _find(what: str, header: Sequence[str], named: Mapping[str, str]) -> tuple[int, float] | None:
+    """Column of a recording that holds one quantity, and its unit in SI; None for one that may be left out."""
+    if what in named and named[what] not in header:
+        raise Fault(f"no column '{named[what]}' for '{what}' in the trajectory", f"it has {few_names(header)}")
     places = [at for at, name in enumerate(header) if _quantity(what, name) in ALIASES.get(what, (what,))]
+    if what in named:
+        places = [header.index(named[what])]
     if len(places) > 1:
         both = " and ".join(f"'{header[at][:20]}'" for at in places[:2])
         raise Fault(f"columns {both} of the trajectory may both be '{what}'", f"{_named_in_scene(what)}, or drop one")
     if places:
-        return PoseColumn(places[0], UNITS.get(what, {}).get(_words(header[places[0]])[-1], 1.0))
+        return places[0], UNITS.get(what, {}).get(_words(header[places[0]])[-1], 1.0)
     if what in ("time", "x", "y", "z"):
         mend = f"{_named_in_scene(what, _likeliest(what, header))}; the file has {few_names(header)}"
         raise Fault(f"no column '{what}' in the trajectory", mend)

@@ -97,7 +97,7 @@ def parse_csv(content: bytes, named: Mapping[str, str]) -> RecordedPoses:
     time, position = _checked(table["time"], np.column_stack([table[axis] for axis in "xyz"]))
     if "heading" in table:
         heading = table["heading"]
-        if not has_unit("heading", header[place["heading"].column]):
+        if not has_unit("heading", header[place["heading"][0]]):
             _check_radians(heading, time, position)
         return RecordedPoses(time, position, wrap(heading) if np.abs(heading).max() > MAX_HEADING else heading)
     turned = all(part in table for part in QUATERNION)
@@ -117,9 +117,8 @@ def _csv_lines(content: bytes) -> list[list[str]]:
     try:
         lines = list(csv.reader(io.StringIO(content.decode("utf-8-sig", errors="replace"), newline=None)))
     except csv.Error as error:
-        raise Fault(
-            f"the trajectory is no CSV file ({error})", "give a line of column names, then one a pose"
-        ) from None
+        mend = "give a line of column names, then one a pose"
+        raise Fault(f"the trajectory is no CSV file ({error})", mend) from None
     if not lines or not any(lines[0]):
         raise Fault("the trajectory file does not begin with column names", "give 'time,x,y,z', then one line a pose")
     alone = lines[0][0].strip() if len(lines[0]) == 1 else "#"
@@ -183,10 +182,8 @@ def _numbers(words: Sequence[str], count: int, number: int, mend: str) -> list[f
 def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
     """Check that times and positions can be those of recorded poses, and return them as they are."""
     if np.abs(time).max() > MAX_TIME:
-        raise Fault(
-            f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory",
-            "give seconds, or end the name of a CSV column in its unit: time_ns",
-        )
+        mend = "give seconds, or end the name of a CSV column in its unit: time_ns"
+        raise Fault(f"a time of {time[np.argmax(np.abs(time))]:.3g} s in the trajectory", mend)
     step = np.diff(time)
     if (step <= 0.0).any():
         pose = int(np.argmax(step <= 0.0)) + 1
@@ -194,10 +191,8 @@ def _checked(time: Floats, position: Floats) -> tuple[Floats, Floats]:
     odd = (step < SMALLEST) | (step > MAX_STEP)
     if odd.any():
         pose = int(np.argmax(odd)) + 1
-        raise Fault(
-            f"{step[pose - 1]:.3g} s from the pose before to pose {pose}",
-            f"give steps of {SMALLEST:g} to {MAX_STEP:g} s: cut the file at a gap, thin it out where it is too dense",
-        )
+        mend = f"give steps of {SMALLEST:g} to {MAX_STEP:g} s: cut the file at a gap, thin it out where it is too dense"
+        raise Fault(f"{step[pose - 1]:.3g} s from the pose before to pose {pose}", mend)
     if np.abs(position).max() > 1e5:
         raise Fault(f"a coordinate of {np.abs(position).max():.3g} m in the trajectory", "give metres")
     return time, position

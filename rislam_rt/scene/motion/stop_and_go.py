@@ -10,8 +10,7 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import wrap
 from rislam_rt.scene.findings import Fault
-from rislam_rt.scene.motion.headings import along_heading, short_turn
-from rislam_rt.scene.motion.waypoints import RoundedPath, round_corners
+from rislam_rt.scene.motion.waypoints import RoundedPath, along_heading, round_corners, short_turn
 
 
 class Stretch(NamedTuple):
@@ -34,8 +33,7 @@ class Stretch(NamedTuple):
         return self.rise + steady / self.peak + self.fall
 
     def at(self, time: Floats) -> tuple[Floats, Floats]:
-        """Distances (K,) [m] along a stretch between two halts, and speeds (K,) [m/s], at times (K,) [s] from its
-        start."""
+        """Distances (K,) [m] along a stretch between two halts, speeds (K,) [m/s], at times (K,) [s] from its start."""
         left = self.duration - time
         grows, falls = time < self.rise, left < self.fall
         speed = self.acceleration * np.where(grows, time, left)
@@ -115,31 +113,21 @@ def plan_stops(
     last = len(waypoints) - 1
     stops = [0, *(int(row) for row in np.flatnonzero(halts[1:-1]) + 1), last]
     stretches = []
-    for start, end in pairwise(stops):
+    for start, end in pairwise(stops):  # each grows to that speed, or as far as its length lets it
         way = round_corners(waypoints[start : end + 1], speed**2 / acceleration, start)
         rests = [from_rest or halts[stop] > 0.0 or 0 < stop < last for stop in (start, end)]
-        stretches.append(_stretch(way, speed, acceleration, *rests))
+        peak = min(speed, float(np.sqrt(2.0 * acceleration * way.total / sum(rests)))) if any(rests) else speed
+        ramps = (peak / acceleration if rest else 0.0 for rest in rests)
+        stretches.append(Stretch(way, peak, acceleration, *ramps))
     turns = _turns([stretch.way for stretch in stretches])
     inner = halts[stops[1:-1]]
     times = inner if turn_rate is None else np.abs(turns) / turn_rate
     if (times > (1.0 + 1e-9) * inner).any():
         late = int(np.argmax(times / inner))
-        fault = Fault(
-            f"{inner[late]:g} s, and the turn of {np.degrees(abs(turns[late])):.3g} degrees there takes "
-            f"{times[late]:.3g} s",
-            "halt longer, or raise agent.turn_deg_s",
-        )
-        fault.key = f"halt_s[{stops[late + 1]}]"
-        raise fault
+        turn = f"the turn of {np.degrees(abs(turns[late])):.3g} degrees there takes {times[late]:.3g} s"
+        mend = "halt longer, or raise agent.turn_deg_s"
+        raise Fault(f"{inner[late]:g} s, and {turn}", mend, f"halt_s[{stops[late + 1]}]")
     return StopAndGo(stretches, halts[stops], turns, times)
-
-
-def _stretch(way: RoundedPath, speed: float, acceleration: float, from_rest: bool, to_rest: bool) -> Stretch:
-    """Stretch of a stop-and-go motion that grows to that speed [m/s], or as far as its length lets it."""
-    ramps = int(from_rest) + int(to_rest)
-    peak = min(speed, float(np.sqrt(2.0 * acceleration * way.total / ramps))) if ramps else speed
-    ramp = peak / acceleration
-    return Stretch(way, peak, acceleration, ramp if from_rest else 0.0, ramp if to_rest else 0.0)
 
 
 def _turns(ways: Sequence[RoundedPath]) -> Floats:

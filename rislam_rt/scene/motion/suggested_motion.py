@@ -72,8 +72,7 @@ def _places(triangles: Floats, box: Floats) -> tuple[Floats, Booleans]:
 
 
 def _levels(plan: Floats, triangles: Floats) -> Floats:
-    """Heights [m] for a suggested motion, ascending, at which a vertical line through a plan's point (2,) meets a
-    room's triangles."""
+    """Heights [m] for a suggested motion, ascending, at which a vertical line through a point (2,) meets triangles."""
     corners = triangles[:, :, :2] - plan
     after = np.roll(corners, -1, axis=1)
     turn = corners[..., 0] * after[..., 1] - corners[..., 1] * after[..., 0]

@@ -1,16 +1,19 @@
-"""Path of the agent along waypoints: straight legs, and corners rounded so that an acceleration is kept."""
+"""Path of the agent along waypoints: straight legs, corners rounded so that an acceleration is kept, and headings."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, cross
+from rislam_rt.geometry.angles import wrap
 from rislam_rt.scene.findings import Fault
 
 SHARPEST = np.radians(170.0)
 """Largest turn [rad] at a waypoint: the arc of one that turns back would never end."""
 STRAIGHT = 1e-9
 """Turn [rad] at a waypoint below which it needs no arc."""
+HALF_TURN = 1e-9
+"""Angle [rad] to half a turn below which rounding alone would say whether it goes left or right: it goes left."""
 
 
 class RoundedPath(NamedTuple):
@@ -64,10 +67,11 @@ def round_corners(waypoints: Floats, radius: float, first: int = 0) -> RoundedPa
     turn = np.arctan2(np.linalg.norm(cross(before, after), axis=1), np.einsum("ij,ij->i", before, after))
     if (turn > SHARPEST).any():
         corner = first + int(np.argmax(turn)) + 1
-        raise Fault(
-            f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner} (the first is 0)",
-            f"give a way round (up to {np.degrees(SHARPEST):.0f} degrees at a waypoint), or a halt there: agent.halt_s",
+        mend = (
+            f"give a way round (up to {np.degrees(SHARPEST):.0f} degrees at a waypoint), or a halt there: agent.halt_s"
         )
+        what = f"the way turns back by {np.degrees(turn.max()):.0f} degrees at waypoint {corner} (the first is 0)"
+        raise Fault(what, mend)
     cut = np.concatenate([[0.0], np.where(turn > STRAIGHT, radius * np.tan(turn / 2.0), 0.0), [0.0]])
     left = length - cut[:-1] - cut[1:]
     if (left < 0.0).any():
@@ -103,3 +107,23 @@ def _pieces(waypoints: Floats, along: Floats, turn: Floats, cut: Floats, left: F
     length = np.zeros(count)
     length[::2], length[1::2] = left, np.where(bent, radius * turn, 0.0)
     return RoundedPath(start, way, inward, np.where(inward.any(axis=1), radius, 1.0), length)
+
+
+def along_heading(course: Floats) -> Floats:
+    """Headings (K,) [rad] of a motion along velocities or tangents (K, 3); of a vertical one or a standstill, its
+    neighbour's."""
+    length = np.linalg.norm(course, axis=1)
+    # beside a millionth of the highest speed there is only rounding, which points anywhere
+    least = np.maximum(1e-9 * length, max(1e-6 * length.max(initial=0.0), 1e-300))
+    level = np.hypot(course[:, 0], course[:, 1]) > least
+    if not level.any():
+        return np.zeros(len(course))
+    last = np.maximum.accumulate(np.where(level, np.arange(len(course)), -1))
+    row = np.where(last >= 0, last, int(np.argmax(level)))
+    return np.asarray(np.arctan2(course[row, 1], course[row, 0]))
+
+
+def short_turn(before: Floats, after: Floats) -> Floats:
+    """Turns (N,) [rad] on the spot from headings (N,) to others (N,) [rad], the short way; half a turn to the left."""
+    turn = wrap(after - before)
+    return np.where(np.abs(turn) > np.pi - HALF_TURN, np.pi, turn)

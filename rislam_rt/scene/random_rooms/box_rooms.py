@@ -40,10 +40,7 @@ def random_room(name: str, *, rng: np.random.Generator) -> Scene:
         high = np.minimum(low + rng.uniform(0.4, 1.5, size=2), 0.88 * size[:2])
         meshes["block"] = block([*low, 0.03 * size[2]], [*high, rng.uniform(0.3, 0.6) * size[2]])
     materials = _materials(len(meshes), rng)
-    reflectors = tuple(
-        Reflector(key, mesh.vertices, mesh.faces, material)
-        for (key, mesh), material in zip(meshes.items(), materials, strict=True)
-    )
+    reflectors = tuple(Reflector(key, *meshes[key], material) for key, material in zip(meshes, materials, strict=True))
     spheres = tuple(_sphere(f"sphere_{k}", size, rng) for k in range(rng.integers(1, MAX_SCATTERERS + 1)))
     panel = _panel(corners, size, rng) if rng.uniform() < PANEL else None
     start = np.array([0.18, 0.18, 0.35]) * size
@@ -79,10 +76,8 @@ def _sphere(name: str, size: Floats, rng: np.random.Generator) -> Scatterer:
     """Draw a spherical scatterer in a random box room."""
     radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
     center = rng.uniform([MARGIN, MARGIN, 0.15 * size[2]], [*(size[:2] - MARGIN), 0.8 * size[2]])
-    shade = None
-    if radius > 0.1 and rng.uniform() < SHADING:
-        mesh = sphere_mesh(center, radius)
-        shade = Occluder(mesh.vertices, mesh.faces)
+    hides = radius > 0.1 and rng.uniform() < SHADING
+    shade = Occluder(*sphere_mesh(center, radius)) if hides else None
     return Scatterer(name, center, float(np.pi * radius**2), radius, shade=shade)
 
 

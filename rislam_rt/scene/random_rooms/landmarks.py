@@ -6,7 +6,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.angles import unit
 from rislam_rt.model import RisPanel, RisSpec
 from rislam_rt.model.ris import ElementPattern
-from rislam_rt.scene.check.mesh_queries import crossings
+from rislam_rt.scene.check.mesh_queries import is_blocked
 from rislam_rt.scene.random_rooms.furniture import FurniturePiece, PlacementLimits, draw_piece, fits
 from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import ceiling_normal, wall_normal
@@ -68,11 +68,10 @@ def draw_scatterer(
 def hidden_share(point: Floats, way: Floats, pieces: list[FurniturePiece]) -> float:
     """Share of the agent's path (K, 3) from which furniture hides a random landmark (3,), at every tenth position."""
     seen_from = way[::10]
-    triangles = [mesh.triangles for mesh in (piece.mesh() for piece in pieces)]
+    triangles = [piece.mesh().triangles for piece in pieces]
     if not triangles:
         return 0.0
-    cycles, _ = crossings(seen_from, np.broadcast_to(point, seen_from.shape), np.concatenate(triangles))
-    return len(np.unique(cycles)) / len(seen_from)
+    return float(np.mean(is_blocked(seen_from, point, np.concatenate(triangles))))
 
 
 def draw_panel(
@@ -86,17 +85,12 @@ def draw_panel(
         host, center, normal, up = found
         apart = np.linalg.norm(landmarks - center, axis=1).min(initial=np.inf) >= APART
         if apart and not any(piece.holds(center, OFF_SURFACES) for piece in pieces):
-            return RisPanel(_data_sheet(normal, up, rng), center, host)
+            rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
+            cols = rows if rng.uniform() < SQUARE else cols
+            levels, element = int(rng.choice(LEVELS)), PATTERNS[rng.choice(len(PATTERNS))]
+            spec = RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
+            return RisPanel(spec, center, host)
     return None
-
-
-def _data_sheet(normal: Floats, up: Floats, rng: np.random.Generator) -> RisSpec:
-    """Draw the data sheet of a random RIS panel with this normal and up: size, levels, and element pattern."""
-    rows, cols = rng.integers(ELEMENTS[0], ELEMENTS[1] + 1, size=2)
-    if rng.uniform() < SQUARE:
-        cols = rows
-    levels, element = int(rng.choice(LEVELS)), PATTERNS[rng.choice(len(PATTERNS))]
-    return RisSpec(int(rows), int(cols), np.array([SPACING, SPACING]), normal, up, levels, element)
 
 
 def _on_wall(ground: PlacementLimits, rng: np.random.Generator) -> tuple[str, Floats, Floats, Floats] | None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.errors import SceneError
-from rislam_rt.geometry.angles import wrap
+from rislam_rt.geometry.angles import rotation_z, wrap
 from rislam_rt.model import Body, Trajectory
 from rislam_rt.scene.random_rooms.random_floor_plan import depth_inside
 from rislam_rt.scene.random_rooms.shell import Roof
@@ -15,6 +15,8 @@ MOTIONS = ("straight", "curve", "corner", "stop", "turn", "climb")
 """Kinds of random motion."""
 CYCLES, CYCLE = 300, 0.1
 """Number of cycles of a random motion, and time [s] between them: half a minute."""
+TIME = CYCLE * np.arange(CYCLES, dtype=np.float64)
+"""Times (K,) [s] of a random motion's cycles."""
 SPEED, SLOWEST = (0.05, 0.6), 0.01
 """Range of random speeds [m/s], log-uniform; in too small a room a draw is slowed down, to `SLOWEST` at least."""
 OFF_WALLS, BELOW_CEILING = 0.45, 0.6
@@ -58,19 +60,18 @@ class MotionProfile(NamedTuple):
 
 def draw_motion_profile(kind: str, ways: Ways = "anyhow", *, rng: np.random.Generator) -> MotionProfile:
     """Draw the profile of a random motion of one of `MOTIONS` and of one of `Ways`, without the rest at its start."""
-    time = _times()
     still, steady = np.zeros(CYCLES), np.ones(CYCLES)
     if kind == "straight":
         return MotionProfile(steady, still, still)
     if kind == "corner":
         angles = CORNER if ways == "anyhow" else (np.pi / 2.0, np.pi / 2.0)
-        return MotionProfile(steady, _corners(time, angles, rng), still)
+        return MotionProfile(steady, _corners(angles, rng), still)
     if kind in ("stop", "turn"):
-        pace, stops = _stop_and_go(time, rng)
-        turn = 0.5 * _wander(time, rng)
-        return MotionProfile(pace, _spins(time, stops, rng) if kind == "turn" else turn * pace, still)
-    wander = _wander(time, rng)
-    return MotionProfile(steady, wander, _climb(time, rng) if kind == "climb" else still)
+        pace, stops = _stop_and_go(rng)
+        turn = 0.5 * _wander(rng)
+        return MotionProfile(pace, _spins(stops, rng) if kind == "turn" else turn * pace, still)
+    wander = _wander(rng)
+    return MotionProfile(steady, wander, _climb(rng) if kind == "climb" else still)
 
 
 def draw_motion(
@@ -97,9 +98,7 @@ def draw_motion(
         shape = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
         start = rng.uniform(low, high, size=(_STARTS, 2))
         yaw = rng.uniform(-np.pi, np.pi, size=_STARTS) if anyhow else _along_walls(outline, rng)
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-        place = start[:, None] + speed * np.einsum("sij,kj->ski", turn, shape)
+        place = start[:, None] + speed * np.einsum("sij,kj->ski", rotation_z(yaw)[:, :2, :2], shape)
         coarse = depth_inside(outline, place[:, ::10]).min(axis=1)
         for number in np.flatnonzero(coarse >= OFF_WALLS):
             height = _start_height(roof, place[number], rise, rng)
@@ -111,7 +110,7 @@ def draw_motion(
                 if ways == "carried":
                     step, by = _carried(speed * pace, ahead, rng)
                     position, velocity = position + step, velocity + by
-                return Trajectory(_times(), position, velocity, angle, Body())
+                return Trajectory(TIME, position, velocity, angle, Body())
         speed, end = (_SLOWER * speed, end) if anyhow else (speed, _SLOWER * end)
     raise SceneError("no room for a motion; draw another plan")
 
@@ -120,7 +119,7 @@ def _carried(pace: Floats, ahead: Floats, rng: np.random.Generator) -> tuple[Flo
     """Draw what a walker's gait adds to positions (K, 3) [m] and velocities (K, 3) [m/s] of a random motion, at speeds
     (K,) [m/s] towards unit vectors (K, 2): sines in proportion to the speed up to `STROLL`."""
     rate, bob, sway = rng.uniform(*STEP_RATE), rng.uniform(*BOB), rng.uniform(*SWAY)
-    phase = np.pi * rate * _times() + rng.uniform(0.0, 2.0 * np.pi)
+    phase = np.pi * rate * TIME + rng.uniform(0.0, 2.0 * np.pi)
     twice = 2.0 * phase + rng.uniform(0.0, 2.0 * np.pi)
     share, left = np.minimum(pace / STROLL, 1.0)[:, None], np.column_stack([-ahead[:, 1], ahead[:, 0]])
     step = share * np.column_stack([sway * np.sin(phase)[:, None] * left, bob * np.sin(twice)])
@@ -133,11 +132,10 @@ def _from_rest(course: MotionProfile, speed: float, push: float, rest: float, en
 
     It sets off and brakes with `push` [m/s^2]; all else in the profile comes later by the time that setting off takes.
     """
-    time = _times()
-    later = np.count_nonzero(push * (time - rest) < speed)
+    later = np.count_nonzero(push * (TIME - rest) < speed)
     before = (np.ones(later), np.zeros(later), np.zeros(later))
     pace, turn, climb = (np.concatenate(parts)[:CYCLES] for parts in zip(before, course, strict=True))
-    ramp = push / speed * np.maximum(np.minimum(time - rest, end - time), 0.0)
+    ramp = push / speed * np.maximum(np.minimum(TIME - rest, end - TIME), 0.0)
     return MotionProfile(np.minimum(pace, ramp), turn, climb)
 
 
@@ -147,11 +145,6 @@ def _along_walls(outline: Floats, rng: np.random.Generator) -> Floats:
     return np.asarray(np.arctan2(edge[:, 1], edge[:, 0]) + 0.5 * np.pi * rng.integers(0, 4, size=_STARTS))
 
 
-def _times() -> Floats:
-    """Times (K,) [s] of a random motion's cycles."""
-    return CYCLE * np.arange(CYCLES, dtype=np.float64)
-
-
 def _start_height(roof: Roof, place: Floats, rise: Floats, rng: np.random.Generator) -> float | None:
     """Draw a random motion's height [m] at the start, so that all of it fits the room; None if it cannot."""
     room = roof.height(place) - BELOW_CEILING - rise
@@ -159,49 +152,47 @@ def _start_height(roof: Roof, place: Floats, rise: Floats, rng: np.random.Genera
     return None if high < low else float(rng.uniform(low, high))
 
 
-def _wander(time: Floats, rng: np.random.Generator) -> Floats:
+def _wander(rng: np.random.Generator) -> Floats:
     """Draw the smooth rate of turn (K,) [rad/s] of a random motion: three sines of 6 to 20 s and a mean."""
     period, phase = rng.uniform(6.0, 20.0, size=3), rng.uniform(0.0, 2.0 * np.pi, size=3)
     weight = rng.standard_normal(4) * WANDER * np.array([0.6, 0.6, 0.6, 0.5])
-    waves = np.sin(2.0 * np.pi * time[:, None] / period + phase)
+    waves = np.sin(2.0 * np.pi * TIME[:, None] / period + phase)
     return np.asarray(waves @ weight[:3] + weight[3])
 
 
-def _corners(time: Floats, angles: tuple[float, float], rng: np.random.Generator) -> Floats:
-    """Draw the rate of turn (K,) [rad/s] of a random motion with corners at random times, 4 to 10 s apart, of angles
-    in a range [rad]."""
-    rate, at = np.zeros(len(time)), rng.uniform(2.0, 6.0)
-    while at < time[-1]:
+def _corners(angles: tuple[float, float], rng: np.random.Generator) -> Floats:
+    """Draw the rate of turn (K,) [rad/s] of a random motion with corners 4 to 10 s apart, by angles in a range."""
+    rate, at = np.zeros(CYCLES), rng.uniform(2.0, 6.0)
+    while at < TIME[-1]:
         turn = rng.uniform(*angles) * rng.choice([-1.0, 1.0])
-        rate[(time >= at) & (time < at + CORNER_TIME - 1e-9)] = turn / CORNER_TIME
+        rate[slice(*np.searchsorted(TIME, (at, at + CORNER_TIME - 1e-9)))] = turn / CORNER_TIME
         at += rng.uniform(4.0, 10.0)
     return rate
 
 
-def _stop_and_go(time: Floats, rng: np.random.Generator) -> tuple[Floats, list[tuple[float, float]]]:
+def _stop_and_go(rng: np.random.Generator) -> tuple[Floats, list[tuple[float, float]]]:
     """Draw the stops of a random motion: its shares of the speed (K,), and from when to when [s] the agent stands."""
-    pace, stops, at = np.ones(len(time)), [], rng.uniform(*WALKING)
-    while at < time[-1]:
+    pace, stops, at = np.ones(CYCLES), [], rng.uniform(*WALKING)
+    while at < TIME[-1]:
         end = at + rng.uniform(*STANDING)
-        ramp = np.maximum(np.maximum(at - time, time - end) / BRAKING, 0.0)
-        pace = np.minimum(pace, ramp)
+        pace = np.minimum(pace, np.maximum(np.maximum(at - TIME, TIME - end) / BRAKING, 0.0))
         stops.append((at, end))
         at = end + BRAKING + rng.uniform(*WALKING)
     return np.clip(pace, 0.0, 1.0), stops
 
 
-def _spins(time: Floats, stops: list[tuple[float, float]], rng: np.random.Generator) -> Floats:
+def _spins(stops: list[tuple[float, float]], rng: np.random.Generator) -> Floats:
     """Draw the rate of turn (K,) [rad/s] of a random motion that turns at a constant rate in every stop."""
-    rate = np.zeros(len(time))
+    rate = np.zeros(CYCLES)
     for begin, end in stops:
         angle = rng.uniform(*SPIN) * rng.choice([-1.0, 1.0])
-        rate[(time >= begin) & (time < end)] = angle / (end - begin)
+        rate[slice(*np.searchsorted(TIME, (begin, end)))] = angle / (end - begin)
     return rate
 
 
-def _climb(time: Floats, rng: np.random.Generator) -> Floats:
+def _climb(rng: np.random.Generator) -> Floats:
     """Draw the rate of climb (K,) [m/s] of a random motion: one rise or fall over 4 to 10 s, a raised cosine."""
     begin, length = rng.uniform(2.0, 8.0), rng.uniform(4.0, 10.0)
-    share = np.clip((time - begin) / length, 0.0, 1.0)
+    share = np.clip((TIME - begin) / length, 0.0, 1.0)
     height = rng.uniform(*CLIMB) * rng.choice([-1.0, 1.0])
     return np.asarray(height / length * (1.0 - np.cos(2.0 * np.pi * share)))

@@ -131,14 +131,9 @@ def _landmarks(
         if found is not None:
             positions = np.concatenate([positions, found[0][None]])
             pieces += found[1]
-    scatterers = [_sphere(number, point, rng) for number, point in enumerate(positions)]
-    return scatterers, ris
-
-
-def _sphere(number: int, position: Floats, rng: np.random.Generator) -> Scatterer:
-    """Make a random room's spherical scatterer of random radius at a position (3,) [m]."""
-    radius = float(np.exp(rng.uniform(*np.log(RADIUS))))
-    return Scatterer(f"sphere_{number}", position, float(np.pi * radius**2), radius)
+    radii = (float(np.exp(rng.uniform(*np.log(RADIUS)))) for _ in positions)
+    spheres = enumerate(zip(positions, radii, strict=True))
+    return [Scatterer(f"sphere_{k}", point, float(np.pi * r**2), r) for k, (point, r) in spheres], ris
 
 
 def _reflectors(
@@ -151,7 +146,7 @@ def _reflectors(
     meshes = [*shell.items(), *((f"{piece.kind}_{number}", piece.mesh()) for number, piece in enumerate(pieces))]
     reflection = [*walls, *rng.uniform(*FURNITURE_REFLECTION, size=len(pieces))]
     return tuple(
-        Reflector(name, mesh.vertices, mesh.faces, Material(reflection=float(share)))
+        Reflector(name, *mesh, Material(reflection=float(share)))
         for (name, mesh), share in zip(meshes, reflection, strict=True)
     )
 

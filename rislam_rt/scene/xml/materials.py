@@ -1,6 +1,6 @@
 """Radio materials of a Sionna scene file (XML): read as ours, and ours written as them."""
 
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from rislam_rt.errors import SceneError
@@ -18,18 +18,11 @@ LEFT_OUT = ("xpd_coefficient", "alpha_r", "alpha_i", "lambda_")
 """Properties of a Sionna material that are not carried over: all of diffuse scattering alone."""
 
 
-class XmlMaterial(NamedTuple):
-    """Radio material as read from a Sionna scene file, and what could not be carried over."""
-
-    material: Material | None
-    """The material; None where nothing is reflected: an absorber."""
-    notes: tuple[str, ...]
-    """What could not be carried over."""
-
-
-def read_material(bsdf: Element) -> XmlMaterial:
+def read_material(bsdf: Element) -> tuple[Material | None, list[str]]:
     """Read the radio material of a `<bsdf>` element of a Sionna scene file: `itu-radio-material` and `radio-material`,
-    or any whose name says `itu_...`, as Sionna itself takes them.
+    or any whose name says `itu_...`, as Sionna itself takes them; also what could not be carried over.
+
+    None stands for what reflects nothing: an absorber, or air.
 
     Raises
     ------
@@ -39,31 +32,28 @@ def read_material(bsdf: Element) -> XmlMaterial:
     name = bsdf.get("id") or bsdf.get("name") or ""
     plain, kind = name.removeprefix("mat-"), bsdf.get("type", "")
     values = {e.get("name", ""): e for e in children(bsdf, "float", "integer", "string")}
-    notes = tuple(f"bsdf '{one_line(name)[:40]}': {key} is not carried over" for key in LEFT_OUT if key in values)
+    notes = [f"bsdf '{one_line(name)[:40]}': {key} is not carried over" for key in LEFT_OUT if key in values]
     own: dict[str, float] = {}
     if kind == "radio-material":
         own["permittivity"] = _number(values, "relative_permittivity", 1.0)
         own["conductivity"] = _number(values, "conductivity", 0.0)
     if kind == ABSORBER or own == {"permittivity": 1.0, "conductivity": 0.0}:  # nothing, or air
-        return XmlMaterial(None, ())
+        return None, []
     rough = _number(values, "scattering_coefficient", 0.0)
     thickness = _number(values, "thickness", DEFAULT_THICKNESS)
     if kind == "itu-radio-material" or plain.startswith(("itu_", "itu-")):
         given = values["type"].get("value", "") if "type" in values else plain[4:]
         if given not in ITU_MATERIALS:
             raise Fault(f"an ITU material '{one_line(given)[:40]}'", f"take one of {', '.join(ITU_MATERIALS)}")
-        return XmlMaterial(_made(itu=given, thickness=thickness, scattering=rough), notes)
+        return _made(itu=given, thickness=thickness, scattering=rough), notes
     if kind == "radio-material":
-        return XmlMaterial(_made(**own, thickness=thickness, scattering=rough), notes)
-    raise Fault(
-        f"a material of type '{one_line(kind)[:40]}' says nothing of radio",
-        "call it itu_concrete (or itu_ and another name of ITU-R P.2040), or make it an itu-radio-material",
-    )
+        return _made(**own, thickness=thickness, scattering=rough), notes
+    mend = "call it itu_concrete (or itu_ and another name of ITU-R P.2040), or make it an itu-radio-material"
+    raise Fault(f"a material of type '{one_line(kind)[:40]}' says nothing of radio", mend)
 
 
 def material_element(material: Material | None, name: str) -> Element:
-    """Material in a Sionna scene file (XML), a `<bsdf>` element: its own ITU slab, a slab of given permittivity, or air
-    for None.
+    """Material in a Sionna scene file (XML), a `<bsdf>`: its own ITU slab, a slab of given permittivity, air for None.
 
     A constant R has no counterpart that Sionna's `load_scene` knows; what comes nearest is `Material.as_body`. What
     only hides is a slab of air, which Sionna's rays do not pass unless refraction is on: in Sionna RT 2.2.0 no
@@ -73,12 +63,12 @@ def material_element(material: Material | None, name: str) -> Element:
         return Element("bsdf", {"type": "radio-material", "id": name})
     material = material.as_body()
     bsdf = Element("bsdf", {"type": "itu-radio-material" if material.itu else "radio-material", "id": name})
-    values: dict[str, float] = {}
+    values = {"thickness": material.thickness}
     if material.itu:
         SubElement(bsdf, "string", {"name": "type", "value": material.itu})
     else:
-        values |= {"relative_permittivity": material.permittivity or 1.0, "conductivity": material.conductivity}
-    values["thickness"] = material.thickness
+        slab = {"relative_permittivity": material.permittivity or 1.0, "conductivity": material.conductivity}
+        values = slab | values
     if material.scattering > 0.0:
         values["scattering_coefficient"] = material.scattering
     for key, value in values.items():
@@ -96,8 +86,7 @@ def _made(**values: Any) -> Material:
     try:
         return Material(**values)
     except SceneError as error:
-        what, _, mend = str(error).partition("; ")
-        raise Fault(what, mend) from None
+        raise Fault.of(error) from None
 
 
 def material_word(material: Material | None) -> str:

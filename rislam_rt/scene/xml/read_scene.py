@@ -15,7 +15,7 @@ from rislam_rt.model import Material
 from rislam_rt.scene.check.triangle_array import without_area
 from rislam_rt.scene.findings import Fault, one_line
 from rislam_rt.scene.meshes import MAX_FACES, Mesh
-from rislam_rt.scene.xml.materials import XmlMaterial, read_material
+from rislam_rt.scene.xml.materials import read_material
 from rislam_rt.scene.xml.shapes import clip_mesh, shape_mesh
 from rislam_rt.scene.xml.untrusted_xml import MAX_XML_BYTES, children, parse_xml
 
@@ -79,8 +79,7 @@ def sionna_scenes() -> dict[str, Path]:
 
 
 def read_xml(path: Path, max_faces: int = MAX_FACES, window: Floats | None = None) -> XmlScene:
-    """Read the shapes of a Mitsuba or Sionna scene file, with radio materials; where a window is given, what lies in
-    it.
+    """Read the shapes of a Mitsuba or Sionna scene file, with radio materials; of a window, what lies in it.
 
     Parameters
     ----------
@@ -125,27 +124,27 @@ class _XmlMaterials:
     def __init__(self, root: Element) -> None:
         self._elements = {bsdf.get("id", ""): bsdf for bsdf in children(root, "bsdf")}
         self._alias = {e.get("as", ""): e.get("id", "") for e in children(root, "alias")}
-        self._read: dict[str, XmlMaterial] = {}
+        self._read: dict[str, Material | None] = {}
         self.notes: list[str] = []
 
     def of(self, shape: Element) -> Material | None:
-        """Material, as an XML scene is read, of one of its shapes: its own, or the one it refers to; None where nothing
-        reflects."""
+        """Material of a shape of an XML scene: its own, or the one that it refers to; None where nothing reflects."""
         for own in children(shape, "bsdf"):
-            return self._noted(read_material(own)).material
+            return self._noted(own)
         for reference in children(shape, "ref"):
             name = reference.get("id", "")
             name = self._alias.get(name, name)
-            if name in self._elements and name not in self._read:
-                self._read[name] = self._noted(read_material(self._elements[name]))
-            if name in self._read:
-                return self._read[name].material
-            raise Fault(f"it refers to '{one_line(name)[:40]}', which the file does not define", "add that <bsdf>")
+            if name not in self._elements:
+                raise Fault(f"it refers to '{one_line(name)[:40]}', which the file does not define", "add that <bsdf>")
+            if name not in self._read:
+                self._read[name] = self._noted(self._elements[name])
+            return self._read[name]
         raise Fault("it has no material", "add <ref id=...> to a <bsdf>, e.g. of type itu-radio-material")
 
-    def _noted(self, material: XmlMaterial) -> XmlMaterial:
-        """Keep the notes on a material of an XML scene file, and pass it on."""
-        self.notes += material.notes
+    def _noted(self, bsdf: Element) -> Material | None:
+        """Read a material of an XML scene file, and keep the notes on it."""
+        material, notes = read_material(bsdf)
+        self.notes += notes
         return material
 
 

@@ -19,8 +19,7 @@ from rislam_rt.scene.motion.agent_motion import straight_motion
 from rislam_rt.scene.motion.suggested_motion import suggest_agent
 from rislam_rt.scene.scene_folder import SCENE_FILE
 from rislam_rt.scene.schema import RisSection
-from rislam_rt.scene.templates import room_name
-from rislam_rt.scene.write import write_scene
+from rislam_rt.scene.write import room_name, write_scene
 from rislam_rt.scene.xml.materials import material_element, read_material
 from rislam_rt.scene.xml.read_scene import find_xml, read_xml
 from rislam_rt.scene.xml.write import SHADE_OF
@@ -73,21 +72,22 @@ def scene_of_xml(
     beside = path.with_name(SCENE_FILE)
     whole = load_scene(beside) if beside.is_file() else None
     exact = {r.name: r.material for r in whole.reflectors} if whole else {}
-    reflectors = tuple(
-        Reflector(p.name, p.mesh.vertices, p.mesh.faces, _exact(p.material, exact.get(p.name)))
-        for p in found.parts
-        if p.material is not None
-    )
+    solid = [(part, part.material) for part in found.parts if part.material is not None]
+    reflectors = tuple(Reflector(p.name, *p.mesh, _exact(material, exact.get(p.name))) for p, material in solid)
     if not reflectors:
         raise SceneError(f"{path}: nothing in it reflects; give a scene with radio materials")
     own = {SHADE_OF + s.name for s in whole.scatterers} if whole else set()
-    occluders = tuple(
-        Occluder(p.mesh.vertices, p.mesh.faces, p.name) for p in found.parts if p.material is None and p.name not in own
-    )
+    hiding = [part for part in found.parts if part.material is None and part.name not in own]
+    occluders = tuple(Occluder(*part.mesh, part.name) for part in hiding)
     if whole is not None:
         notes.append(f"agent, panel and {len(whole.scatterers)} scatterers are those of the {SCENE_FILE} beside it")
         return replace(whole, name=name, reflectors=reflectors, occluders=occluders, digest=""), notes
-    agent = _motion(path, reflectors, occluders)
+    try:
+        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in occluders]))
+    except Fault as fault:
+        raise SceneError(fault.at(str(path), "").line) from None
+    body = Body(np.array(table["tx_offset_m"]), np.array(table["rx_offset_m"]))
+    agent = straight_motion(table["start"], table["velocity"], table["cycles"], table["cycle_s"], body)
     panel, about = _panel(reflectors, occluders, agent, carrier_ghz)
     way = float(np.linalg.norm(agent.position[-1] - agent.position[0]))
     notes.append(f"proposed way: {way:.2g} m in {agent.time[-1]:.0f} s, to be edited in [agent]; {about}")
@@ -106,7 +106,7 @@ def _window(within: Sequence[float]) -> Floats | None:
 
 def _exact(read: Material, exact: Material | None) -> Material:
     """An XML scene's material as the scene file beside it has it, if it was written so; else as read."""
-    if exact is not None and read_material(material_element(exact, "written")).material == read:
+    if exact is not None and read_material(material_element(exact, "written"))[0] == read:
         return exact
     return read
 
@@ -120,13 +120,3 @@ def _panel(
     way = agent.position[[0, -1]]
     table, about = propose_panel(draft, FreeSpace(way, way, 0.0, 0.0), carrier_ghz)
     return (build_panel(RisSection(**table)) if table else None), about
-
-
-def _motion(path: Path, reflectors: Sequence[Reflector], occluders: Sequence[Occluder]) -> Trajectory:
-    """Suggested trajectory of an agent through the reflectors and occluders of an XML scene."""
-    try:
-        table = suggest_agent(np.concatenate([r.triangles for r in reflectors] + [s.triangles for s in occluders]))
-    except Fault as fault:
-        raise SceneError(fault.at(str(path), "").line) from None
-    body = Body(np.array(table["tx_offset_m"]), np.array(table["rx_offset_m"]))
-    return straight_motion(table["start"], table["velocity"], table["cycles"], table["cycle_s"], body)

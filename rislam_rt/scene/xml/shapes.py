@@ -26,8 +26,7 @@ _CUBE_FACES = np.array(
 
 
 def shape_mesh(shape: Element, folder: Path, max_faces: int) -> Mesh:
-    """Mesh of a `<shape>` element of an XML scene file, its `to_world` applied; mesh files lie inside the scene's
-    folder.
+    """Mesh of a `<shape>` element of an XML scene file, its `to_world` applied; mesh files lie in the scene's folder.
 
     Raises
     ------

@@ -29,10 +29,12 @@ def parse_xml(content: bytes) -> Element:
         raise Fault(f"{len(content)} bytes are too many for a scene", f"keep it below {MAX_XML_BYTES}")
     root = _tree(content)
     defaults = {e.get("name", ""): e.get("value", "") for e in root.findall("default")[:MAX_DEFAULTS]}
-    for element in root.iter() if defaults else ():
+    names = sorted(filter(None, defaults), key=len, reverse=True)  # so that `$name` is not taken for `$na`
+    for element in root.iter() if names else ():
         for key, value in element.attrib.items():
-            if "$" in value:
-                element.attrib[key] = _filled(value, defaults)
+            name = next((name for name in names if f"${name}" in value), None) if "$" in value else None
+            if name is not None:  # replaced once
+                element.attrib[key] = value.replace(f"${name}", defaults[name])
     return root
 
 
@@ -71,11 +73,3 @@ def _tree(content: bytes) -> Element:
         raise Fault(f"not XML: {one_line(str(error))[:80]}", "give a Mitsuba or Sionna scene file") from None
     except (ValueError, LookupError) as error:  # an encoding that nobody knows
         raise Fault(f"not readable XML ({one_line(str(error))[:60]})", "save it in UTF-8") from None
-
-
-def _filled(value: str, defaults: dict[str, str]) -> str:
-    """Value of an XML attribute with `$name` replaced once, longest names first."""
-    for name in sorted(defaults, key=len, reverse=True):
-        if name and f"${name}" in value:
-            return value.replace(f"${name}", defaults[name])
-    return value

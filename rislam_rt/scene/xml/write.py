@@ -5,7 +5,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from rislam_rt.model import Material, Scene
 from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.scene_folder import mesh_file
+from rislam_rt.scene.scene_folder import README, mesh_file
 from rislam_rt.scene.write import scene_files, write_files
 from rislam_rt.scene.xml.materials import material_element, material_word
 
@@ -32,8 +32,7 @@ also holds what Sionna's file format has no place for:
 
 
 def write_xml(scene: Scene, folder: str | Path) -> list[str]:
-    """Write a scene into a new folder, as `scene.xml` with meshes for Sionna's `load_scene`; returns what it cannot
-    carry.
+    """Write a scene as a new folder, `scene.xml` with meshes for Sionna's `load_scene`; returns what it cannot carry.
 
     Raises
     ------
@@ -45,11 +44,9 @@ def write_xml(scene: Scene, folder: str | Path) -> list[str]:
     notes = left_behind(scene)
     readme = _README.format(name=scene.name, notes="\n".join(f"- {note}" for note in notes) or "- nothing")
     files = scene_files(scene)
-    for scatterer in scene.scatterers:
-        if scatterer.shade is not None:
-            shade = scatterer.shade
-            files[mesh_file(SHADE_OF + scatterer.name)] = ply_bytes(shade.vertices, shade.faces)
-    write_files(files | {XML_FILE: xml_bytes(scene), "README.md": readme.encode()}, folder)
+    shades = [(SHADE_OF + s.name, s.shade) for s in scene.scatterers if s.shade is not None]
+    files |= {mesh_file(name): ply_bytes(shade.vertices, shade.faces) for name, shade in shades}
+    write_files(files | {XML_FILE: xml_bytes(scene), README: readme.encode()}, folder)
     return notes
 
 
@@ -59,9 +56,8 @@ def xml_bytes(scene: Scene) -> bytes:
     shapes: list[tuple[str, Material | None]] = [(r.name, r.material) for r in scene.reflectors]
     shapes += [(shade.name, None) for shade in scene.occluders]
     shapes += [(SHADE_OF + s.name, None) for s in scene.scatterers if s.shade is not None]
-    names = {
-        m: f"{material_word(m)}-{number}" for number, m in enumerate(dict.fromkeys(material for _, material in shapes))
-    }
+    materials = dict.fromkeys(material for _, material in shapes)
+    names = {material: f"{material_word(material)}-{number}" for number, material in enumerate(materials)}
     root.extend(material_element(material, name) for material, name in names.items())
     for name, material in shapes:
         shape = SubElement(root, "shape", {"type": "ply", "id": f"mesh-{name}"})

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from built_in_rooms.parts import box_walls
 
-from rislam_rt.scene.shapes import block, joined
+from rislam_rt.scene.meshes import joined
+from rislam_rt.scene.shapes import block
 
 SIZE = (5.0, 4.0, 2.6)
 Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

@@ -15,8 +15,7 @@ from built_in_rooms.parts import box_walls
 from rislam_rt.errors import RislamError
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.importing import ImportOptions, import_room
-from rislam_rt.scene.meshes import ply_bytes
-from rislam_rt.scene.shapes import joined
+from rislam_rt.scene.meshes import joined, ply_bytes
 
 BOX = joined(list(box_walls(4.0, 3.0, 2.5).values()))
 OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in BOX.vertices) + "".join(

@@ -9,8 +9,9 @@ from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.regions.flat_regions import find_facets, weld
 from rislam_rt.scene.importing.regions.mesh_simplification import clustered
 from rislam_rt.scene.importing.regions.round_surfaces import find_round, prism, sides_for
+from rislam_rt.scene.meshes import joined
 from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.shapes import block, joined
+from rislam_rt.scene.shapes import block
 
 
 def star(corners: int, *, rng: np.random.Generator, reach: float = 1.0) -> np.ndarray:

@@ -17,8 +17,9 @@ from rislam_rt.scene.check.mesh_queries import winding
 from rislam_rt.scene.check.meshes import FAINT
 from rislam_rt.scene.importing import ImportOptions, import_room
 from rislam_rt.scene.importing.materials import THICKNESS, itu_by_word, parse_choices, parse_material
+from rislam_rt.scene.meshes import joined
 from rislam_rt.scene.schema import ItuMaterial
-from rislam_rt.scene.shapes import block, joined
+from rislam_rt.scene.shapes import block
 
 SHELL = {"floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west"}
 

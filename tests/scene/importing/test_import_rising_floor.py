@@ -10,9 +10,9 @@ from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.importing import ImportOptions, import_room
 from rislam_rt.scene.importing.free_space import find_free
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, joined
 from rislam_rt.scene.polygons import outline_loops
-from rislam_rt.scene.shapes import block, joined, quad
+from rislam_rt.scene.shapes import block, quad
 
 HALL = (12.0, 8.0, 6.0)
 

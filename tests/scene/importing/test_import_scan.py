@@ -11,7 +11,8 @@ from rislam_rt.geometry.angles import rotation_z
 from rislam_rt.model import Scene
 from rislam_rt.scene import load_scene
 from rislam_rt.scene.importing import ImportOptions, import_room
-from rislam_rt.scene.shapes import block, joined
+from rislam_rt.scene.meshes import joined
+from rislam_rt.scene.shapes import block
 
 SIZE, NOISE = np.array([3.2, 2.6, 2.4]), 0.005
 YAW = 0.35

@@ -49,7 +49,7 @@ def test_a_missing_column_is_told_with_the_likeliest(header: str, says: str) -> 
 def test_what_is_told_about_a_heading_and_all_other_columns_are_left_alone() -> None:
     others = ["yaw_rate", "heading_std_deg", "x_std", "vx", "time_offset", "note"]
     assert set(find_columns([*others, *PLACE], {})) == set(PLACE)
-    assert find_columns([*others, *PLACE], {})["x"].column == len(others) + 1
+    assert find_columns([*others, *PLACE], {})["x"][0] == len(others) + 1
     assert "heading" in find_columns([*PLACE, "yaw", "bearing"], {})
     assert find_columns([*PLACE, "bearing"], {"heading": "bearing"})["heading"] == (4, 1.0)
 

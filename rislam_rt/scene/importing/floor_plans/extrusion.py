@@ -14,9 +14,9 @@ from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.materials import MaterialAssignment
 from rislam_rt.scene.importing.regions.region_groups import compass_side, numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
-from rislam_rt.scene.meshes import Mesh, as_mesh
+from rislam_rt.scene.meshes import Mesh, as_mesh, joined
 from rislam_rt.scene.polygons import inside_loop, triangulate
-from rislam_rt.scene.shapes import joined, quad
+from rislam_rt.scene.shapes import quad
 
 THICKEST = 0.6
 """Thickest wall [m]: an opening goes through all parallel walls this near, as both faces of a thick wall are."""

@@ -81,8 +81,7 @@ def parse_corners(text: str) -> list[PlanShape]:
 
 
 def parse_geojson(content: bytes) -> list[PlanShape]:
-    """Parse a GeoJSON file into the shapes of a floor plan: polygons are rooms, lines are walls, unless a feature's
-    `kind` says else.
+    """Parse a GeoJSON file into the shapes of a floor plan: polygons are rooms, lines walls, unless `kind` says else.
 
     Raises
     ------
@@ -152,9 +151,8 @@ def build_plan(shapes: list[PlanShape], unit: float, height: float) -> FloorPlan
         try:
             _add(plan, shape, unit, height)
         except RislamError as error:
-            label = one_line(str(shape.about.get("name", number)))[:40]
-            raise Fault(f"{shape.kind} {label}: {one_line(str(error)).rpartition('; ')[0]}",
-                        one_line(str(error)).rpartition("; ")[2]) from None  # fmt: skip
+            label, (what, _, mend) = shape.about.get("name", number), one_line(str(error)).rpartition("; ")
+            raise Fault(f"{shape.kind} {one_line(str(label))[:40]}: {what}", mend) from None
     return plan
 
 

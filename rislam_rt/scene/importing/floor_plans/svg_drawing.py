@@ -20,6 +20,7 @@ _WORDS = {
     "room": ("room", "rooms", "zimmer", "raum", "space"),
 }
 _SHAPES = ("rect", "polygon", "polyline", "line", "path")
+_NAMES = ("class", "id", "label", "data-kind")
 _KEYS = ("material", "open", "bottom", "top", "name")
 _REFUSED = {
     "circle": "a circle; draw it as a polygon, or leave it out",
@@ -84,11 +85,7 @@ def _walk(element: Tree.Element, matrix: Floats, inherited: str, depth: int) -> 
 
 def _kind(element: Tree.Element) -> str:
     """Kind of a floor plan's shape, by the first word for one in an SVG element's own names; empty if there is none."""
-    own = " ".join(
-        value
-        for key, value in element.attrib.items()
-        if key.rpartition("}")[2] in ("class", "id", "label", "data-kind")
-    )
+    own = " ".join(value for key, value in element.attrib.items() if key.rpartition("}")[2] in _NAMES)
     words = set(re.split(r"[\W\d_]+", own.lower()))
     return next((kind for kind, known in _WORDS.items() if words & set(known)), "")
 
@@ -106,8 +103,7 @@ def _outline(tag: str, element: Tree.Element) -> Iterator[tuple[Floats, bool]]:
             yield np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]]), True
         return
     if tag == "line":
-        ends = np.array([_length(element, key) for key in ("x1", "y1", "x2", "y2")]).reshape(2, 2)
-        yield ends, False
+        yield np.array([_length(element, key) for key in ("x1", "y1", "x2", "y2")]).reshape(2, 2), False
         return
     numbers = [float(word) for word in _NUMBER.findall(element.get("points", ""))]
     if len(numbers) % 2 or len(numbers) < 4:

@@ -56,9 +56,8 @@ def wall_lines(plan: FloorPlan) -> list[Line]:
         for other in mine:
             if other.material == material and other.name == name:
                 continue
-            a, b = sorted(float(x) for x in (other.start + np.outer([s for p in other.spans for s in p], other.along)
-                                             - ends[0]) @ along)[:: max(2 * len(other.spans) - 1, 1)]  # fmt: skip
-            places = without_span(places, a, b)
+            there = (other.start + np.outer(np.ravel(other.spans), other.along) - ends[0]) @ along
+            places = without_span(places, float(there.min()), float(there.max()))
         same = next((k for k in mine if k.material == material and k.name == name), None)
         if same is None:
             if places:
@@ -105,13 +104,10 @@ def snapped_spans(line: Line, lines: list[Line]) -> Spans:
             on = float((line.start + place * line.along - other.start) @ other.along)
             if any(low - SNAP <= on <= high + SNAP for low, high in other.spans):
                 meets.append(place)
-    near = np.array(meets)
     found = []
     for span in line.spans:
-        ends = []
-        for end in span:
-            best = near[np.argmin(np.abs(near - end))] if len(near) else end
-            ends.append(float(best) if abs(best - end) <= SNAP else end)
-        if ends[1] - ends[0] > SAME_LINE:
-            found.append((ends[0], ends[1]))
+        nearest = [min(meets, key=lambda place: abs(place - end), default=end) for end in span]
+        low, high = (best if abs(best - end) <= SNAP else end for best, end in zip(nearest, span, strict=True))
+        if high - low > SAME_LINE:
+            found.append((low, high))
     return found

@@ -7,8 +7,7 @@ from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers, cross
 from rislam_rt.geometry.angles import unit
-from rislam_rt.geometry.connected_parts import connected
-from rislam_rt.geometry.triangles import triangle_cross, triangle_heights
+from rislam_rt.geometry.triangles import connected, triangle_cross, triangle_heights
 
 FLAT_ANGLE = np.radians(0.5)
 """Angle [rad] of neighbouring triangles below which they are one plane: half a degree looks flat to whoever drew it."""
@@ -57,6 +56,13 @@ class FlatRegions(NamedTuple):
     component: Integers
     """(R,) part of the mesh connected by edges that each region is in; one that touches at a corner is none of it."""
     edges: Edges
+
+    @property
+    def part(self) -> Integers:
+        """Part (R,) of the file that each flat region of a mesh comes from."""
+        part = np.zeros(len(self.area), dtype=np.int64)
+        part[self.region] = self.mesh.part
+        return part
 
     def faces_of(self, regions: Integers) -> Integers:
         """Triangles (T, 3) of a mesh in given flat regions."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import COPLANAR_OFFSET
-from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.geometry.triangles import connected
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, bounds_of
 
 SPAN = 0.6
@@ -40,10 +40,8 @@ def find_pieces(facets: FlatRegions, nodes: list[str]) -> list[RegionGroup]:
 
     A node with a name of its own is one object; whatever has none is parted into what hangs together.
     """
-    part = np.zeros(len(facets.area), dtype=np.int64)
-    part[facets.region] = facets.mesh.part
-    node = np.array([plain_name(nodes[p]) for p in range(len(nodes))], dtype=object)[part]
-    box = bounds_of(facets, np.arange(len(part)))
+    node = np.array([plain_name(name) for name in nodes], dtype=object)[facets.part]
+    box = bounds_of(facets, np.arange(len(node)))
     shell: list[int] = []
     others: list[RegionGroup] = []
     whole = node == ""
@@ -136,8 +134,7 @@ def wall_name(normal: Floats, middle: Floats, room: Floats) -> str:
 
 
 def compass_side(direction: Floats) -> str:
-    """Side of the compass, for the name of a group of flat regions, of a horizontal direction, `east` along x, in
-    eighths."""
+    """Side of the compass, in eighths, of a horizontal direction, `east` along x: for names of groups of regions."""
     return _SIDES[int(np.round(np.degrees(np.arctan2(direction[1], direction[0])) / 45.0)) % 8]
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions, crease_groups
-from rislam_rt.scene.meshes import Mesh
-from rislam_rt.scene.shapes import joined, quad
+from rislam_rt.scene.meshes import Mesh, joined
+from rislam_rt.scene.shapes import quad
 
 CREASE = np.radians(35.0)
 """Angle [rad] of facets above which they meet in an edge: a round thing is drawn with eleven sides or more."""

@@ -76,12 +76,11 @@ def sort_regions(
     for found in rounds:
         # as planes, cylinders get sides of their own; of other round things the sides that are drawn are taken
         rounded[found.regions] = found.radius > 0.0 or options.curved == "shade"
-    part = np.zeros(len(owner), dtype=np.int64)
-    part[facets.region] = facets.mesh.part
+    part = facets.part
     mirror, narrow = _mirrors(facets, rounded, options)
     resting = _resting(facets, pieces, mirror)
     mirror &= ~resting
-    group = _coplanar(facets, pieces[0].regions, mirror, part)
+    group = _coplanar(facets, pieces[0].regions, mirror)
     label = group.copy()
     for number, found in enumerate(rounds):
         if rounded[found.regions[0]]:
@@ -94,7 +93,7 @@ def sort_regions(
         mesh, error = region_mesh(facets, regions, kept, OUTLINE * options.wavelength)
         area = float(facets.area[regions].sum())
         surfaces.append(Surface(int(owner[first]), int(part[first]), facets.normal[first], mesh, area, error))
-    return _with_clutter(facets, pieces, rounds, surfaces, owner, part, mirror, resting, narrow, options)
+    return _with_clutter(facets, pieces, rounds, surfaces, owner, mirror, resting, narrow, options)
 
 
 def _mirrors(facets: FlatRegions, rounded: Booleans, options: ImportOptions) -> tuple[Booleans, float]:
@@ -129,9 +128,9 @@ def _resting(facets: FlatRegions, pieces: list[RegionGroup], mirror: Booleans) -
     return resting
 
 
-def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Integers) -> Integers:
+def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans) -> Integers:
     """Wall (R,) that each surface of an imported mesh belongs to: in the shell, those of one plane and part are one."""
-    group = np.arange(len(mirror))
+    group, part = np.arange(len(mirror)), facets.part
     rows = shell[mirror[shell]]
     for place, i in enumerate(rows):
         if group[i] != i:
@@ -150,7 +149,7 @@ def _coplanar(facets: FlatRegions, shell: Integers, mirror: Booleans, part: Inte
 
 def _with_clutter(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], surfaces: list[Surface], owner: Integers,
-    part: Integers, mirror: Booleans, resting: Booleans, narrow: float, options: ImportOptions,
+    mirror: Booleans, resting: Booleans, narrow: float, options: ImportOptions,
 ) -> SortedSurfaces:  # fmt: skip
     """Complete the sorted surfaces of an imported mesh: cylinders as prisms, what does not reflect as clutter."""
     wavelength, cylinders, prisms = options.wavelength, [], []
@@ -161,12 +160,12 @@ def _with_clutter(
         sagitta = SAGITTA * wavelength * (0.5 if options.curved == "planes" else 1.0)
         mesh, error = prism(found, sagitta)
         first = int(found.regions[0])
-        thing = int(owner[first])
+        thing, part = int(owner[first]), int(facets.part[first])
         cylinders.append((found.radius, len(mesh.faces) // 2, error))
         rest[found.regions] = False
         if options.curved == "planes":
             area = float(facets.area[found.regions].sum())
-            surfaces.append(Surface(thing, int(part[first]), facets.normal[first], mesh, area, error))
+            surfaces.append(Surface(thing, part, facets.normal[first], mesh, area, error))
         else:
             prisms.append(ClutterMesh(thing, mesh.triangles))
     gone = float(facets.area[resting].sum())
@@ -188,8 +187,7 @@ def _with_clutter(
 
 
 def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
-    """Simplify an imported mesh's surfaces of clutter in the smallest cells [m] that leave few triangles; also the
-    error [m] and the cell."""
+    """Simplify an imported mesh's clutter in the smallest cells that leave few triangles; also error and cell [m]."""
     while True:
         found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
         if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:

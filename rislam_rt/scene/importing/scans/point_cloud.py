@@ -33,8 +33,7 @@ class PointCloud(NamedTuple):
 
 
 def downsample_mesh(mesh: Welded) -> PointCloud:
-    """Point cloud of a scanned mesh: one corner for every cube of `SPACING` and side, with the normal of the patch
-    about it.
+    """Point cloud of a scanned mesh: a corner for every cube of `SPACING` and side, with the normal of its patch.
 
     Both faces of a thin board stay apart where the mesh says which side is which.
     """

@@ -10,9 +10,8 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.geometry.planes import plane_tangents
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 from rislam_rt.scene.importing.scans.scan_planes import ScanPlane
-from rislam_rt.scene.meshes import Mesh
+from rislam_rt.scene.meshes import Mesh, joined
 from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
-from rislam_rt.scene.shapes import joined
 
 CELL = 0.1
 """Side [m] of the cells in which the points of a scanned plane are counted."""
@@ -37,6 +36,25 @@ class Outline(NamedTuple):
     filled: float
 
 
+class _Meeting(NamedTuple):
+    """Line where a scanned plane meets another, `normal . x = offset` in the plane, and what the other one is."""
+
+    normal: Floats
+    offset: float
+    slope: float
+    """Sine of the angle between the two planes."""
+    tree: cKDTree
+
+
+class _Sheet(NamedTuple):
+    """A scanned plane whose outline is drawn: its two tangents (3, 2), and the lines where it meets the others."""
+
+    frame: Floats
+    foot: Floats
+    """(3,) [m] of the plane, the zero of its outline: the point nearest to the origin."""
+    meetings: list[_Meeting]
+
+
 class _Edge(NamedTuple):
     """Edge of a scanned plane's outline, `normal . x = offset` in the plane, and whether another plane gives it."""
 
@@ -49,56 +67,55 @@ class _Edge(NamedTuple):
 def outline_planes(planes: list[ScanPlane], cloud: PointCloud, fill: float) -> list[Outline | None]:
     """Outlines of a scan's planes as meshes, holes up to `fill` [m^2] closed; None where too little is left."""
     trees = [cKDTree(cloud.points[plane.members]) for plane in planes]
-    return [_outline(number, planes, trees, cloud, fill) for number in range(len(planes))]
+    outlines = []
+    for plane in planes:
+        frame = np.stack(plane_tangents(plane.normal), axis=-1)
+        others = zip(planes, trees, strict=True)
+        meetings = [_meeting(plane, other, frame, tree) for other, tree in others if other is not plane]
+        sheet = _Sheet(frame, plane.offset * plane.normal, meetings)
+        outlines.append(_outline(sheet, cloud.points[plane.members] @ frame, fill))
+    return outlines
 
 
-def _outline(
-    number: int, planes: list[ScanPlane], trees: list[cKDTree], cloud: PointCloud, fill: float
-) -> Outline | None:
-    """Mesh of the outline of one scanned plane: its cells, small holes filled, edges moved to where planes meet."""
-    plane = planes[number]
-    frame = np.stack(plane_tangents(plane.normal), axis=-1)
-    flat = cloud.points[plane.members] @ frame
+def _outline(sheet: _Sheet, flat: Floats, fill: float) -> Outline | None:
+    """Mesh of the outline of one scanned plane about its points (N, 2): its cells, small holes filled, edges moved to
+    where planes meet."""
     low = flat.min(axis=0) - (BRIDGE + 1.5) * CELL
     size = np.ceil((flat.max(axis=0) - low) / CELL).astype(int) + BRIDGE + 2
     there = np.zeros(size, dtype=np.bool_)
     there[tuple(((flat - low) / CELL).astype(int).T)] = True
-    there, filled = _filled_cells(there, _meeting_cells(number, planes, trees, frame, low, there.shape), fill)
+    there, filled = _filled_cells(there, _meeting_cells(sheet, low, there.shape), fill)
     meshes = []
     for loops in _loops(there):
         corners = [low + CELL * loop for loop in loops]
-        snapped = [_snapped(loop, number, planes, trees, frame) for loop in corners]
-        mesh = _mesh(snapped, frame, plane) or _mesh(corners, frame, plane)
+        mesh = _mesh([_snapped(loop, sheet) for loop in corners], sheet) or _mesh(corners, sheet)
         if mesh is not None:
             meshes.append(mesh)
     return Outline(joined(meshes), filled) if meshes else None
 
 
-def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats) -> tuple[Floats, float, float]:
-    """Line where a scanned plane's outline ends at another plane: normal, offset [m] and sine of the angle, in its
-    frame (3, 2)."""
+def _meeting(plane: ScanPlane, other: ScanPlane, frame: Floats, tree: cKDTree) -> _Meeting:
+    """Line where a scanned plane's outline ends at another plane, in its frame (3, 2)."""
     line = frame.T @ other.normal
     slope = float(np.linalg.norm(line))
     rest = other.offset - plane.offset * float(plane.normal @ other.normal)
-    return (line / slope, rest / slope, slope) if slope > 0.0 else (line, rest, slope)
+    scale = slope if slope > 0.0 else 1.0
+    return _Meeting(line / scale, rest / scale, slope, tree)
 
 
-def _meeting_cells(
-    number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats, low: Floats, shape: tuple[int, ...]
-) -> Booleans:
+def _meeting_cells(sheet: _Sheet, low: Floats, shape: tuple[int, ...]) -> Booleans:
     """Cells of a scanned plane along its lines with other planes, where those have points: holes end there."""
-    plane, found = planes[number], np.zeros(shape, dtype=np.bool_)
+    found = np.zeros(shape, dtype=np.bool_)
     reach = float(np.hypot(shape[0], shape[1])) * CELL
     ends: list[tuple[Floats, Booleans]] = []
-    for other, tree in enumerate(trees):
-        line, offset, slope = _meeting(plane, planes[other], frame)
-        if other == number or slope < 0.5:
+    for line, offset, slope, tree in sheet.meetings:
+        if slope < 0.5:
             continue
         middle = low + 0.5 * CELL * np.array(shape)
         foot = middle + (offset - float(line @ middle)) * line
         steps = np.arange(-reach, reach, 0.5 * CELL)
         flat = foot + steps[:, None] * np.array([-line[1], line[0]])
-        near = tree.query(flat @ frame.T + plane.offset * plane.normal)[0] < 1.5 * CELL
+        near = tree.query(flat @ sheet.frame.T + sheet.foot)[0] < 1.5 * CELL
         if not near.any():
             continue
         near = binary_closing(np.pad(near, 20), np.ones(2 * int(BREAK / CELL) + 1))[20:-20]
@@ -160,10 +177,9 @@ def _loops(there: Booleans) -> list[list[Floats]]:
     return [loops for loops in found if loops]
 
 
-def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats) -> Floats:
+def _snapped(loop: Floats, sheet: _Sheet) -> Floats:
     """Outline (n, 2) of a scanned plane, edges laid on the lines where other planes meet it."""
-    ends = zip(loop, np.roll(loop, -1, axis=0), strict=True)
-    edges = [_edge(start, end, number, planes, trees, frame) for start, end in ends]
+    edges = [_edge(start, end, sheet) for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True)]
     # a short edge beside one that another plane gives is the grid's cut through a corner
     kept = []
     for k, edge in enumerate(edges):
@@ -180,23 +196,19 @@ def _snapped(loop: Floats, number: int, planes: list[ScanPlane], trees: list[cKD
         corners.append(np.linalg.solve(system, np.array([before.offset, edge.offset])))
     moved = np.array(corners)
     far = cKDTree(loop).query(moved)[0].max() if len(moved) > 2 else np.inf
-    return _snapped_corners(moved if far < (SHORT + 1.0) * CELL else loop, number, planes, trees, frame)
+    return _snapped_corners(moved if far < (SHORT + 1.0) * CELL else loop, sheet)
 
 
-def _snapped_corners(
-    corners: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats
-) -> Floats:
+def _snapped_corners(corners: Floats, sheet: _Sheet) -> Floats:
     """Outline (n, 2) of a scanned plane, corners that nearly lie on other planes put on them (on two at most)."""
-    plane, moved = planes[number], corners.copy()
+    moved = corners.copy()
     for k, corner in enumerate(corners):
-        place = frame @ corner + plane.offset * plane.normal
-        near = []
-        for other, tree in enumerate(trees):
-            line, offset, slope = _meeting(plane, planes[other], frame)
-            if other == number or slope < 0.3 or tree.query(place)[0] > 4.0 * CELL:
-                continue
-            near.append((abs(float(line @ corner) - offset), tuple(line), offset))
-        near = sorted(item for item in near if item[0] < 1.5 * CELL)
+        place = sheet.frame @ corner + sheet.foot
+        near = sorted(
+            (abs(float(line @ corner) - offset), tuple(line), offset)
+            for line, offset, slope, tree in sheet.meetings
+            if slope >= 0.3 and abs(float(line @ corner) - offset) < 1.5 * CELL and tree.query(place)[0] <= 4.0 * CELL
+        )
         if not near:
             continue
         system, wanted = [np.array(near[0][1])], [near[0][2]]
@@ -215,34 +227,26 @@ def _same(a: _Edge, b: _Edge) -> bool:
     return bool(a.met and b.met and parallel and abs(abs(a.offset) - abs(b.offset)) < 1e-9)
 
 
-def _edge(
-    start: Floats, end: Floats, number: int, planes: list[ScanPlane], trees: list[cKDTree], frame: Floats
-) -> _Edge:  # fmt: skip
+def _edge(start: Floats, end: Floats, sheet: _Sheet) -> _Edge:
     """Line of one edge of a scanned plane's outline: where the nearest other plane cuts this one, if near all along."""
-    plane, along = planes[number], end - start
+    along, middle = end - start, 0.5 * (start + end)
     length = float(np.linalg.norm(along))
     normal = np.array([along[1], -along[0]]) / length
-    middle = frame @ (0.5 * (start + end)) + plane.offset * plane.normal
-    best: tuple[float, _Edge | None] = (MEET * CELL, None)
-    for other, tree in enumerate(trees):
-        line, offset, slope = _meeting(plane, planes[other], frame)
-        if other == number or slope < 0.3 or tree.query(middle)[0] > 4.0 * CELL + 0.5 * length:
-            continue
-        if abs(float(line @ normal)) < SLANT:
-            continue
-        far = max(abs(float(line @ start) - offset), abs(float(line @ end) - offset))
-        if far < best[0]:
-            best = (far, _Edge(line, offset, length, True))
     # cells with a point in them reach half a cell beyond what is there, on average; the solid lies to the left
-    return best[1] or _Edge(normal, float(normal @ (0.5 * (start + end))) - 0.5 * CELL, length, False)
+    place = sheet.frame @ middle + sheet.foot
+    nearest, best = MEET * CELL, _Edge(normal, float(normal @ middle) - 0.5 * CELL, length, False)
+    for line, offset, slope, tree in sheet.meetings:
+        far = max(abs(float(line @ p) - offset) for p in (start, end))
+        meets = slope >= 0.3 and abs(float(line @ normal)) >= SLANT and far < nearest
+        if meets and tree.query(place)[0] <= 4.0 * CELL + 0.5 * length:
+            nearest, best = far, _Edge(line, offset, length, True)
+    return best
 
 
-def _mesh(loops: list[Floats], frame: Floats, plane: ScanPlane) -> Mesh | None:
+def _mesh(loops: list[Floats], sheet: _Sheet) -> Mesh | None:
     """Mesh of a scanned plane from its outer outline and holes (n, 2); None if they make no polygon."""
     outer, holes = loops[0], loops[1:]
     if signed_area(outer) <= 0.0 or any(signed_area(h) >= 0.0 or not inside_loop(outer, h.mean(axis=0)) for h in holes):
         return None
     faces = triangulate(outer, holes)
-    if faces is None:
-        return None
-    return Mesh(np.concatenate(loops) @ frame.T + plane.offset * plane.normal, faces)
+    return None if faces is None else Mesh(np.concatenate(loops) @ sheet.frame.T + sheet.foot, faces)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rislam_rt.arrays import Booleans, Floats, Integers
-from rislam_rt.geometry.connected_parts import connected
+from rislam_rt.geometry.triangles import connected
 from rislam_rt.scene.importing.scans.point_cloud import PointCloud
 
 LEAN = np.cos(np.radians(30.0))

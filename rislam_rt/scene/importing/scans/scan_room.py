@@ -39,11 +39,10 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
     kept = [pair for k, pair in enumerate(kept) if not any(_lies_on(pair, larger, cloud.noise) for larger in kept[:k])]
     if not kept:
         raise Fault("no plane is found in the scan", "check --units, or clean the mesh")
-    surfaces = [
-        Surface(0, 0, plane.normal, outline.mesh, float(triangle_areas(outline.mesh.triangles).sum()),
-                WIDTHS * plane.residual)
-        for plane, outline in kept
-    ]  # fmt: skip
+    surfaces = []
+    for plane, (shape, _) in kept:
+        area = float(triangle_areas(shape.triangles).sum())
+        surfaces.append(Surface(0, 0, plane.normal, shape, area, WIDTHS * plane.residual))
     rest = _unexplained(mesh, surfaces, max(CLOSE, 2.0 * WIDTHS * cloud.noise))
     triangles = mesh.vertices[mesh.faces[rest]]
     clutter, error, cell = in_cells([ClutterMesh(0, triangles)] if len(triangles) else [], 2.0 * options.wavelength)
@@ -62,8 +61,7 @@ def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline],
         return False
     if np.abs(corners @ wall.normal - wall.offset).max() > 2.0 * WIDTHS * noise:
         return False
-    middle = outline.mesh.triangles.mean(axis=1)
-    apart = distance_to_triangles(middle, around.mesh.triangles)
+    apart = distance_to_triangles(outline.mesh.triangles.mean(axis=1), around.mesh.triangles)
     return bool((apart < 4.0 * WIDTHS * noise).all())
 
 
