@@ -53,7 +53,7 @@ def find_free(triangles: Floats) -> FreeSpace | None:
         gap = distance_to_triangles(places, triangles)
         for clearance in CLEARANCES:
             rows = gap >= clearance
-            free = _free_at(places[rows], headroom[rows], gap[rows], triangles, clearance)
+            free = _free_at(places[rows], headroom[rows], triangles, clearance)
             if free is not None:
                 return free
     return None
@@ -79,7 +79,7 @@ def _places(triangles: Floats, height: float) -> tuple[Floats, Floats]:
     return np.stack([x[column], y[column], met + np.minimum(height, 0.5 * headroom)], axis=-1), headroom
 
 
-def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
+def _free_at(places: Floats, headroom: Floats, triangles: Floats, clearance: float) -> FreeSpace | None:
     """Free space of a room among places (N, 3) at one clearance [m]; None where there is none."""
     if len(places) < 2:
         return None
@@ -87,7 +87,7 @@ def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, c
     share = hit_shares(places, directions, triangles)
     room = _largest_part(places, headroom, share, triangles)
     room &= share >= share[room].max() - 0.02
-    places, gap, share = places[room], gap[room], share[room]
+    places = places[room]
     near = np.abs(places[:, 2] - places[:, 2, None]) < LEVEL
     level = near[int(np.argmax(near.sum(axis=1)))]
     ground = places[level]
@@ -95,9 +95,8 @@ def _free_at(places: Floats, headroom: Floats, gap: Floats, triangles: Floats, c
     way = _longest_way(ground, triangles, clearance)
     if way is None:
         return None
-    best = int(np.argmax(np.where(level, np.minimum(gap, 1.0), -1.0)))
     order = np.argsort(np.linalg.norm(places - way[0], axis=1), kind="stable")
-    return FreeSpace(places[order], way, clearance, float(share[best]))
+    return FreeSpace(places[order], way, clearance, float(hit_shares(way[:1], directions, triangles)[0]))
 
 
 def _largest_part(places: Floats, headroom: Floats, share: Floats, triangles: Floats) -> Booleans:

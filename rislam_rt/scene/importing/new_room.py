@@ -9,7 +9,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.model import RadioConfig
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.floor_plans.extrusion import extrude
-from rislam_rt.scene.importing.floor_plans.floor_plan import build_plan, parse_corners, parse_geojson
+from rislam_rt.scene.importing.floor_plans.floor_plan import PlanShape, build_plan, parse_corners, parse_geojson
 from rislam_rt.scene.importing.floor_plans.svg_drawing import parse_svg
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.mesh_room import import_mesh
@@ -64,9 +64,7 @@ def import_corners(
     """
     shapes = parse_corners(corners)
     try:
-        plan = build_plan(shapes, UNITS[options.units or "m"], height)
-        check_size(float(np.linalg.norm(np.ptp(shapes[0].points, axis=0))), options.units)
-        draft = extrude(plan, height, options)
+        draft = _draft_of_plan(shapes, options, height)
         return write_room(draft, folder, "Made from the corners of a floor plan.", options, overwrite=overwrite)
     except Fault as fault:
         raise SceneError(f"--floorplan: {fault}") from None
@@ -76,9 +74,17 @@ def _read_plan(file: Path, options: ImportOptions, height: float) -> RoomDraft:
     """Import a floor plan (SVG or GeoJSON) as the draft of a room of a given height [m]."""
     content = read_content(file, MAX_PLAN_BYTES)
     shapes = parse_svg(content) if file.suffix.lower() == ".svg" else parse_geojson(content)
+    return _draft_of_plan(shapes, options, height)
+
+
+def _draft_of_plan(shapes: list[PlanShape], options: ImportOptions, height: float) -> RoomDraft:
+    """Draft of a room of a given height [m] by the shapes of a floor plan, whose options of a mesh are refused."""
+    for name, given in (("--up", options.up), ("--scan", options.scan)):
+        if given is not None:
+            raise Fault(f"{name}: it says how a mesh lies or was made, and this is a floor plan", "leave it out")
     origin, unit = np.array(options.origin[:2]), UNITS[options.units or "m"]
-    points = np.concatenate([shape.points for shape in shapes] or [np.zeros((1, 2))])
-    if (np.abs(points) < IMMEASURABLE).all():  # what is beyond is refused with its shape's name
+    points = np.concatenate([np.zeros((0, 2)), *(shape.points for shape in shapes)])
+    if len(points) and (np.abs(points) < IMMEASURABLE).all():  # what is beyond is refused with its shape's name
         check_size(float(np.linalg.norm(np.ptp(points, axis=0))), options.units)
         check_near(points * unit - origin, origin)
     shapes = [shape._replace(points=shape.points - origin / unit) for shape in shapes]

@@ -118,6 +118,7 @@ BAD: dict[str, tuple[str, bytes | str | dict[str, Any], str]] = {
     "lines only": ("room.ply", ply(BOX.vertices * [1.0, 0.0, 0.0], BOX.faces), "no triangle of the file has an area"),
     "one wall": ("room.ply", ply(BOX.vertices * [1.0, 1.0, 0.0], BOX.faces), ""),
     "svg laughs": ("room.svg", LAUGHS, "defines entities"),
+    "svg laughs in UTF-16": ("room.svg", LAUGHS.encode("utf-16"), "defines entities"),
     "svg is html": ("room.svg", "<html></html>", "is no SVG"),
     "svg broken": ("room.svg", "<svg><g>", "not readable SVG"),
     "svg curves": ("room.svg", '<svg><path d="M 0 0 C 1 1 2 2 3 3"/></svg>', "curves"),

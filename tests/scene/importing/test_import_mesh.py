@@ -103,7 +103,7 @@ def test_a_name_that_one_surface_has_is_kept(tmp_path: Path) -> None:
     }  # fmt: skip
     scene: Any = trimesh.Scene()
     parts = box_walls(5.0, 4.0, 2.6)
-    for node in set(given.values()):
+    for node in dict.fromkeys(given.values()):
         mesh = joined([parts[name] for name in given if given[name] == node])
         scene.add_geometry(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False), node_name=node, geom_name=node)
     file = tmp_path / "named.glb"

@@ -129,7 +129,8 @@ def test_thick_walls_have_frames(tmp_path: Path) -> None:
     ("corners", "says"),
     [
         ("0,0 4,0", "2 corners"), ("0,0 4,4 4,0 0,4", "crosses itself"), ("0,0 4,0 x,3", "is no corner"),
-        ("", "0 corners"), ("0,0 1e9,0 4,3", "beyond 100 km"), ("0,0 nan,0 4,3", "not finite"),
+        ("", "0 corners"), ("0,0 1e9,0 4,3", "measure 1e.09 m across"), ("0,0 1e30,0 4,3", "beyond 100 km"),
+        ("0,0 nan,0 4,3", "not finite"),
         ("0,0 400,0 400,300 0,300", "--floorplan: in metres it would measure 500 m across; give --units cm"),
         ("0,0 0.2,0 0.2,2 0,2", "no free place"),
     ],
@@ -138,6 +139,20 @@ def test_corners_that_enclose_nothing(tmp_path: Path, corners: str, says: str) -
     with pytest.raises(SceneError, match=says) as caught:
         import_corners(corners, tmp_path / "room", ImportOptions())
     assert str(caught.value).isprintable()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_corners_lie_where_the_origin_says(tmp_path: Path) -> None:
+    import_corners("10,20 14,20 14,23 10,23", tmp_path / "room", ImportOptions(origin=(10.0, 20.0, 0.0)))
+    assert np.allclose(load_scene(tmp_path / "room").bounds, [[0.0, 0.0, 0.0], [4.0, 3.0, 2.7]], atol=0.2)
+
+
+@pytest.mark.parametrize("name", ["up", "scan"])
+def test_what_says_how_a_mesh_lies_is_refused_of_a_floor_plan(tmp_path: Path, name: str) -> None:
+    """Both were passed over in silence."""
+    options = ImportOptions(up="y") if name == "up" else ImportOptions(scan=True)
+    with pytest.raises(SceneError, match=rf"--floorplan: --{name}: .*; leave it out"):
+        import_corners("0,0 4,0 4,3 0,3", tmp_path / "room", options)
     assert list(tmp_path.iterdir()) == []
 
 

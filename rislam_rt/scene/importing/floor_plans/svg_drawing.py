@@ -44,7 +44,7 @@ def parse_svg(content: bytes) -> list[PlanShape]:
     Fault
         Not SVG, a shape with curves, or one that is drawn by reference.
     """
-    if b"<!ENTITY" in content:
+    if b"<!ENTITY" in content.replace(b"\0", b""):  # in UTF-16 as well
         raise Fault("the drawing defines entities", "save it as plain SVG")
     try:
         root = Tree.fromstring(content)
