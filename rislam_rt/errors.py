@@ -23,8 +23,8 @@ class RislamError(Exception):
 
     @property
     def lines(self) -> list[str]:
-        """Lines of an error's message: one printable line for each fault, and the number of those beyond
-        `MOST_LINES`."""
+        """Message that errors of this package have in lines: one printable line for each fault, and the number of those
+        beyond `MOST_LINES`."""
         told = [_printable(str(text)) for text in self.args[:MOST_LINES]]
         more = len(self.args) - len(told)
         return [*told, f"{more} more of this kind"] if more else told

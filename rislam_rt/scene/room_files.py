@@ -34,7 +34,7 @@ def panel(
     center: list[float], normal: list[float], up: list[float], host: str = "ceiling", size: int = 6,
     element: str = "tang", spacing: float = 0.015,
 ) -> dict[str, Any]:  # fmt: skip
-    """Table of a new room's scene file for a RIS panel like the paper's, anywhere; its elements, too, are the paper's
+    """Table for a RIS panel like the paper's, anywhere, in the files of a room; its elements, too, are the paper's
     (`tang`) or reflect as a perfect plate does (`energy`), and their `spacing` [m] is half a wavelength at 10 GHz."""
     lie = {"center": center, "normal": normal, "up": up, "rows": size, "cols": size, "spacing_m": [spacing, spacing]}
     return lie | {"levels": 4, "element": element, "host": host}

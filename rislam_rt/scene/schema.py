@@ -319,7 +319,7 @@ def validate_spec(table: dict[str, Any]) -> SceneSpec:
 
 
 def read_spec(path: Path) -> tuple[SceneSpec, bytes]:
-    """Read a scene file and validate it by the schema: its specification and its bytes.
+    """Validate a scene file by the schema: returns its specification and the bytes that were read.
 
     Raises
     ------

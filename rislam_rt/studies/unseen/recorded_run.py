@@ -32,7 +32,8 @@ class RecordedScheme(NamedTuple):
 
     @property
     def has_strayed(self) -> bool:
-        """Whether the replay gave other estimates than the recorded run, so that delays and births are not known."""
+        """Whether a recorded run strayed from its run: its replay gave other estimates, and delays and births are not
+        known."""
         return self.apart is not None and not self.apart <= APART
 
 

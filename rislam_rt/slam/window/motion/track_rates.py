@@ -130,9 +130,9 @@ def _histories(state: WindowState, ends: PathDirections, start: int) -> _Histori
 
 
 def _directions(heading: Floats, ends: PathDirections, slot: Integers, clock: Floats) -> tuple[Floats, Floats]:
-    """Derivatives (N, 3) of the lengths by the position, in the room's axes: the directions from which each path comes
-    and into which it leaves, times -1, smoothed by lines over the times `clock` (N,) [s] for each track; and the
-    variance (T,) of their error along a way of one metre."""
+    """Derivatives (N, 3) of tracks' lengths by the position, for their rates, in the room's axes: the directions from
+    which each path comes and into which it leaves, times -1, smoothed by lines over the times `clock` (N,) [s] for each
+    track; and the variance (T,) of their error along a way of one metre."""
     which, seen, angle = ends.which, ends.cosines, heading[slot]
     cos, sin = np.cos(angle), np.sin(angle)
     flat = np.stack([cos * seen[:, 0] - sin * seen[:, 1], sin * seen[:, 0] + cos * seen[:, 1]], axis=1)
