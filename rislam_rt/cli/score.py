@@ -14,7 +14,7 @@ from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
     from rislam_rt.model import SlamResult
-    from rislam_rt.studies.unseen.recorded_run import RecordedScheme
+    from rislam_rt.studies.score_card.recorded_run import RecordedScheme
 
 
 def command(
@@ -49,7 +49,7 @@ def command(
     """
     from rislam_rt.pipeline.long.run import read_whole
     from rislam_rt.report.unseen.run_card import print_run_card
-    from rislam_rt.studies.unseen.recording_file import write_recording
+    from rislam_rt.studies.score_card.recording_file import write_recording
     from rislam_rt.sweeps.cell_work import plain_result
 
     result = read_whole(run)
@@ -85,7 +85,7 @@ def _recording_file(folder: Path, run: Path, scheme: str) -> Path:
 
 def _recorded(result: "SlamResult", run: Path, *, replay: bool) -> "list[RecordedScheme]":
     """Recordings of all schemes for their score cards, with a progress bar while they are replayed."""
-    from rislam_rt.studies.unseen.recorded_run import recorded_schemes, replay_seconds
+    from rislam_rt.studies.score_card.recorded_run import recorded_schemes, replay_seconds
 
     if not replay:
         return list(recorded_schemes(result, run, replayed=False))

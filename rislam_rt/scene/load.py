@@ -17,8 +17,9 @@ from rislam_rt.scene.check.triangle_array import START_KEY
 from rislam_rt.scene.findings import Fault, Finding, panel_key, raise_errors, warning_at
 from rislam_rt.scene.mesh_placement import MeshFiles
 from rislam_rt.scene.motion.agent_motion import build_motion
+from rislam_rt.scene.read_scene_file import MAX_SCENE_BYTES, read_spec
 from rislam_rt.scene.scene_folder import scene_file
-from rislam_rt.scene.schema import MAX_SCENE_BYTES, AgentSection, RisSection, ScattererSection, SceneSpec, read_spec
+from rislam_rt.scene.schema import AgentSection, RisSection, ScattererSection, SceneSpec
 from rislam_rt.scene.shapes import solid_mesh
 from rislam_rt.toml import parse_toml
 

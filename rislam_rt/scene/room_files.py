@@ -26,7 +26,7 @@ class RoomFiles:
 
 
 def reflector(name: str, material: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Table of a new room's scene file for a reflector with a PLY mesh of its own."""
+    """Table for a reflector in the files of a room, with a PLY mesh of its own."""
     return {"name": name, "mesh": mesh_file(name), "material": material or PAPER_MATERIAL}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rislam_rt
-from rislam_rt.studies.unseen.score import OVER_TIME
+from rislam_rt.studies.score_card.score import OVER_TIME
 
 ROOT = Path(__file__).parents[2]
 SHORT = ("channel=image_source", "depth=1", "cycles=14", "receiver.estimator=bound", 'schemes=["random"]')

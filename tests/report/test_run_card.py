@@ -1,7 +1,7 @@
 """The score card of one run: the rows of the page of unseen rooms, and what is not known is not a number."""
 
 from rislam_rt.report.unseen import page, run_card
-from rislam_rt.studies.unseen.score import OVER_TIME
+from rislam_rt.studies.score_card.score import OVER_TIME
 
 SCORES = {
     "rmse_m": 0.0077, "ratio": 0.54, "relative_rmse_m": 0.0085, "relative_ratio": 12.8, "relative_bound_m": 0.00066,

@@ -16,7 +16,7 @@ from rislam_rt.errors import SceneError
 from rislam_rt.scene import check_scene, load_scene
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.meshes import FORMATS, MeshReader, ply_bytes
-from rislam_rt.scene.schema import parse_spec, validate_spec
+from rislam_rt.scene.read_scene_file import parse_spec, validate_spec
 
 Damage = Callable[[str, str], Path]
 CORNERS = np.array([[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 6.0, 0.0], [0.0, 6.0, 0.0]])

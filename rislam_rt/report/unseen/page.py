@@ -9,7 +9,7 @@ from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.pipeline.scores.true_loss import FAR_OVER, LASTING, LOST
 from rislam_rt.report.markdown import NOTHING, paragraph, picture, table_lines
 from rislam_rt.report.unseen.score_cards import SchemeRun
-from rislam_rt.studies.unseen.score import GOOD_ANGLE, GOOD_OFFSET, NEAR_POINT, SETTLED
+from rislam_rt.studies.score_card.score import GOOD_ANGLE, GOOD_OFFSET, NEAR_POINT, SETTLED
 from rislam_rt.studies.unseen.spec import TEST, UnseenSpec
 
 MILLI = 1e3

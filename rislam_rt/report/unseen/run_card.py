@@ -9,7 +9,7 @@ from rich.table import Column, Table
 
 from rislam_rt.report.markdown import NOTHING
 from rislam_rt.report.unseen.page import MILLI
-from rislam_rt.studies.unseen.score import SETTLED
+from rislam_rt.studies.score_card.score import SETTLED
 
 UNKNOWN = "not known"
 """Cell of a score that needs the map of every cycle, where the last alone is known."""

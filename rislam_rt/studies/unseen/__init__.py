@@ -2,12 +2,12 @@
 
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, Recorder, answers_from_arrays, replay
-from rislam_rt.studies.unseen.recorded_run import record_run
-from rislam_rt.studies.unseen.recording_file import Recording, read_recording, write_recording
-from rislam_rt.studies.unseen.score import score_run
+from rislam_rt.studies.score_card.recorded_run import record_run
+from rislam_rt.studies.score_card.recording_file import Recording, read_recording, write_recording
+from rislam_rt.studies.score_card.score import score_run
+from rislam_rt.studies.score_card.truth import Truth, build_truth
 from rislam_rt.studies.unseen.spec import UnseenSpec
 from rislam_rt.studies.unseen.sweep import build_unseen, count_tests
-from rislam_rt.studies.unseen.truth import Truth, build_truth
 
 __all__ = [
     "Answers", "Inputs", "Recorder", "Recording", "Truth", "UnseenSpec", "answers_from_arrays", "build_truth",

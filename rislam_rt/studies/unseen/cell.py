@@ -23,10 +23,10 @@ from rislam_rt.ris import rephase
 from rislam_rt.scene import write_scene
 from rislam_rt.scene.random_rooms import RandomRoom, Ways, draw_room
 from rislam_rt.storage.netcdf import write_dataset
+from rislam_rt.studies.score_card.recording_file import Recording, write_recording
+from rislam_rt.studies.score_card.score import score_run
+from rislam_rt.studies.score_card.truth import build_truth
 from rislam_rt.studies.swept.cell import cell_spec
-from rislam_rt.studies.unseen.recording_file import Recording, write_recording
-from rislam_rt.studies.unseen.score import score_run
-from rislam_rt.studies.unseen.truth import build_truth
 from rislam_rt.sweeps.cell_work import one_line
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from rislam_rt.errors import RislamError, StoreError
 from rislam_rt.pipeline.recordings.inputs import Inputs, dataset_to_inputs, inputs_to_dataset
 from rislam_rt.storage.files import MARK
 from rislam_rt.storage.netcdf import Entry, read_dataset, variables, write_dataset
-from rislam_rt.studies.unseen.truth import Truth
+from rislam_rt.studies.score_card.truth import Truth
 
 TRUTH: dict[str, Entry] = {
     "position": (("time", "xyz"), "m", "midpoint of Tx and Rx"),

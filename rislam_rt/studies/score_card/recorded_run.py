@@ -13,9 +13,9 @@ from rislam_rt.pipeline.long.run import read_given, read_whole
 from rislam_rt.pipeline.recordings.inputs import Inputs
 from rislam_rt.pipeline.recordings.replay import Answers, answers_from_arrays, replay
 from rislam_rt.progress import Tell, tell_nobody
-from rislam_rt.studies.unseen.recording_file import Recording
-from rislam_rt.studies.unseen.score import score_run
-from rislam_rt.studies.unseen.truth import build_truth
+from rislam_rt.studies.score_card.recording_file import Recording
+from rislam_rt.studies.score_card.score import score_run
+from rislam_rt.studies.score_card.truth import build_truth
 
 APART = 1e-6
 """[m] Distance between a run's estimates and those of its replay from which on the replay is another estimator's."""

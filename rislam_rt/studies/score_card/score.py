@@ -1,4 +1,4 @@
-"""Scores of one estimator in one unseen room: RMSE over its bound, NEES, divergence, walls, landmarks, births."""
+"""Score card of one estimator in one run: RMSE over its bound, NEES, divergence, walls, landmarks, births."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from rislam_rt.pipeline.recordings.replay import Answers
 from rislam_rt.pipeline.scores.audible_paths import heard_long
 from rislam_rt.pipeline.scores.summary import NEAR_LANDMARK
 from rislam_rt.pipeline.scores.true_loss import lost_scores
-from rislam_rt.studies.unseen.truth import Truth
+from rislam_rt.studies.score_card.truth import Truth
 
 SETTLED = 10.0
 """[s] Time after which the RMSE is computed once more, when landmarks have been born."""
@@ -30,7 +30,7 @@ OVER_TIME = ("wall_delay_s", "point_delay_s", "panel_delay_s", "births", "births
 
 
 def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
-    """Score the estimates of one run, in an unseen room or another, against its truth: RMSE, bounds, NEES, divergence,
+    """Score card of the estimates of one run against its truth: RMSE, bounds, NEES, divergence,
     walls, landmarks, births.
 
     None where there is nothing to score, and of delays and births where the last map alone is known. Relative errors
@@ -73,7 +73,7 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
 
 
 def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Floats) -> dict[str, Any]:
-    """Scores of walls in an unseen room: how many detectable ones the map has, errors, delays, ghost walls."""
+    """Score card of walls: how many detectable ones the map has, errors, delays, ghost walls."""
     heard, walls = heard_long(truth.wall_audible, time), truth.walls(told)
     first = np.full(len(heard), -1)
     match = np.full(len(heard), -1)
@@ -97,7 +97,7 @@ def wall_scores(truth: Truth, maps: list[MapEstimate], time: Floats, told: Float
 
 
 def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Floats) -> dict[str, Any]:
-    """Scores of landmarks in an unseen room: how many detectable ones the last map has, errors and delays, ghost
+    """Score card of landmarks: how many detectable ones the last map has, errors and delays, ghost
     points, GOSPA."""
     there = truth.landmark[: len(truth.landmark) - (truth.panel if inputs.panel is None else 0)]
     audible = truth.landmark_audible[:, : len(there)]
@@ -122,7 +122,7 @@ def point_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Fl
 
 
 def panel_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Floats) -> dict[str, Any]:
-    """Scores of the panel in an unseen room: whether it is detectable, whether the last map has it, and the delay.
+    """Score card of the panel: whether it is detectable, whether the last map has it, and the delay.
 
     The map has it where the landmark that it holds for it lies within `NEAR_POINT` of it. A second landmark in the same
     place, which may be nearer, does not change that. Of several panels all that are detectable have to be found; the
@@ -171,13 +171,13 @@ def kind_scores(truth: Truth, maps: list[MapEstimate], answers: Answers) -> dict
 
 
 def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
-    """Score in an unseen room: position RMSE [m], RMS posterior bound and their ratio, by name."""
+    """Score card: position RMSE [m], RMS posterior bound and their ratio, by name."""
     rmse, least = evaluate.root_mean_square(errors), evaluate.root_mean_square(bound)
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
 def _nees(offset: Floats, covariance: Floats, count: int) -> float | None:
-    """Score in an unseen room: mean NEES of the absolute position error (K, 3) [m] along the first `count` axes over
+    """Score card: mean NEES of the absolute position error (K, 3) [m] along the first `count` axes over
     the cycles, per degree of freedom; None if none of them is filtered."""
     axes = np.flatnonzero(np.einsum("kii->ki", covariance[:, :count, :count]).min(axis=0) > 0.0)
     if not len(axes):
@@ -187,12 +187,12 @@ def _nees(offset: Floats, covariance: Floats, count: int) -> float | None:
 
 
 def _delay(first: Integers, audible: Booleans, time: Floats) -> float | None:
-    """Score in an unseen room: median time [s] from the first cycle in which a landmark or wall is detectable to the
+    """Score card: median time [s] from the first cycle in which a landmark or wall is detectable to the
     first that maps it."""
     known = (first >= 0) & audible.any(axis=0)
     return _median(time[first[known]] - time[np.argmax(audible[:, known], axis=0)])
 
 
 def _median(values: Floats) -> float | None:
-    """Median of a score in an unseen room; None of no values."""
+    """Median of a score; None of no values."""
     return float(np.median(values)) if len(values) else None

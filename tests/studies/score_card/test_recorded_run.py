@@ -20,8 +20,8 @@ from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import find_pipeline, find_room
-from rislam_rt.studies.unseen import recorded_run
-from rislam_rt.studies.unseen.score import OVER_TIME
+from rislam_rt.studies.score_card import recorded_run
+from rislam_rt.studies.score_card.score import OVER_TIME
 
 CYCLES = 14
 """The first births come in the twelfth cycle."""

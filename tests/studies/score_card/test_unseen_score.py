@@ -10,8 +10,8 @@ from rislam_rt.model import Body, MapEstimate, Measurement, PathKind, RisSpec, S
 from rislam_rt.pipeline.recordings.replay import Answers, Inputs, answers_from_arrays
 from rislam_rt.pipeline.scores.true_loss import lost_scores
 from rislam_rt.slam import StartPrior
-from rislam_rt.studies.unseen.score import OVER_TIME, score_run
-from rislam_rt.studies.unseen.truth import Truth
+from rislam_rt.studies.score_card.score import OVER_TIME, score_run
+from rislam_rt.studies.score_card.truth import Truth
 
 K = 150
 TIME = 0.1 * np.arange(K)
