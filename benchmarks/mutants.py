@@ -31,7 +31,7 @@ PARTS = (
 ALSO = ("pyproject.toml", "mkdocs.yml", ".ci", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "requirements.lock")
 LEFT_OUT = ("tests/rules", "tests/test_mutants.py")
 """They read the code's text, so that they would notice the edit and not what it does."""
-SLOW = ("tests/slam", "tests/cli", "tests/studies/unseen", "tests/pipeline/long")
+SLOW = ("tests/slam", "tests/cli", "tests/studies/unseen", "tests/studies/score_card", "tests/pipeline/long")
 """Last of those that no mutant names."""
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 

@@ -141,6 +141,8 @@ def _parallel_pairs(normal: Floats, offset: Floats, corner: Floats, gap: float) 
 
 def _joint_planes(pairs: list[CoplanarPair], area: Floats) -> Integers:
     """Number (W,) of the largest wall among all coplanar walls that overlapping pairs connect with each wall."""
+    if not pairs:
+        return np.arange(len(area))
     part = connected(np.array([pair[:2] for pair in pairs], dtype=np.int64).reshape(-1, 2), len(area))
     largest = np.argsort(-area, kind="stable")  # first, of two alike the one with the lower number
     return largest[np.unique(part[largest], return_index=True)[1]][part]

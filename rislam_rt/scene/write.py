@@ -22,7 +22,8 @@ from rislam_rt.toml import parse_toml, toml_bytes
 TRAJECTORY_FILE = "path.tum"
 """Name of the agent's path in a scene folder."""
 MADE = re.compile(
-    r"(Made|Written) by `(rislam-rt new |python tools/build_scenes\.py )|`rislam-rt new ROOM --from scene\.xml` brings"
+    r"(Made|Written) by `(rislam-rt new[ `]|python tools/build_scenes\.py )"
+    r"|`rislam-rt new ROOM --from scene\.xml` brings"
 )
 """Line in the README of a room that this program wrote, by which its folder is recognised."""
 

@@ -73,4 +73,6 @@ def check_size(diagonal: float, units: str | None) -> None:
     mend = f"give {words}, or --units m if it is meant" if words else "give --units mm, cm, m or in"
     if not words and diagonal < SMALLEST_ROOM:
         mend += "; degrees of longitude and latitude have to be projected to metres first"
+    if diagonal * UNITS["mm"] > LARGEST_ROOM:
+        mend = "no unit makes a room of it: mend the coordinates that lie far off"
     raise Fault(f"in metres it would measure {diagonal:.4g} m across", mend)

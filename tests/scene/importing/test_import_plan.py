@@ -129,8 +129,8 @@ def test_thick_walls_have_frames(tmp_path: Path) -> None:
     ("corners", "says"),
     [
         ("0,0 4,0", "2 corners"), ("0,0 4,4 4,0 0,4", "crosses itself"), ("0,0 4,0 x,3", "is no corner"),
-        ("", "0 corners"), ("0,0 1e9,0 4,3", "measure 1e.09 m across"), ("0,0 1e30,0 4,3", "beyond 100 km"),
-        ("0,0 nan,0 4,3", "not finite"),
+        ("", "0 corners"), ("0,0 1e9,0 4,3", "measure 1e.09 m across; no unit makes a room"),
+        ("0,0 1e30,0 4,3", "beyond 100 km"), ("0,0 nan,0 4,3", "not finite"),
         ("0,0 400,0 400,300 0,300", "--floorplan: in metres it would measure 500 m across; give --units cm"),
         ("0,0 0.2,0 0.2,2 0,2", "no free place"),
     ],
