@@ -155,5 +155,5 @@ def _found(entry: Mapping[str, Any], name: str, share: str, digits: int = 3) -> 
 
 def _since(entry: Mapping[str, Any]) -> str:
     """Table cell of the study in many rooms: when the map first held the panel, and when a path over it was audible."""
-    held, audible = (entry.get(f"ris_{name}_s") for name in ("identified", "audible"))
+    held, audible = entry["ris_identified_s"], entry["ris_audible_s"]
     return "-" if audible is None else f"{'never' if held is None else f'{held:.1f}'} ({audible:.1f})"
