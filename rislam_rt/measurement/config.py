@@ -15,7 +15,7 @@ Threshold = Annotated[float, Ge(2.0), Le(60.0)]
 detected."""
 Bounded = Annotated[float, Ge(0.0), Le(1e12)]
 """Number of 0 or more whose square float64 carries."""
-Delay = Annotated[float, Ge(0.0), Le(1.0)]
+Delay = Annotated[float, Ge(-1e-6), Le(1.0)]
 """[s] A delay of 1 s is beyond every scene."""
 LEAST_RATE = 1e-100
 """Smallest false-alarm rate above 0 [components a cycle]: float64 cannot tell a threshold for fewer."""
@@ -56,7 +56,7 @@ class ReceiverConfig:
     top_speed: Bounded = 0.5
     """Largest speed of the agent [m/s] assumed for the paths that motion leaves in the difference of two codes."""
     min_delay: Delay = 0.0
-    """Components before this delay [s] are not reported."""
+    """Components before this delay [s] are not reported; below 0 where the Rx clock may be ahead of the Tx clock."""
     max_delay: Annotated[float, Gt(0.0), Le(1.0)] = 80e-9
     """Components after this delay [s] are not reported."""
     false_alarm_rate: Bounded = 0.0

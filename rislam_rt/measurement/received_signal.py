@@ -22,7 +22,8 @@ FEWEST_TONES = 16
 
 
 def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
-    """Number M of tones of a sounding: as set, or the power of two that leaves a quarter period after the last delay.
+    """Number M of tones of a sounding: as set, or the power of two that leaves a quarter period beside the delays
+    that are looked for.
 
     Raises
     ------
@@ -31,7 +32,7 @@ def num_tones(radio: RadioConfig, config: ReceiverConfig) -> int:
     """
     if config.num_subcarriers:
         return config.num_subcarriers
-    needed = max(SPARE * radio.bandwidth * config.max_delay, FEWEST_TONES)
+    needed = max(SPARE * radio.bandwidth * (config.max_delay - min(config.min_delay, 0.0)), FEWEST_TONES)
     count = int(2 ** np.ceil(np.log2(needed)))
     if count > MOST_TONES:
         raise ConfigError(

@@ -157,10 +157,16 @@ def perceived_paths(
         level, tilt = rotation_z(motion.heading), _rotations(np.radians(told.tilt_deg) + sway[:, 0], sway[:, 1])
         arrival = arrival @ np.swapaxes(level @ np.swapaxes(tilt, -1, -2) @ np.swapaxes(level, -1, -2), -1, -2)
     if told.clock_offset_ns or told.clock_drift_ns_s:
-        elapsed = motion.time - (motion.time[0] if since is None else since)
-        late = 1e-9 * (told.clock_offset_ns + told.clock_drift_ns_s * elapsed)
+        late = clock_lateness(motion.time, told, since)
         tau = np.where(paths.valid, tau + late[:, None], tau)
     return replace(paths, arrival=arrival, tau=tau)
+
+
+def clock_lateness(time: Floats, told: AssumedSection, since: float | None = None) -> Floats:
+    """Delay (K,) [s] that clocks apart, of which the assumed model knows nothing, add to every path at `time` (K,) [s];
+    they drift from the time `since` on, the first if it is not given."""
+    elapsed = time - (time[0] if since is None else since)
+    return np.asarray(1e-9 * (told.clock_offset_ns + told.clock_drift_ns_s * elapsed))
 
 
 def _rotations(pitch: Floats, roll: Floats) -> Floats:

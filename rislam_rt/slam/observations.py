@@ -51,9 +51,12 @@ class Observations(NamedTuple):
         return Observations._make(None if field is None else field[rows] for field in self)
 
 
-def observations_of(measurement: Measurement, radio: RadioConfig) -> Observations:
-    """Observations in the filter's units of a measurement; nothing stays infinite, no standard deviation zero."""
-    length = np.clip(SPEED_OF_LIGHT * measurement.tau, 0.0, FAR)
+def observations_of(measurement: Measurement, radio: RadioConfig, body: Body) -> Observations:
+    """Observations in the filter's units of a measurement; nothing stays infinite, no standard deviation zero.
+
+    Where the clocks of Tx and Rx are apart, lengths are counted from the direct path.
+    """
+    length = np.clip(SPEED_OF_LIGHT * measurement.tau - clock_offset(measurement, radio, body), 0.0, FAR)
     amplitude = np.clip(measurement.amplitude, 1e-30, 1e30)
     free = np.exp(free_space(radio)) / np.maximum(length, 1e-3)
     std = np.concatenate([SPEED_OF_LIGHT * measurement.tau_std[:, None], measurement.cosines_std], axis=1)
@@ -100,7 +103,29 @@ def free_space(radio: RadioConfig) -> float:
     return float(np.log(radio.wavelength * np.sqrt(radio.tx_gain * radio.rx_gain) / (4.0 * np.pi)))
 
 
+def clock_offset(measurement: Measurement, radio: RadioConfig, body: Body) -> float:
+    """Length [m] by which all paths of a measurement seem longer because the clocks of Tx and Rx are apart, by what its
+    direct path seems longer than the baseline; 0 if that is as likely for one clock, or no direct path is heard.
+
+    The direct path is the first that is louder than any mirror's return could be (`LOS_MARGIN`), whatever its delay.
+    That the clocks are apart is rare beforehand, and then by any length within which things are looked for.
+    """
+    baseline = _baseline(body)
+    loud = np.flatnonzero(measurement.amplitude * (baseline + LOS_MARGIN) > np.exp(free_space(radio)))
+    if not len(loud):
+        return 0.0
+    first = loud[np.argmin(measurement.tau[loud])]
+    std = float(np.clip(SPEED_OF_LIGHT * measurement.tau_std[first], 1e-5, FAR))
+    late = float(SPEED_OF_LIGHT * measurement.tau[first]) - baseline
+    log_one = -0.5 * (late / std) ** 2 - np.log(np.sqrt(2.0 * np.pi) * std)
+    return late if CONSTANTS.log_rare - np.log(2.0 * CONSTANTS.size) > log_one else 0.0
+
+
 def is_los(observations: Observations, body: Body) -> Booleans:
     """Whether each observed component (M,) is the direct path: no longer than the body's baseline from Tx to Rx."""
-    baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
-    return observations.seen[:, 0] < baseline + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)
+    return observations.seen[:, 0] < _baseline(body) + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)
+
+
+def _baseline(body: Body) -> float:
+    """Length [m] of the direct path from Tx to Rx."""
+    return float(np.linalg.norm(body.tx_offset - body.rx_offset))

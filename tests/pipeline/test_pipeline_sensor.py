@@ -105,7 +105,7 @@ def test_filter_and_rival_expect_the_false_components_that_the_receiver_makes(ra
     # 400 cycles of a Poisson rate
     assert count == pytest.approx(rate, abs=5.0 * np.sqrt(rate / 400))
     # the mean of one over the density of what is drawn is the volume that it is drawn from, over the rate
-    glances = [observations_of(m, radio) for m in false]
+    glances = [observations_of(m, radio, Body()) for m in false]
     inverse = np.concatenate([1.0 / stranger_density(g, sensor, 0.0) for g in glances])
     level = 0.5 * np.log(sensor.threshold)
     strong = np.concatenate([g.log_amplitude for g in glances]) - 0.5 * np.log(radio.integrated_snr(np.ones(1)))

@@ -29,7 +29,7 @@ class MatchedFilterGrid(NamedTuple):
     antennas: Complexes
     """(G, L) conjugate antenna vectors, in single precision: the grid only says where to look."""
     delays: Integers
-    """(T,) indices of delays within the window, in steps of 1 / `OVERSAMPLING` cells."""
+    """(T,) indices of delays within the window, in steps of 1 / `OVERSAMPLING` cells, modulo the period."""
     tones: int
     """Length of the Fourier transform over tones: `OVERSAMPLING` times their number."""
     places: tuple[Floats, Floats, Floats]
@@ -76,12 +76,16 @@ def pick_peaks(
     picked: list[Floats] = []
     output = spectrum(grid, residual)
     lowest = GRID_LOSS * threshold * sounding.num_samples
+    first = int(
+        np.floor(window[0] * OVERSAMPLING)
+    )  # the transform repeats after a period, the window may begin below 0
+    delays = ((grid.delays - first) % grid.tones + first) / OVERSAMPLING
     while len(picked) < most:
         power = output.real**2 + output.imag**2
         best = np.unravel_index(np.argmax(power), power.shape)
         if power[best] < lowest:
             break
-        start = np.array([grid.delays[best[1]] / OVERSAMPLING, *grid.cosines[best[0]]])
+        start = np.array([delays[best[1]], *grid.cosines[best[0]]])
         parameters, matched, antennas, tones = _climb(grid, start, residual, window)
         snr = abs(matched) ** 2 / sounding.num_samples
         if snr < threshold:

@@ -217,7 +217,10 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
                 f"{LONGEST_DELAY:g} (were these nanoseconds, or metres?)"
             )
         if (one.tau < 0.0).any():  # 0: a false component at the edge of a receiver's window
-            raise ConfigError(f"{where}: delay of {one.tau.min():g} s received; give none below 0")
+            raise ConfigError(
+                f"{where}: delay of {one.tau.min():g} s received; give none below 0 (or add as much to all of its "
+                "cycle: with the direct path among them lengths are counted from that)"
+            )
         reach = np.abs(one.cosines).max(initial=0.0)
         if reach > 1.0:
             raise ConfigError(f"{where}: cosine of {reach:g} received; give {cosine_wanted(reach)}")

@@ -1,4 +1,5 @@
-"""Late paths of a room: heard paths that come in beyond the receiver's window of delays, and the setting that mends it.
+"""Late paths of a room: heard paths that come in beyond the receiver's window of delays, or a direct path that a clock
+brings in before it, and the setting that mends it.
 
 No measurement tells of them: what the window cuts off is not reported, and what is later than the period of the
 sounding is reported as if it were shorter.
@@ -10,15 +11,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans
+from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.input_messages import share_text
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.measurement.config import MOST_TONES
 from rislam_rt.measurement.received_signal import SPARE, num_tones
 from rislam_rt.model import PathKind, Paths, RadioConfig
+from rislam_rt.pipeline.assumed_model import clock_lateness
 from rislam_rt.pipeline.scores.audible_paths import audible_paths
-from rislam_rt.pipeline.specification.pipeline_spec import Settings
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings
 from rislam_rt.scene.findings import Finding, warning_at
 
 STEP = 1e-8
@@ -49,6 +51,23 @@ def late_path_warnings(paths: Paths, settings: Settings, file: str) -> Iterator[
         message += f"; returns of {', '.join(walls[:MOST_NAMES])}{' and more' if len(walls) > MOST_NAMES else ''} are "
         message += "among them"
     yield warning_at(file, "receiver.max_delay", message, _mend(settings.radio, settings.receiver, latest))
+
+
+def early_path_warnings(paths: Paths, time: Floats, spec: PipelineSpec, file: str) -> Iterator[Finding]:
+    """Warning, one for a run of cycles at `time` (K,) [s], of a direct path that the told error of the clocks brings in
+    before the late paths' window begins: from there on no estimator can tell how far they are apart."""
+    direct = paths.valid & (paths.kind == PathKind.LOS)
+    late = clock_lateness(time, spec.told)
+    early, begin = np.where(direct, paths.tau, np.inf).min(axis=1) + late, spec.receiver.min_delay
+    if not late.any() or early.min() >= begin:
+        return
+    first = time[np.argmax(early < begin)] - time[0]
+    message = (
+        f"from {first:.3g} s on the direct path comes in before {1e9 * begin:g} ns, as [told] has the clocks of Tx and "
+        "Rx run, and is not reported: no estimator counts lengths from it"
+    )
+    delay = STEP * float(np.floor(early.min() / STEP))
+    yield warning_at(file, "receiver.min_delay", message, f"give receiver.min_delay = {delay:.9g}")
 
 
 def _walls(paths: Paths, late: Booleans) -> list[str]:

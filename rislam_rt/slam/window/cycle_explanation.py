@@ -55,7 +55,7 @@ class HeardCycle(NamedTuple):
 def components_to_explain(measurement: Measurement, scene: KnownEnvironment) -> HeardCycle:
     """Select a measurement's components that need an explanation, without direct path and echoes, sorted by delay and
     direction so that nothing hangs on their order."""
-    observed = observations_of(measurement, scene.radio)
+    observed = observations_of(measurement, scene.radio, scene.body)
     landmark = np.where(is_los(observed, scene.body), REMOVED, UNUSED)
     order = np.lexsort(observed.seen.T[::-1])
     free = order[landmark[order] == UNUSED]

@@ -11,7 +11,8 @@ from rislam_rt.adviser import forecast_codes, link_budget
 from rislam_rt.adviser.link_budget import survey
 from rislam_rt.cli.app import app
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.room.late_paths import late_path_warnings
+from rislam_rt.pipeline.room.late_paths import early_path_warnings, late_path_warnings
+from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.scene import load_scene
 
@@ -91,3 +92,41 @@ def test_check_warns_of_them_and_counts_the_warning(monkeypatch: pytest.MonkeyPa
     assert "0 errors, 2 warnings" in shown
     small = CliRunner().invoke(app, ["check", str(ROOT / "scenes" / "empty_box")]).output
     assert "receiver.max_delay" not in small
+
+
+@pytest.mark.parametrize(("offset", "drift", "first"), [(-0.4, 0.0, "0 s"), (0.0, -1.0, "0.4 s"), (0.1, -1.0, "0.5 s")])
+def test_clocks_that_hide_the_direct_path_are_named_with_what_mends_it(offset: float, drift: float, first: str) -> None:
+    """The direct path of 0.1 m takes 0.33 ns."""
+    changed = (*SHORT, "cycles=20", f"told.clock_offset_ns={offset}", f"told.clock_drift_ns_s={drift}")
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed)
+    setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
+    time = setup.scene.agent.time
+    (line,) = (finding.line for finding in early_path_warnings(setup.paths, time, spec, "scene.toml"))
+    assert line.startswith(f"scene.toml: receiver.min_delay: from {first} on the direct path comes in before 0 ns")
+    mended = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*changed, *advised(line)))
+    assert not list(early_path_warnings(setup.paths, time, mended, "scene.toml"))
+
+
+@pytest.mark.parametrize("told", ["clock_offset_ns=-0.3", "clock_drift_ns_s=0.1", "tilt_deg=1.0"])
+def test_a_direct_path_that_is_heard_is_not_warned_of(told: str) -> None:
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*SHORT, f"told.{told}"))
+    setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
+    assert not list(early_path_warnings(setup.paths, setup.scene.agent.time, spec, "scene.toml"))
+
+
+@pytest.mark.parametrize("scheme", ["optimized", "bp_slam_aoa", "channel_slam"])
+@pytest.mark.parametrize("estimator", ["bound", "waveform"])
+def test_clocks_apart_cost_no_estimator_anything(scheme: str, estimator: str) -> None:
+    """Lengths counted from the direct path, whichever clock is ahead: the same estimates but for its 7 um."""
+    plain = ["channel=image_source", "cycles=12", f'schemes=["{scheme}"]', f"receiver.estimator={estimator}"]
+    apart = "told.clock_offset_ns=-2.0", "told.clock_drift_ns_s=-1.0", "receiver.min_delay=-1e-8"
+    found = [
+        run_slam(
+            room_in(PAPER),
+            load_spec(ROOT / "pipelines" / "trace_then_slam.toml", [*plain, *more]),
+            rng=np.random.default_rng(3),
+        )
+        for more in ((apart[2],), apart)
+    ]
+    one, other = (each.schemes[scheme].position for each in found)
+    assert np.abs(one - other).max() < 1e-3

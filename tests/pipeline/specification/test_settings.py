@@ -55,7 +55,7 @@ def test_no_setting_is_left_out() -> None:
         ("channel", "traced", "one of traced, image_source", ""),
         # What follows are the fields of records.
         ("receiver.converter_bits", 0, "at least 0, at most 32", ""),
-        ("receiver.min_delay", 0.0, "at least 0, at most 1", ""),
+        ("receiver.min_delay", 0.0, "at least -1e-06, at most 1", ""),
         ("receiver.max_delay", 80e-9, "above 0, at most 1", ""),
         ("design.population", 50, "at least 2", ""),
         ("design.elite", 10, "at least 0", ""),

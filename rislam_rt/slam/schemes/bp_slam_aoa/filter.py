@@ -139,7 +139,7 @@ def estimate(state: BpSlamAoaState, config: BpSlamAoaConfig) -> SlamEstimate:
 def _scan(state: BpSlamAoaState, measurement: Measurement, config: BpSlamAoaConfig) -> tuple[ComponentScan, Integers]:
     """Components that BP-SLAM with angles uses (no direct path, no wall returns set aside), and their rows (M,)."""
     sensor = state.sensor
-    observed = observations_of(measurement, sensor.radio)
+    observed = observations_of(measurement, sensor.radio, state.body)
     aside = is_los(observed, state.body) | is_strong(observed.ratio, None if config.use_vt else config.specular_ratio)
     rows = np.flatnonzero(~aside)
     observed = observed.take(rows)

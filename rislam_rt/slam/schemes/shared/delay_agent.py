@@ -68,7 +68,7 @@ def hear_ranges(
 
     The direct path is left out; wall returns too, with `config.planes` False.
     """
-    observed = observations_of(measurement, agent.sensor.radio)
+    observed = observations_of(measurement, agent.sensor.radio, agent.body)
     strong, free = is_strong(observed.ratio, config.specular_ratio), ~is_los(observed, agent.body)
     rows = np.flatnonzero(free if config.planes else free & ~strong)
     scan = Scan(observed.seen[rows, 0], np.maximum(observed.std[rows, 0], config.smallest_std))
