@@ -56,7 +56,8 @@ def observations_of(measurement: Measurement, radio: RadioConfig, body: Body) ->
 
     Where the clocks of Tx and Rx are apart, lengths are counted from the direct path.
     """
-    length = np.clip(SPEED_OF_LIGHT * measurement.tau - clock_offset(measurement, radio, body), 0.0, FAR)
+    length = np.clip(SPEED_OF_LIGHT * measurement.tau, -FAR, FAR) - clock_offset(measurement, radio, body)
+    length = np.clip(length, 0.0, FAR)
     amplitude = np.clip(measurement.amplitude, 1e-30, 1e30)
     free = np.exp(free_space(radio)) / np.maximum(length, 1e-3)
     std = np.concatenate([SPEED_OF_LIGHT * measurement.tau_std[:, None], measurement.cosines_std], axis=1)
@@ -111,7 +112,8 @@ def clock_offset(measurement: Measurement, radio: RadioConfig, body: Body) -> fl
     That the clocks are apart is rare beforehand, and then by any length within which things are looked for.
     """
     baseline = _baseline(body)
-    loud = np.flatnonzero(measurement.amplitude * (baseline + LOS_MARGIN) > np.exp(free_space(radio)))
+    loud = measurement.amplitude * (baseline + LOS_MARGIN) > np.exp(free_space(radio))
+    loud = np.flatnonzero(loud & (np.abs(measurement.tau) < FAR / SPEED_OF_LIGHT))
     if not len(loud):
         return 0.0
     first = loud[np.argmin(measurement.tau[loud])]
