@@ -46,7 +46,7 @@ class Recording(NamedTuple):
     """Scores of the scheme's own estimator."""
 
 
-def write_recording(recording: Recording, path: Path) -> None:
+def write_recording(recording: Recording, path: str | Path) -> None:
     """Write a recorded run to a NetCDF file, whole or not at all: `INPUTS`, `TRUTH` with names from `true_` on, the
     rest as attributes.
 
@@ -55,6 +55,7 @@ def write_recording(recording: Recording, path: Path) -> None:
     StoreError
         The disk refused.
     """
+    path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
