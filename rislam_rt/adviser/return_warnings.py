@@ -1,4 +1,5 @@
-"""Warnings of wall returns that a filter may take for others, before a run: cancelled, merged, of parallel fronts."""
+"""Warnings of wall returns that a filter may take for others, before a run: cancelled, merged, of parallel fronts, of
+curved walls."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -6,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from rislam_rt.adviser.link_budget import Survey
-from rislam_rt.arrays import Booleans, Integers, take_rows
-from rislam_rt.channel.walls import build_walls
+from rislam_rt.arrays import Booleans, Floats, Integers, take_rows
+from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
@@ -30,6 +31,11 @@ WIDEST = 10
 LEAST, SWERVE = 0.005, 0.125
 """Distances [m] between two fronts from which and up to which one is taken for the other, to an agent's harm: a wall is
 known to millimetres, and in half a second an agent gets aside so far, at 1 m/s^2."""
+FACETS = 3
+"""Facets heard, each beside one to which it turns by little, from which on a wall is curved, and has no single kink."""
+BEND = np.deg2rad(15.0)
+"""Angle [rad] between facets of a curved wall from which on the filter tells them apart: in galleries of facets of 15,
+20 and 30 degrees it errs by a centimetre, of 10, 7.5 and 5 degrees it is lost (docs/slam_measured.md)."""
 PARALLEL = np.deg2rad(1.0)
 """Angle [rad] up to which two fronts are parallel: their returns come from directions closer than an array tells."""
 
@@ -41,6 +47,7 @@ def return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
         yield from cancelled_return_warnings(looked, file)
         yield from merged_return_warnings(looked, file)
         yield from parallel_front_warnings(looked, file)
+        yield from curved_wall_warnings(looked, file)
 
 
 def cancelled_return_warnings(looked: Survey, file: str) -> Iterator[Finding]:
@@ -166,17 +173,11 @@ def parallel_front_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     A board before a wall, a door in its frame or cupboards in a row throw signals back from the same direction. Where
     the return of one ends and that of the other begins, its length changes as if the agent had stepped aside.
     """
-    paths, settings, walls = looked.paths, looked.settings, build_walls(looked.scene)
-    lone = single_returns(paths)
-    heard = audible_paths(paths, settings, use_vt=True)[:, lone]
-    lone, heard = lone[heard.any(axis=0)], heard[:, heard.any(axis=0)]
-    if not len(lone):
+    walls = build_walls(looked.scene)
+    wall, facing = _heard_fronts(looked, walls)
+    if not len(wall):
         return
-    wall = np.maximum(paths.tx_walls[lone].max(axis=1), paths.rx_walls[lone].max(axis=1))
     middle = np.array([walls.surface(int(each))[0] for each in wall]).reshape(-1, 3)
-    away = looked.scene.agent.position @ walls.normal[wall].T - walls.offset[wall]
-    away = np.where(heard, away, 0.0).sum(axis=0) / heard.sum(axis=0)  # where each is heard
-    facing = np.sign(away)[:, None] * walls.normal[wall]
     gap = np.abs(np.vecdot(facing[:, None], middle[:, None] - middle))  # of each wall's plane from the others' middles
     alike = (facing @ facing.T > np.cos(PARALLEL)) & (walls.plane[wall][:, None] != walls.plane[wall])
     gap = np.where(alike & (gap >= LEAST) & (gap <= SWERVE), gap, 0.0)
@@ -193,3 +194,49 @@ def parallel_front_warnings(looked: Survey, file: str) -> Iterator[Finding]:
         f"the other, and be {apart} off from there on",
         "where that matters, leave out the one that matters less, or lead the way past one of them alone",
     )  # fmt: skip
+
+
+def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
+    """Warning, one for a room, of curved walls: `FACETS` facets or more that are heard along the way turn, each to one
+    beside it, by less than `BEND`, and all together by more; `file` is what it names as its place.
+
+    Where an agent goes past the edge of two facets they are equally far, their returns come out as one that turns from
+    one direction into the other, and from then on the new facet passes for the old one.
+    """
+    walls = build_walls(looked.scene)
+    wall, facing = _heard_fronts(looked, walls)
+    if len(wall) < FACETS:
+        return
+    turn = np.arccos(np.clip(facing @ facing.T, -1.0, 1.0))
+    corners = [{tuple(corner) for corner in _corners(walls, int(each))} for each in wall]
+    beside = np.array([[len(one & other) >= 2 for other in corners] for one in corners]).reshape(turn.shape)
+    slight = beside & (turn > PARALLEL) & (turn < BEND - PARALLEL)
+    facets = np.flatnonzero(slight.any(axis=0))
+    if len(facets) < FACETS or turn[np.ix_(facets, facets)].max() < BEND:
+        return
+    sizes = np.rad2deg(turn[slight])
+    by = f"{sizes.min():.2g}" + (f" to {sizes.max():.2g}" if sizes.max() > 1.01 * sizes.min() else "")
+    yield warning_at(
+        file, "reflector",
+        f"'{walls.names[wall[facets[0]]]}' and {counted(len(facets) - 1, 'other facet')} of curved walls heard along "
+        f"the way turn by {by} degrees from one to the next: the filter may take the return of one for the next "
+        "one's, and be lost without saying so",
+        f"give a curved wall by facets that turn by {np.rad2deg(BEND):.0f} degrees or more",
+    )  # fmt: skip
+
+
+def _corners(walls: Walls, wall: int) -> Floats:
+    """Corners (C, 3) of a wall's triangles for warnings of returns, to a tenth of a millimetre."""
+    return np.unique(np.round(walls.triangles[walls.wall_of_triangle == wall].reshape(-1, 3), 4) + 0.0, axis=0)
+
+
+def _heard_fronts(looked: Survey, walls: Walls) -> tuple[Integers, Floats]:
+    """Walls (N,) whose single returns are heard along the way, for warnings of these, and their unit normals (N, 3) on
+    the side of the agent where each is heard."""
+    paths, lone = looked.paths, single_returns(looked.paths)
+    heard = audible_paths(paths, looked.settings, use_vt=True)[:, lone]
+    lone, heard = lone[heard.any(axis=0)], heard[:, heard.any(axis=0)]
+    wall = np.maximum(paths.tx_walls[lone].max(axis=1, initial=-1), paths.rx_walls[lone].max(axis=1, initial=-1))
+    away = looked.scene.agent.position @ walls.normal[wall].T - walls.offset[wall]
+    away = np.where(heard, away, 0.0).sum(axis=0) / heard.sum(axis=0)
+    return wall, np.sign(away)[:, None] * walls.normal[wall]

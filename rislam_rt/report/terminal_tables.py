@@ -24,10 +24,15 @@ if TYPE_CHECKING:
     from rislam_rt.sweeps import Row
 
 
+WHOLE_LABELS = 3
+"""Schemes of a run up to which a terminal of 80 columns has room for the labels of a table in one line each."""
+
+
 def print_summary(summary: Mapping[str, Any]) -> None:
     """Print the scores of a run as a table, a column for each scheme: RMSE of agent, landmarks and walls, bound."""
     title = f"{summary['pipeline']} in {summary['scene']}: {summary['cycles']} cycles, seed {summary['seed']}"
-    table = Table("RMSE", *(Column(name, justify="right") for name in summary["schemes"]))
+    label = Column("RMSE", no_wrap=len(summary["schemes"]) <= WHOLE_LABELS)
+    table = Table(label, *(Column(name, justify="right") for name in summary["schemes"]))
     for row in summary_rows(summary):
         table.add_row(*row)
     _show(title, table)
@@ -38,12 +43,17 @@ def summary_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     schemes = list(summary["schemes"].values())
     rows = [[label, *map(show, schemes)] for label, show in ERRORS.items()]
     for name in schemes[0]["landmarks"]:
-        rows.append([f"landmark {name}", *(_metres(s["landmarks"][name]["rmse_m"]) for s in schemes)])
+        rows.append([f"landmark {name}", *(_landmark(s["landmarks"][name]) for s in schemes)])
     rows += [*_panel_rows(schemes), *_wall_rows(schemes)]
     rows += [[label, *map(show, schemes)] for label, show in SCORES.items()]
     if any(s["lost"]["times"] for s in schemes):
         rows.append(["because", *(words_of_loss(s["lost"]) if s["lost"]["times"] else "-" for s in schemes)])
     return rows
+
+
+def _landmark(entry: Mapping[str, Any]) -> str:
+    """Cell of a terminal table: error of a landmark; "-" for a panel where the scheme was told of none."""
+    return _metres(entry["rmse_m"], "-" if entry.get("identified_last", True) is None else "not found")
 
 
 def _panel_rows(schemes: Sequence[Mapping[str, Any]]) -> list[list[str]]:

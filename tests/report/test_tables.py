@@ -1,8 +1,10 @@
 """Rows of a run's table: every wall that is heard or found has one, the others share one."""
 
+import pytest
+
 from rislam_rt.pipeline.scores.loss_causes import unnoticed_lines
 from rislam_rt.pipeline.scores.true_loss import silent_loss_lines
-from rislam_rt.report.terminal_tables import summary_rows
+from rislam_rt.report.terminal_tables import print_summary, summary_rows
 
 FOUND = {"rmse_m": 0.01, "angle_deg": 0.1, "bound_m": 0.005, "audible_s": 7.0}
 MISSED = {"rmse_m": None, "angle_deg": None, "bound_m": 0.02, "audible_s": 2.0}
@@ -44,6 +46,33 @@ def test_walls_in_one_plane_are_one_and_a_wall_that_was_found_is_shown():
         ["wall near", "1.0 cm, 0.1°"],
         ["wall late", "1.0 cm, 0.1°"],
     ]
+
+
+def test_a_scheme_that_was_told_of_no_panel_did_not_miss_it():
+    """`identified_last` is None there; a scatterer, which every scheme looks for, has no such entry."""
+    entry = {"rmse_m": None, "identified_last": False}
+    one = _scheme() | {"landmarks": {"panel": entry, "ball": {"rmse_m": None}}}
+    other = _scheme() | {"landmarks": {"panel": entry | {"identified_last": None}, "ball": {"rmse_m": None}}}
+    rows = {label: cells for label, *cells in summary_rows({"schemes": {"optimized": one, "no_ris": other}})}
+    assert rows["landmark panel"] == ["not found", "-"]
+    assert rows["landmark ball"] == ["not found", "not found"]
+    assert rows["panel found"] == ["no", "-"]
+
+
+@pytest.mark.parametrize("schemes", [1, 2, 3])
+def test_labels_stay_in_one_line_beside_long_cells(schemes, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lost = _scheme() | {"true_loss": {"lost": True, "silent": True, "lost_at_s": 12.6}}
+    summary = {
+        "pipeline": "p",
+        "scene": "s",
+        "cycles": 10,
+        "seed": 1,
+        "schemes": {f"s{n}": lost for n in range(schemes)},
+    }
+    print_summary(summary)
+    printed = capsys.readouterr().out
+    assert all(f"│ {label} " in printed for label, *_ in summary_rows(summary))
 
 
 def test_a_run_in_slices_lists_what_it_found():
