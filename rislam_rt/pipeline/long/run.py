@@ -94,7 +94,7 @@ def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> L
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // slices.SHOWN)
-    late = late_warnings(scene, paths, spec)
+    late = late_warnings(replace(scene, agent=motion), paths, spec)
     lines = (*about["warnings"], *late, f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
     shown = run_folder.result_of_marker({**about, "warnings": lines}, replace(scene, agent=motion), paths, schemes)
     return LongRun(summary_table(shown, scores, len(scene.agent)), shown)

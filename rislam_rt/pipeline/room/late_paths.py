@@ -56,9 +56,9 @@ def late_path_warnings(paths: Paths, settings: Settings, file: str) -> Iterator[
 def early_path_warnings(paths: Paths, time: Floats, spec: PipelineSpec, file: str) -> Iterator[Finding]:
     """Warning, one for a run of cycles at `time` (K,) [s], of a direct path that the told error of the clocks brings in
     before the late paths' window begins: from there on no estimator can tell how far they are apart."""
-    direct = paths.valid & (paths.kind == PathKind.LOS)
-    late = clock_lateness(time, spec.told)
-    early, begin = np.where(direct, paths.tau, np.inf).min(axis=1) + late, spec.receiver.min_delay
+    direct, late = paths.valid & (paths.kind == PathKind.LOS), clock_lateness(time, spec.told)
+    early = np.where(direct, paths.tau, np.inf).min(axis=1, initial=np.inf) + late
+    begin = spec.receiver.min_delay
     if not late.any() or early.min() >= begin:
         return
     first = time[np.argmax(early < begin)] - time[0]

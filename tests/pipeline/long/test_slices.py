@@ -98,6 +98,16 @@ def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
     np.testing.assert_array_equal([one.position for one in answers.estimates], scheme.position)
 
 
+def test_warnings_of_a_run_of_which_figures_show_some_cycles(room, spec, short_slices, tmp_path, monkeypatch):
+    """Clocks that lose the direct path from the fifth cycle on: 0.33 ns of 0.1 m, at 1 ns a second."""
+    monkeypatch.setattr(slices, "SHOWN", 4)
+    told = spec.model_copy(update={"told": spec.told.model_copy(update={"clock_drift_ns_s": -1.0})})
+    found = lead(room, told, tmp_path / "run")
+    assert len(found.shown.scene.agent) == 4
+    (line,) = (line for line in found.shown.warnings if "receiver.min_delay" in line)
+    assert "from 0.4 s on the direct path comes in before 0 ns" in line
+
+
 def _cut(room):
     from rislam_rt.pipeline.run import cut_scene
 
