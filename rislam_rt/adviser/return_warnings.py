@@ -33,6 +33,8 @@ LEAST, SWERVE = 0.005, 0.125
 known to millimetres, and in half a second an agent gets aside so far, at 1 m/s^2."""
 FACETS = 3
 """Facets heard, each beside one to which it turns by little, from which on a wall is curved, and has no single kink."""
+JOINED = 1e-4
+"""[m] Distance up to which corners of facets are one."""
 BEND = np.deg2rad(15.0)
 """Angle [rad] between facets of a curved wall from which on the filter tells them apart: in galleries of facets of 15,
 20 and 30 degrees it errs by a centimetre, of 10, 7.5 and 5 degrees it is lost (docs/slam_measured.md)."""
@@ -207,14 +209,13 @@ def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     wall, facing = _heard_fronts(looked, walls)
     if len(wall) < FACETS:
         return
-    turn = np.arccos(np.clip(facing @ facing.T, -1.0, 1.0))
-    corners = [{tuple(corner) for corner in _corners(walls, int(each))} for each in wall]
-    beside = np.array([[len(one & other) >= 2 for other in corners] for one in corners]).reshape(turn.shape)
-    slight = beside & (turn > PARALLEL) & (turn < BEND - PARALLEL)
-    facets = np.flatnonzero(slight.any(axis=0))
-    if len(facets) < FACETS or turn[np.ix_(facets, facets)].max() < BEND:
+    places = np.round(walls.triangles.reshape(-1, 3) / JOINED)
+    corner = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    turns = [_slight_turn(walls, corner, int(each)) for each in wall]
+    facets = np.array([number for number, turn in enumerate(turns) if turn > 0.0], dtype=np.int64)
+    if len(facets) < FACETS or (facing[facets] @ facing[facets].T).min() > np.cos(BEND):
         return
-    sizes = np.rad2deg(turn[slight])
+    sizes = np.rad2deg([turns[number] for number in facets])
     by = f"{sizes.min():.2g}" + (f" to {sizes.max():.2g}" if sizes.max() > 1.01 * sizes.min() else "")
     yield warning_at(
         file, "reflector",
@@ -225,9 +226,14 @@ def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _corners(walls: Walls, wall: int) -> Floats:
-    """Corners (C, 3) of a wall's triangles for warnings of returns, to a tenth of a millimetre."""
-    return np.unique(np.round(walls.triangles[walls.wall_of_triangle == wall].reshape(-1, 3), 4) + 0.0, axis=0)
+def _slight_turn(walls: Walls, corner: Integers, wall: int) -> float:
+    """Angle [rad] by which a facet turns to the one beside it that it turns to least, for warnings of curved walls; 0
+    without any to which it turns by less than `BEND`. `corner` (T, 3) numbers the triangles' corners by their place."""
+    edge = np.isin(corner, corner[walls.wall_of_triangle == wall]).sum(axis=1) == 2
+    others = np.setdiff1d(walls.wall_of_triangle[edge], wall)
+    turn = np.arccos(np.clip(np.abs(walls.normal[others] @ walls.normal[wall]), 0.0, 1.0))
+    slight = turn[(turn < BEND - PARALLEL) & (turn > 0.0)]
+    return float(slight.min()) if len(slight) else 0.0
 
 
 def _heard_fronts(looked: Survey, walls: Walls) -> tuple[Integers, Floats]:

@@ -15,7 +15,9 @@ Threshold = Annotated[float, Ge(2.0), Le(60.0)]
 detected."""
 Bounded = Annotated[float, Ge(0.0), Le(1e12)]
 """Number of 0 or more whose square float64 carries."""
-Delay = Annotated[float, Ge(-1e-6), Le(1.0)]
+EARLIEST = -1e-6
+"""[s] Earliest delay from which on a receiver listens: the clocks are apart by a microsecond."""
+Delay = Annotated[float, Ge(EARLIEST), Le(1.0)]
 """[s] A delay of 1 s is beyond every scene."""
 LEAST_RATE = 1e-100
 """Smallest false-alarm rate above 0 [components a cycle]: float64 cannot tell a threshold for fewer."""

@@ -21,7 +21,7 @@ from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
-from rislam_rt.pipeline.room.late_paths import early_path_warnings, late_path_warnings
+from rislam_rt.pipeline.room.late_paths import direct_path_warnings, late_path_warnings
 from rislam_rt.pipeline.room.motion_warnings import motion_warnings
 from rislam_rt.pipeline.room.scene_overrides import change_room
 from rislam_rt.pipeline.room.true_motion import draw_looks, draw_motion
@@ -233,13 +233,13 @@ def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
 
 
 def late_warnings(scene: Scene, paths: Paths, spec: PipelineSpec) -> tuple[str, ...]:
-    """Warnings of a run, two lines at most: paths that come in later than the receiver hears, as `check` says, and a
-    direct path that comes in before."""
+    """Warnings of a run: paths that come in later than the receiver hears, as `check` says, and a direct path that is
+    earlier or later."""
     panels, place = (
         len(scene.panels) if any(SCHEMES[name].panel for name in spec.schemes) else 0,
         f"scene '{scene.name}'",
     )
-    early = early_path_warnings(paths, scene.agent.time, spec, place)
+    early = direct_path_warnings(paths, scene.agent.time, spec, place)
     return tuple(finding.line for finding in (*late_path_warnings(paths, build_settings(spec, panels), place), *early))
 
 

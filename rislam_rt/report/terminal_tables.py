@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rislam_rt.sweeps import Row
 
 
-WHOLE_LABELS = 3
+WHOLE_LABELS = 2
 """Schemes of a run up to which a terminal of 80 columns has room for the labels of a table in one line each."""
 
 

@@ -11,6 +11,9 @@ from rislam_rt.slam.model_constants import CONSTANTS
 
 LOS_MARGIN = 0.1
 """Length [m] beyond the baseline below which a component is the direct path: no landmark can be that near."""
+ASIDE = 0.1
+"""Difference of each cosine up to which a component arrives from where the Tx is: 6 degrees, for the body's tilt and
+what the array errs by."""
 FAR = 1e5
 """Length [m], and standard deviation of anything, that stands for an infinite one."""
 UNTOLD, OTHER, PANEL = -1, 0, 1
@@ -106,28 +109,27 @@ def free_space(radio: RadioConfig) -> float:
 
 def clock_offset(measurement: Measurement, radio: RadioConfig, body: Body) -> float:
     """Length [m] by which all paths of a measurement seem longer because the clocks of Tx and Rx are apart, by what its
-    direct path seems longer than the baseline; 0 if that is as likely for one clock, or no direct path is heard.
+    direct path seems longer than the baseline; 0 if that is as likely for one clock, or no direct path is known.
 
-    The direct path is the first that is louder than any mirror's return could be (`LOS_MARGIN`), whatever its delay.
-    That the clocks are apart is rare beforehand, and then by any length within which things are looked for.
+    It is known whatever its delay by where the Tx is (`ASIDE`) and as the only one so loud: half of free space over the
+    baseline at least. A saturated receiver makes several of it, of which none is. That the clocks are apart is rare
+    beforehand, and then by any length within which things are looked for.
     """
-    baseline = _baseline(body)
-    loud = measurement.amplitude * (baseline + LOS_MARGIN) > np.exp(free_space(radio))
-    loud = np.flatnonzero(loud & (np.abs(measurement.tau) < FAR / SPEED_OF_LIGHT))
-    if not len(loud):
+    span = body.tx_offset - body.rx_offset
+    baseline, period = float(np.linalg.norm(span)), 1.0 / radio.array.spacing
+    aside = measurement.cosines - span[:2] / baseline
+    aside -= np.round(aside / period) * period  # the array hears its two ends alike
+    direct = (np.abs(aside) < ASIDE).all(axis=1) & (np.abs(measurement.tau) < FAR / SPEED_OF_LIGHT)
+    direct &= measurement.amplitude * 2.0 * baseline > np.exp(free_space(radio))
+    if np.count_nonzero(direct) != 1:
         return 0.0
-    first = loud[np.argmin(measurement.tau[loud])]
-    std = float(np.clip(SPEED_OF_LIGHT * measurement.tau_std[first], 1e-5, FAR))
-    late = float(SPEED_OF_LIGHT * measurement.tau[first]) - baseline
+    late = float(SPEED_OF_LIGHT * measurement.tau[direct][0]) - baseline
+    std = float(np.clip(SPEED_OF_LIGHT * measurement.tau_std[direct][0], 1e-5, FAR))
     log_one = -0.5 * (late / std) ** 2 - np.log(np.sqrt(2.0 * np.pi) * std)
     return late if CONSTANTS.log_rare - np.log(2.0 * CONSTANTS.size) > log_one else 0.0
 
 
 def is_los(observations: Observations, body: Body) -> Booleans:
     """Whether each observed component (M,) is the direct path: no longer than the body's baseline from Tx to Rx."""
-    return observations.seen[:, 0] < _baseline(body) + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)
-
-
-def _baseline(body: Body) -> float:
-    """Length [m] of the direct path from Tx to Rx."""
-    return float(np.linalg.norm(body.tx_offset - body.rx_offset))
+    baseline = float(np.linalg.norm(body.tx_offset - body.rx_offset))
+    return observations.seen[:, 0] < baseline + LOS_MARGIN + 3.0 * np.minimum(observations.std[:, 0], LOS_MARGIN)

@@ -1,5 +1,5 @@
 """Late paths of a room: heard paths that come in beyond the receiver's window of delays, or a direct path that a clock
-brings in before it, and the setting that mends it.
+brings in outside of it, and the setting that mends it.
 
 No measurement tells of them: what the window cuts off is not reported, and what is later than the period of the
 sounding is reported as if it were shorter.
@@ -15,7 +15,7 @@ from rislam_rt.arrays import Booleans, Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.input_messages import share_text
 from rislam_rt.measurement import ReceiverConfig
-from rislam_rt.measurement.config import MOST_TONES
+from rislam_rt.measurement.config import EARLIEST, MOST_TONES
 from rislam_rt.measurement.received_signal import SPARE, num_tones
 from rislam_rt.model import PathKind, Paths, RadioConfig
 from rislam_rt.pipeline.assumed_model import clock_lateness
@@ -53,21 +53,26 @@ def late_path_warnings(paths: Paths, settings: Settings, file: str) -> Iterator[
     yield warning_at(file, "receiver.max_delay", message, _mend(settings.radio, settings.receiver, latest))
 
 
-def early_path_warnings(paths: Paths, time: Floats, spec: PipelineSpec, file: str) -> Iterator[Finding]:
+def direct_path_warnings(paths: Paths, time: Floats, spec: PipelineSpec, file: str) -> Iterator[Finding]:
     """Warning, one for a run of cycles at `time` (K,) [s], of a direct path that the told error of the clocks brings in
-    before the late paths' window begins: from there on no estimator can tell how far they are apart."""
+    before the late paths' window begins, or after it ends: from there on nobody can tell how far they are apart."""
     direct, late = paths.valid & (paths.kind == PathKind.LOS), clock_lateness(time, spec.told)
-    early = np.where(direct, paths.tau, np.inf).min(axis=1, initial=np.inf) + late
-    begin = spec.receiver.min_delay
-    if not late.any() or early.min() >= begin:
+    if not late.any() or not direct.any():
         return
-    first = time[np.argmax(early < begin)] - time[0]
+    rows, (begin, end) = direct.any(axis=1), (spec.receiver.min_delay, spec.receiver.max_delay)
+    when, arrival = time[rows] - time[0], np.where(direct, paths.tau, np.inf).min(axis=1)[rows] + late[rows]
     message = (
-        f"from {first:.3g} s on the direct path comes in before {1e9 * begin:g} ns, as [told] has the clocks of Tx and "
-        "Rx run, and is not reported: no estimator counts lengths from it"
+        "s on the direct path comes in {} {:g} ns, as [told] has the clocks of Tx and Rx run: the receiver does not "
     )
-    delay = STEP * float(np.floor(early.min() / STEP))
-    yield warning_at(file, "receiver.min_delay", message, f"give receiver.min_delay = {delay:.9g}")
+    message += "hear it there, and no estimator can count lengths from it"
+    if arrival.min() < begin:
+        first, delay = when[np.argmax(arrival < begin)], STEP * float(np.floor(arrival.min() / STEP))
+        mend = f"give receiver.min_delay = {delay:.9g}" if delay >= EARLIEST else "tell clocks less far apart"
+        yield warning_at(file, "receiver.min_delay", f"from {first:.3g} {message.format('before', 1e9 * begin)}", mend)
+    if arrival.max() > end:
+        first, delay = when[np.argmax(arrival > end)], STEP * float(np.ceil(arrival.max() / STEP))
+        more = f"give receiver.max_delay = {delay + end - max(begin, 0.0):.9g}, or tell clocks less far apart"
+        yield warning_at(file, "receiver.max_delay", f"from {first:.3g} {message.format('after', 1e9 * end)}", more)
 
 
 def _walls(paths: Paths, late: Booleans) -> list[str]:

@@ -11,7 +11,7 @@ from rislam_rt.adviser import forecast_codes, link_budget
 from rislam_rt.adviser.link_budget import survey
 from rislam_rt.cli.app import app
 from rislam_rt.pipeline import load_spec, run_slam
-from rislam_rt.pipeline.room.late_paths import early_path_warnings, late_path_warnings
+from rislam_rt.pipeline.room.late_paths import direct_path_warnings, late_path_warnings
 from rislam_rt.pipeline.run import prepare_setup
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.scene import load_scene
@@ -101,17 +101,35 @@ def test_clocks_that_hide_the_direct_path_are_named_with_what_mends_it(offset: f
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed)
     setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
     time = setup.scene.agent.time
-    (line,) = (finding.line for finding in early_path_warnings(setup.paths, time, spec, "scene.toml"))
+    (line,) = (finding.line for finding in direct_path_warnings(setup.paths, time, spec, "scene.toml"))
     assert line.startswith(f"scene.toml: receiver.min_delay: from {first} on the direct path comes in before 0 ns")
     mended = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*changed, *advised(line)))
-    assert not list(early_path_warnings(setup.paths, time, mended, "scene.toml"))
+    assert not list(direct_path_warnings(setup.paths, time, mended, "scene.toml"))
+
+
+def test_a_direct_path_beyond_the_window_is_named_too() -> None:
+    changed = (*SHORT, "cycles=20", "told.clock_drift_ns_s=100.0")
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", changed)
+    setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
+    (line,) = (f.line for f in direct_path_warnings(setup.paths, setup.scene.agent.time, spec, "scene.toml"))
+    assert line.startswith("scene.toml: receiver.max_delay: from 0.8 s on the direct path comes in after 80 ns")
+    mended = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*changed, "receiver.max_delay=2.7e-7"))
+    assert "give receiver.max_delay = 2.8e-07" in line
+    assert not list(direct_path_warnings(setup.paths, setup.scene.agent.time, mended, "scene.toml"))
+
+
+def test_no_delay_is_advised_that_is_refused() -> None:
+    spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*SHORT, "told.clock_offset_ns=-1100.0"))
+    setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
+    (line,) = (f.line for f in direct_path_warnings(setup.paths, setup.scene.agent.time, spec, "scene.toml"))
+    assert line.endswith("; tell clocks less far apart")
 
 
 @pytest.mark.parametrize("told", ["clock_offset_ns=-0.3", "clock_drift_ns_s=0.1", "tilt_deg=1.0"])
 def test_a_direct_path_that_is_heard_is_not_warned_of(told: str) -> None:
     spec = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*SHORT, f"told.{told}"))
     setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
-    assert not list(early_path_warnings(setup.paths, setup.scene.agent.time, spec, "scene.toml"))
+    assert not list(direct_path_warnings(setup.paths, setup.scene.agent.time, spec, "scene.toml"))
 
 
 @pytest.mark.parametrize("scheme", ["optimized", "bp_slam_aoa", "channel_slam"])
