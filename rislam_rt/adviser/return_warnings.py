@@ -12,6 +12,7 @@ from rislam_rt.channel.walls import Walls, build_walls
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError
 from rislam_rt.geometry.angles import rotation_z
+from rislam_rt.geometry.triangles import connected
 from rislam_rt.input_messages import counted, share_text
 from rislam_rt.measurement import Received, build_sensor, receive
 from rislam_rt.measurement.components import NoiselessComponents, merge, single
@@ -34,7 +35,7 @@ known to millimetres, and in half a second an agent gets aside so far, at 1 m/s^
 FACETS = 3
 """Facets heard, each beside one to which it turns by little, from which on a wall is curved, and has no single kink."""
 JOINED = 1e-4
-"""[m] Distance up to which corners of facets are one."""
+"""[m] Distance up to which corners of facets are one, and angle [rad] up to which facets are even."""
 BEND = np.deg2rad(15.0)
 """Angle [rad] between facets of a curved wall from which on the filter tells them apart: in galleries of facets of 15,
 20 and 30 degrees it errs by a centimetre, of 10, 7.5 and 5 degrees it is lost (docs/slam_measured.md)."""
@@ -199,23 +200,24 @@ def parallel_front_warnings(looked: Survey, file: str) -> Iterator[Finding]:
 
 
 def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
-    """Warning, one for a room, of curved walls: `FACETS` facets or more that are heard along the way turn, each to one
-    beside it, by less than `BEND`, and all together by more; `file` is what it names as its place.
+    """Warning, one for a room, of curved walls: `FACETS` facets or more heard along the way belong together, each
+    turned by less than `BEND` to one beside it, and turn by more in all; `file` is what it names as its place.
 
     Where an agent goes past the edge of two facets they are equally far, their returns come out as one that turns from
     one direction into the other, and from then on the new facet passes for the old one.
     """
     walls = build_walls(looked.scene)
     wall, facing = _heard_fronts(looked, walls)
-    if len(wall) < FACETS:
+    pairs, turns = _slight_turns(walls)
+    part = connected(pairs, len(walls))[wall]
+    for one in np.unique(part):
+        facets = np.flatnonzero(part == one)
+        if len(facets) >= FACETS and (facing[facets] @ facing[facets].T).min() < np.cos(BEND):
+            break
+    else:
         return
-    places = np.round(walls.triangles.reshape(-1, 3) / JOINED)
-    corner = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 3)
-    turns = [_slight_turn(walls, corner, int(each)) for each in wall]
-    facets = np.array([number for number, turn in enumerate(turns) if turn > 0.0], dtype=np.int64)
-    if len(facets) < FACETS or (facing[facets] @ facing[facets].T).min() > np.cos(BEND):
-        return
-    sizes = np.rad2deg([turns[number] for number in facets])
+    heard = np.isin(pairs, wall[facets]).any(axis=1)
+    sizes = np.rad2deg(turns[heard])
     by = f"{sizes.min():.2g}" + (f" to {sizes.max():.2g}" if sizes.max() > 1.01 * sizes.min() else "")
     yield warning_at(
         file, "reflector",
@@ -226,14 +228,19 @@ def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _slight_turn(walls: Walls, corner: Integers, wall: int) -> float:
-    """Angle [rad] by which a facet turns to the one beside it that it turns to least, for warnings of curved walls; 0
-    without any to which it turns by less than `BEND`. `corner` (T, 3) numbers the triangles' corners by their place."""
-    edge = np.isin(corner, corner[walls.wall_of_triangle == wall]).sum(axis=1) == 2
-    others = np.setdiff1d(walls.wall_of_triangle[edge], wall)
-    turn = np.arccos(np.clip(np.abs(walls.normal[others] @ walls.normal[wall]), 0.0, 1.0))
-    slight = turn[(turn < BEND - PARALLEL) & (turn > 0.0)]
-    return float(slight.min()) if len(slight) else 0.0
+def _slight_turns(walls: Walls) -> tuple[Integers, Floats]:
+    """Pairs (P, 2) of facets with a common edge that turn by less than `BEND`, for warnings of curved walls, and their
+    angles (P,) [rad]."""
+    places = np.round(walls.triangles.reshape(-1, 3) / JOINED)
+    corner = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    edges = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner, edge = walls.wall_of_triangle.repeat(3), np.unique(edges, axis=0, return_inverse=True)[1].ravel()
+    order = np.argsort(edge, kind="stable")
+    next_to = edge[order][1:] == edge[order][:-1]
+    pairs = np.stack([owner[order][:-1][next_to], owner[order][1:][next_to]], axis=1)
+    turn = np.arccos(np.clip(np.abs(np.vecdot(walls.normal[pairs[:, 0]], walls.normal[pairs[:, 1]])), 0.0, 1.0))
+    slight = (turn > JOINED) & (turn < BEND - PARALLEL)
+    return pairs[slight], turn[slight]
 
 
 def _heard_fronts(looked: Survey, walls: Walls) -> tuple[Integers, Floats]:

@@ -66,3 +66,25 @@ def test_a_curved_wall_that_is_not_heard_is_not_named() -> None:
     found = looked(10.0)
     silent = replace(found.paths, valid=np.zeros_like(found.paths.valid))
     assert not lines(found._replace(paths=silent))
+
+
+def test_walls_in_parts_and_kinks_apart_are_no_curved_wall() -> None:
+    """Walls of the box in two even halves each; and three walls with a kink of ten degrees of their own."""
+    found = looked(20.0)
+    plain = found.scene.reflectors[0]
+    for depth in (0.0, 0.15):
+        parts = []
+        for turn in (-1.2, 0.0, 1.2):
+            cos, sin = np.cos(turn), np.sin(turn)
+            foot = np.array([[1.7, -0.86], [1.7 + depth, 0.0], [1.7, 0.86]]) @ np.array([[cos, sin], [-sin, cos]])
+            foot = MIDDLE + foot
+            corners = np.array([(*at, z) for at in foot for z in (0.4, 2.2)])
+            faces = np.array([[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]])
+            name = f"part{len(parts)}"
+            parts += [
+                Reflector(f"{name}a", corners[:4], faces[:2], plain.material),
+                Reflector(f"{name}b", corners[2:], faces[2:] - 2, plain.material),
+            ]
+        room = replace(found.scene, reflectors=(*found.scene.reflectors[:-1], *parts))
+        again = survey(room, found.settings)
+        assert not lines(again)

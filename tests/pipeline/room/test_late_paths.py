@@ -113,7 +113,7 @@ def test_a_direct_path_beyond_the_window_is_named_too() -> None:
     setup = prepare_setup(room_in(PAPER), spec, rng=np.random.default_rng(1))
     (line,) = (f.line for f in direct_path_warnings(setup.paths, setup.scene.agent.time, spec, "scene.toml"))
     assert line.startswith("scene.toml: receiver.max_delay: from 0.8 s on the direct path comes in after 80 ns")
-    mended = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*changed, "receiver.max_delay=2.7e-7"))
+    mended = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", (*changed, "receiver.max_delay=2.8e-7"))
     assert "give receiver.max_delay = 2.8e-07" in line
     assert not list(direct_path_warnings(setup.paths, setup.scene.agent.time, mended, "scene.toml"))
 
@@ -133,9 +133,10 @@ def test_a_direct_path_that_is_heard_is_not_warned_of(told: str) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["optimized", "bp_slam_aoa", "channel_slam"])
-@pytest.mark.parametrize("estimator", ["bound", "waveform"])
-def test_clocks_apart_cost_no_estimator_anything(scheme: str, estimator: str) -> None:
-    """Lengths counted from the direct path, whichever clock is ahead: the same estimates but for its 7 um."""
+@pytest.mark.parametrize(("estimator", "most"), [("bound", 5e-5), ("waveform", 1e-3)])
+def test_clocks_apart_cost_no_estimator_anything(scheme: str, estimator: str, most: float) -> None:
+    """Lengths counted from the direct path, whichever clock is ahead: the same estimates but for its error of 7 um in
+    each cycle, and, from samples, for noise that falls on other delays: a tenth of the components' millimetres."""
     plain = ["channel=image_source", "cycles=12", f'schemes=["{scheme}"]', f"receiver.estimator={estimator}"]
     apart = "told.clock_offset_ns=-2.0", "told.clock_drift_ns_s=-1.0", "receiver.min_delay=-1e-8"
     found = [
@@ -147,4 +148,4 @@ def test_clocks_apart_cost_no_estimator_anything(scheme: str, estimator: str) ->
         for more in ((apart[2],), apart)
     ]
     one, other = (each.schemes[scheme].position for each in found)
-    assert np.abs(one - other).max() < 1e-3
+    assert np.abs(one - other).max() < most
