@@ -17,6 +17,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.mesh_polygons import obj_with_triangles, ply_faces
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""
@@ -84,7 +85,7 @@ class MeshReader:
         """Parse a mesh file's content into triangles; `node` picks one named node of a GLB file.
 
         What is too large is refused before it is unfolded: a GLB file may name one mesh in thousands of nodes. `reach`
-        is the largest coordinate in the file's unit.
+        is the largest coordinate in the file's unit. Polygons of OBJ and PLY files become triangles, concave ones too.
 
         Raises
         ------
@@ -100,7 +101,7 @@ class MeshReader:
             content = without_comments(content)
         elif suffix == ".obj":
             # keywords and numbers are ASCII, comments are anything
-            content = content.removeprefix(BOM_UTF8).decode("latin-1").encode()
+            content = obj_with_triangles(content.removeprefix(BOM_UTF8)).decode("latin-1").encode()
         elif suffix == ".glb":
             check_glb(content, max_faces, max_nodes)
         mesh = _own_ply(content) if suffix == ".ply" else None
@@ -108,7 +109,8 @@ class MeshReader:
             if self._key != (suffix, content):
                 self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
             with _errors_as_faults(suffix[1:]):
-                mesh = _flatten(self._loaded, node)
+                cut = ply_faces(self._loaded) if suffix == ".ply" else None
+                mesh = Mesh(*cut) if cut else _flatten(self._loaded, node)
         return sound_mesh(mesh, max_faces, reach)
 
 
@@ -173,7 +175,8 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
         raise
     except Exception as error:
         cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
-        raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", "export the mesh again") from None
+        mend = "export the mesh again" + (", as text (ASCII) or of triangles alone" if file_type == "ply" else "")
+        raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", mend) from None
     finally:
         logging.disable(logged)
 

@@ -1,0 +1,201 @@
+"""Faces of mesh files (OBJ, PLY) with more than three corners, cut into triangles that cover each as it is drawn."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.geometry.triangles import triangle_heights
+from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.polygons import signed_area, triangulate
+
+SLIVER = 1e-6
+"""Height of a triangle, as a fraction of its polygon's size, up to which it is no more than a line."""
+_CUT_OR_COUNTED = re.compile(
+    rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^f[^\n]*[ \t]-\d|^f[^\n]*#|^[ \t]+[fv][ \t]|\\\n", re.MULTILINE
+)
+"""Where an OBJ file has polygons, corners counted backwards, comments behind faces, indented or continued lines."""
+_MEND = "cut it into triangles where the mesh is made"
+
+
+def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list[Integers]:
+    """Triangulate a mesh file's polygons: corner numbers within each polygon (T, 3), turned like it, in their order.
+
+    A fan from the first corner where that covers the polygon, else ears clipped off in its mean plane. A polygon that
+    is no more than a line stays a fan, of faces without area.
+
+    Parameters
+    ----------
+    points
+        (V, 3) in the file's unit, finite.
+    polygons
+        Each of three or more indices into `points`.
+
+    Raises
+    ------
+    PolygonFault
+        One crosses itself.
+    """
+    sizes = np.array([len(polygon) for polygon in polygons])
+    fans = {int(size): fan(int(size)) for size in np.unique(sizes)}
+    found = [fans[int(size)] for size in sizes]
+    for size in fans:
+        if size > 3:
+            rows = np.flatnonzero(sizes == size)
+            corners = points[np.array([polygons[int(row)] for row in rows])]
+            for k in np.flatnonzero(~_covered_by_fan(corners)):
+                cut = _clipped(corners[k])
+                if cut is None:
+                    raise PolygonFault(int(rows[k]), size, corners[k, 0])
+                found[rows[k]] = cut
+    return found
+
+
+class PolygonFault(Fault):
+    """A face of a mesh file that crosses itself."""
+
+    def __init__(self, number: int, size: int, first: Floats) -> None:
+        self.number = number
+        self.what = f"of {size} corners, the first at {', '.join(f'{x:g}' for x in first)}, crosses itself"
+        super().__init__(f"face {number} {self.what}", _MEND)
+
+
+def fan(size: int) -> Integers:
+    """Fan of triangles from the first corner of a mesh file's polygon: corner numbers (size - 2, 3)."""
+    return np.array([[0, i, i + 1] for i in range(1, size - 1)], dtype=np.int64)
+
+
+def _covered_by_fan(corners: Floats) -> Booleans:
+    """Whether fans from the first corner cover a mesh file's polygons (n, k, 3): all turn one way, none is a line."""
+    n, k, _ = corners.shape
+    spokes = corners[:, 1:] - corners[:, :1]
+    size = np.linalg.norm(np.ptp(corners, axis=1), axis=-1)
+    turn = np.cross(spokes[:, :-1], spokes[:, 1:])
+    normal = turn.sum(axis=1)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    sine = np.einsum("nti,ni->nt", turn, normal / np.where(length > 0.0, length, 1.0))
+    angle = np.arctan2(sine, np.einsum("nti,nti->nt", spokes[:, :-1], spokes[:, 1:])).sum(axis=1)
+    heights = triangle_heights(corners[:, fan(k)].reshape(-1, 3, 3)).reshape(n, k - 2)
+    return np.asarray((sine > 0.0).all(axis=1) & (heights > SLIVER * size[:, None]).all(axis=1) & (angle < 2.0 * np.pi))
+
+
+def _clipped(corners: Floats) -> Integers | None:
+    """Triangulate a mesh file's polygon (k, 3) by clipping ears in its mean plane; None where it crosses itself."""
+    centred = corners - corners.mean(axis=0)
+    _, spread, axes = np.linalg.svd(centred)
+    if spread[1] <= SLIVER * spread[0]:
+        return fan(len(corners))
+    flat = centred @ axes[:2].T
+    turned = signed_area(flat) < 0.0
+    order = np.arange(len(corners))[::-1] if turned else np.arange(len(corners))
+    ears = triangulate(flat[order], [])
+    if ears is None:
+        return None
+    ears = order[ears[:, ::-1] if turned else ears]
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    return ears[triangle_heights(corners[ears]) > SLIVER * size]
+
+
+def obj_with_triangles(content: bytes) -> bytes:
+    """Content of an OBJ file, rewritten where a reader that fans its faces would not give the faces drawn in it.
+
+    Faces that a fan does not cover become triangles, corners counted backwards are numbered from the first; lines
+    lose what continues, indents and comments them. A file without such faces keeps its lines.
+
+    Raises
+    ------
+    Fault
+        A corner or a face cannot be read, or a face crosses itself.
+    """
+    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if not _CUT_OR_COUNTED.search(content):
+        return content
+    lines = content.replace(b"\\\n", b" ").split(b"\n")
+    points: list[list[float]] = []
+    polygons: list[list[int]] = []
+    places: list[int] = []
+    for number, line in enumerate(lines):
+        key, *words = line.partition(b"#")[0].split() or [b""]
+        try:
+            if key == b"v":
+                points.append(obj_point(words))
+            elif key == b"f":
+                polygons.append(obj_corners(words, len(points)))
+                places.append(number)
+        except ValueError as error:
+            raise unreadable_line(number, error) from None
+        if key in (b"v", b"f"):
+            lines[number] = b" ".join([key, *words])
+    corners = np.array(points, dtype=np.float64).reshape(-1, 3)
+    if not np.isfinite(corners).all():
+        return content  # what is not finite is told of the mesh
+    try:
+        cuts = polygon_triangles(corners, polygons)
+    except PolygonFault as fault:
+        raise Fault(f"line {places[fault.number] + 1}: a face {fault.what}", _MEND) from None
+    for number, polygon, cut in zip(places, polygons, cuts, strict=True):
+        words = [b"%d%s%s" % (corner + 1, *word.partition(b"/")[1:])
+                 for corner, word in zip(polygon, lines[number].split()[1:], strict=True)]  # fmt: skip
+        rows = [range(len(words))] if np.array_equal(cut, fan(len(words))) else cut
+        lines[number] = b"\n".join(b" ".join([b"f", *(words[i] for i in row)]) for row in rows)
+    return b"\n".join(lines)
+
+
+def obj_point(words: Sequence[bytes | str]) -> list[float]:
+    """Position of a corner in an OBJ file; a ValueError where it has no three numbers."""
+    if len(words) < 3:
+        raise ValueError("three numbers wanted")
+    return [float(word) for word in words[:3]]
+
+
+def obj_corners(words: Sequence[bytes | str], count: int) -> list[int]:
+    """Corner numbers of a face in an OBJ file, from 0; negative ones count from the last corner so far.
+
+    A ValueError where one is no number or names none of `count` corners.
+    """
+    slash: Any = b"/" if words and isinstance(words[0], bytes) else "/"
+    numbers = [int(word.partition(slash)[0]) for word in words]
+    if len(numbers) < 3:
+        raise ValueError(f"a face of {len(numbers)} corners")
+    for n in numbers:
+        if n == 0 or n > count or n < -count:
+            raise ValueError(f"a face names corner {n} of {count}")
+    return [n - 1 if n > 0 else count + n for n in numbers]
+
+
+def unreadable_line(number: int, error: ValueError) -> Fault:
+    """Fault of a line of an OBJ file, its number from 0."""
+    return Fault(f"line {number + 1} cannot be read ({one_line(str(error))[:60]})", "export it again")
+
+
+def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
+    """Vertices (V, 3) and triangles (F, 3) of a PLY file that trimesh has read, where its fans would not cover a face.
+
+    None where they do, or where the file has no faces or names vertices that it does not have.
+
+    Raises
+    ------
+    Fault
+        A face crosses itself.
+    """
+    raw: dict[str, Any] = next((one.metadata.get("_ply_raw", {}) for one in loaded.geometry.values()), {})
+    data, at = (raw.get(key, {}).get("data") for key in ("face", "vertex"))
+    if data is None or at is None:
+        return None
+    names = list(data) if isinstance(data, dict) else list(data.dtype.names)
+    name = next((name for name in names if name in ("vertex_index", "vertex_indices")), names[0])
+    rows = data[name] if isinstance(data, dict) else data[name]["f1"]
+    if isinstance(rows, np.ndarray) and rows.ndim == 2 and rows.shape[1] < 4:
+        return None
+    polygons = [row for row in (np.asarray(row, dtype=np.int64).reshape(-1) for row in rows) if len(row) > 2]
+    points = np.column_stack([np.asarray(at[axis], dtype=np.float64).reshape(-1) for axis in "xyz"])
+    if max((len(polygon) for polygon in polygons), default=0) < 4 or not np.isfinite(points).all():
+        return None
+    if min(p.min() for p in polygons) < 0 or max(p.max() for p in polygons) >= len(points):
+        return None
+    cuts = polygon_triangles(points, [polygon.tolist() for polygon in polygons])
+    if all(np.array_equal(cut, fan(len(polygon))) for cut, polygon in zip(cuts, polygons, strict=True)):
+        return None
+    return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])

@@ -1,0 +1,118 @@
+"""Polygons of mesh files: each covers what is drawn, in OBJ and PLY, in a scene and in an import."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rislam_rt.arrays import Floats
+from rislam_rt.geometry.triangles import triangle_cross
+from rislam_rt.scene.findings import Fault
+from rislam_rt.scene.importing.mesh_source import read_source
+from rislam_rt.scene.mesh_polygons import SLIVER
+from rislam_rt.scene.meshes import MeshReader
+
+DOORWAY = [(0, 0), (1, 0), (1, 2.1), (2, 2.1), (2, 0), (4, 0), (4, 2.8), (0, 2.8)]
+L_FLOOR = [(8, 0), (8, 4), (4, 4), (4, 7), (0, 7), (0, 0)]
+COLLINEAR = [(0, 0), (2, 0), (4, 0), (4, 3), (0, 3)]
+DART = [(0, 0), (4, 0), (1, 1), (0, 4)]
+SHAPES = {"doorway": (DOORWAY, 9.1), "L": (L_FLOOR, 44.0), "collinear": (COLLINEAR, 12.0), "dart": (DART, 4.0)}
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+def obj(points: Floats, *faces: Sequence[int]) -> bytes:
+    corners = "".join(f"v {x:.7g} {y:.7g} {z:.7g}\n" for x, y, z in points)
+    return (corners + "".join("f " + " ".join(str(i + 1) for i in face) + "\n" for face in faces)).encode()
+
+
+def ply(points: Floats, *faces: Sequence[int], binary: bool = False) -> bytes:
+    kind = "binary_little_endian" if binary else "ascii"
+    head = (
+        f"ply\nformat {kind} 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\n"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    if binary:
+        rows = b"".join(bytes([len(face)]) + np.array(face, "<i4").tobytes() for face in faces)
+        return head.encode() + points.astype("<f4").tobytes() + rows
+    lines = [" ".join(f"{x:.7g}" for x in point) for point in points]
+    lines += [" ".join(str(i) for i in (len(face), *face)) for face in faces]
+    return "\n".join([head.rstrip(), *lines, ""]).encode()
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_polygon_covers_what_is_drawn_from_every_first_corner(shape: str, turned: bool, tmp_path: Path) -> None:
+    """Area and side of the face, upright and tilted, the same triangles from OBJ, PLY and an import."""
+    flat, area = SHAPES[shape]
+    for first in range(len(flat)):
+        for tilt in (np.zeros(3), np.array([0.3, 0.5, 1.1])):
+            points = np.insert(np.array(flat[first:] + flat[:first], dtype=float), 2, 1.0, axis=1)
+            points = Rotation.from_rotvec(tilt).apply(points[::-1] if turned else points)
+            face = range(len(points))
+            (tmp_path / "a.obj").write_bytes(obj(points, face))
+            meshes = [
+                MeshReader().parse(obj(points, face), "a.obj").triangles,
+                MeshReader().parse(ply(points, face), "a.ply").triangles,
+                MeshReader().parse(ply(points, face, binary=True), "a.ply").triangles,
+                read_source(tmp_path / "a.obj")[0][0].triangles,
+            ]
+            normal = Rotation.from_rotvec(tilt).apply([0.0, 0.0, -1.0 if turned else 1.0])
+            for triangles in meshes:
+                crosses = triangle_cross(triangles)
+                assert np.linalg.norm(crosses, axis=1).sum() / 2 == pytest.approx(area, rel=1e-5)
+                assert (crosses @ normal).sum() / 2 == pytest.approx(area, rel=1e-5)
+                assert np.linalg.norm(crosses, axis=1).min() > SLIVER
+                if not tilt.any():  # else the last digits of the file decide between triangles as good
+                    assert _middles(triangles) == _middles(meshes[0])
+
+
+def _middles(triangles: Floats) -> set[tuple[float, ...]]:
+    return {tuple(middle) for middle in np.round(triangles.mean(axis=1), 4) + 0.0}
+
+
+def test_convex_faces_are_as_they_were() -> None:
+    """Of quads alone all first halves come before all second ones; among other faces the halves follow each other."""
+    points = np.array([[x, y, 0.0] for x in range(3) for y in range(2)])
+    mesh = MeshReader().parse(obj(points, (0, 2, 3, 1), (2, 4, 5, 3)), "a.obj")
+    assert np.array_equal(mesh.vertices, points)
+    assert mesh.faces.tolist() == [[0, 2, 3], [2, 4, 5], [3, 1, 0], [5, 3, 2]]
+    assert MeshReader().parse(ply(points, (0, 2, 3, 1), (2, 4, 5, 3)), "a.ply").faces.tolist() == mesh.faces.tolist()
+    mixed = MeshReader().parse(obj(points, (0, 2, 3, 1), (2, 4, 5)), "a.obj")
+    assert mixed.faces.tolist() == [[0, 2, 3], [3, 1, 0], [2, 4, 5]]
+
+
+def test_a_face_with_a_window_joined_by_a_bridge_keeps_the_window() -> None:
+    outer, window = [(0, 0), (4, 0), (4, 3), (0, 3)], [(1, 1), (1, 2), (2, 2), (2, 1)]
+    points = np.insert(np.array(outer + window, dtype=float), 2, 0.0, axis=1)
+    ring = (0, 1, 2, 3, 0, 4, 5, 6, 7, 4)
+    for content, name in ((obj(points, ring), "a.obj"), (ply(points, ring), "a.ply")):
+        crosses = triangle_cross(MeshReader().parse(content, name).triangles)
+        assert np.abs(crosses).sum() / 2 == pytest.approx(11.0)
+
+
+def test_a_face_that_crosses_itself_is_named() -> None:
+    points = np.array([[0.0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 1, 0]])
+    with pytest.raises(Fault, match="line 5: a face of 4 corners, the first at 0, 0, 0, crosses itself; cut it"):
+        MeshReader().parse(obj(points, range(4)), "a.obj")
+    with pytest.raises(Fault, match="face 0 of 4 corners, the first at 0, 0, 0, crosses itself; cut it"):
+        MeshReader().parse(ply(points, range(4)), "a.ply")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("f -4 -3 -2 -1", "f -4 -3 -2 -1"),
+        (" f 1 2 3 4", "\tf 5 6 7 8"),
+        ("f 1 2 3 4 # a wall", "f 5 6 7 8#"),
+        ("f 1 2 \\\n3\\\n4", "f 5 6 7 \\\r\n 8"),
+        ("f 1/1/1 2/1/1 3/1/1 4/1/1", "f 5/1/1 6/1/1 7/1/1 8/1/1"),
+    ],
+)
+def test_every_way_to_write_an_obj_face_is_read(first: str, second: str) -> None:
+    """Corners counted backwards are of those so far: a second square does not take the place of the first."""
+    other = SQUARE.replace("v 1", "v 6").replace("v 0", "v 5")
+    mesh = MeshReader().parse(f"vt 0 0\nvn 0 0 1\n{SQUARE}{first}\n{other}{second}\n".encode(), "a.obj")
+    assert np.abs(triangle_cross(mesh.triangles)).sum() / 2 == pytest.approx(2.0)
+    assert (mesh.vertices.min(), mesh.vertices.max()) == (0.0, 6.0)
