@@ -87,6 +87,7 @@ def command(
     from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.recordings.answer_files import answer_files, summarise_answers, true_positions
     from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
+    from rislam_rt.pipeline.room.array_warnings import array_warnings
     from rislam_rt.pipeline.specification.radio import build_radio
     from rislam_rt.storage.files import write_all
     from rislam_rt.storage.netcdf import NETCDF
@@ -99,13 +100,14 @@ def command(
     if given and measurements.suffix.lower() in NETCDF:
         raise ConfigError(f"{', '.join(given)}: {measurements} brings its own start, Tx and Rx; leave it out")
     body = _body(tx, rx)
-    inputs = read_inputs(measurements, prior, build_radio(spec.radio), body)
+    radio = build_radio(spec.radio)
+    inputs = read_inputs(measurements, prior, radio, body)
     if prior is not None:
         if body is None:  # a baseline that is not the agent's own is an error of centimetres that no deviation shows
             where = "a CSV file does not say where Tx and Rx sit on the agent"
             raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
         inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
-    for line in input_warnings(inputs):
+    for line in (*input_warnings(inputs), *(found.line.partition(": ")[2] for found in array_warnings(radio, "radio"))):
         warn(f"{measurements}: {line}")
     true = None if truth is None else true_positions(truth, inputs.time + inputs.since)
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))

@@ -51,6 +51,12 @@ def test_the_pipelines_radio_counts_and_a_wrong_setting_is_one_line(check):
     assert "map.doc" in err
 
 
+def test_an_array_that_tells_no_direction_is_said_before_it_runs(check):
+    _, out, _ = check("empty_box", "--set", "radio.array.rows=1", "--set", "radio.array.spacing_wavelengths=1")
+    assert "warning: --set: radio.array.rows: 1 x 4 antennas in a line tell no cosine along the body's x" in out
+    assert "warning: --set: radio.array.spacing_wavelengths: antennas 1 wavelengths apart" in out
+
+
 def test_a_scene_without_a_panel_has_no_map(check, tmp_path):
     code, out, _ = check("empty_box", "--picture", "map.png")
     assert code == 0

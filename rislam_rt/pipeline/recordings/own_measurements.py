@@ -28,6 +28,7 @@ from rislam_rt.pipeline.recordings.measurement_columns import (
     cosine_wanted,
 )  # fmt: skip
 from rislam_rt.pipeline.recordings.replay import Answers, replay
+from rislam_rt.pipeline.room.array_warnings import untold_axes
 from rislam_rt.pipeline.run_datasets import dataset_checksum
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.slam import StartPrior
@@ -163,6 +164,12 @@ def inputs_of(
     check_components(columns, heard, place)
     check_heading(columns, cycle, place)
     check_amplitude(columns, heard, radio, place)
+    lacking = [f"cos_{axis}_std" for axis in untold_axes(radio.array) if f"cos_{axis}_std" not in columns]
+    if lacking:
+        raise ConfigError(
+            f"{place}: {', '.join(lacking)}: no such column, and the array of {radio.array.rows} x {radio.array.cols} "
+            f"antennas tells no deviation there; give it, or the radio.array.rows and cols that measured"
+        )
     filled = _filled({name: column[heard] for name, column in columns.items()}, radio)
     rows = [cycle[heard] == number for number in range(len(cycles))]
     measurements = tuple(Measurement(**{name: values[own] for name, values in filled.items()}) for own in rows)
@@ -232,8 +239,9 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
             )
         for name in ("tau_std", "cosines_std", "amplitude", "amplitude_std"):
             value = getattr(one, name)
-            if not (np.isfinite(value) & (value > 0.0)).all():
-                raise ConfigError(f"{where}: {name} of {value.min():g} received; give positive, finite numbers")
+            good = np.isfinite(value) & (value > 0.0)
+            if not good.all():
+                raise ConfigError(f"{where}: {name} of {value[~good][0]:g} received; give positive, finite numbers")
         if (one.tau_std < FINEST_STD).any():
             raise ConfigError(f"{where}: tau_std of {one.tau_std.min():g} s received; give seconds")
         told = one.from_panel

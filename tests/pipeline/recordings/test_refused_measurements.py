@@ -18,6 +18,8 @@ from rislam_rt.storage.netcdf import read_dataset, write_dataset
 from rislam_rt.studies.unseen import Inputs
 
 Table = dict[str, list[float]]
+PIPELINE = find_pipeline("trace_then_slam")
+START = StartPrior(np.zeros(3), np.zeros(3), 0.0)
 
 
 def test_two_cosines_of_no_direction_are_refused(table: Table, spec: PipelineSpec) -> None:
@@ -73,6 +75,27 @@ def test_a_missing_column_is_named(table: Table, spec: PipelineSpec) -> None:
     del table["amplitude"]
     with pytest.raises(ConfigError, match="amplitude or snr_db: column missing"):
         inputs_of(table, StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio))
+
+
+def test_a_deviation_that_the_array_does_not_tell_is_asked_for(table: Table) -> None:
+    """Of 8 x 1 antennas none lies along y: nothing was wrong with a deviation that nobody gave."""
+    radio, start = build_radio(load_spec(PIPELINE, ["radio.array.rows=8", "radio.array.cols=1"]).radio), START
+    table = {name: column for name, column in table.items() if not name.endswith("_std")}
+    with pytest.raises(ConfigError) as found:
+        inputs_of(table, start, radio, place="mine.csv")
+    assert str(found.value) == (
+        "mine.csv: cos_y_std: no such column, and the array of 8 x 1 antennas tells no deviation there; give it, or "
+        "the radio.array.rows and cols that measured"
+    )
+    inputs_of({**table, "cos_y_std": [0.5] * len(table["time_s"])}, start, radio)
+
+
+def test_the_deviation_that_is_wrong_is_told(tmp_path: Path, table: Table, spec: PipelineSpec) -> None:
+    data = inputs_to_dataset(inputs_of(table, START, build_radio(spec.radio)))
+    data["tau_std"][1, 0] = np.inf
+    write_dataset(data, tmp_path / "mine.nc")
+    with pytest.raises(ConfigError, match="cycle 1: tau_std of inf received; give positive, finite numbers"):
+        read_inputs(tmp_path / "mine.nc", None, build_radio(spec.radio))
 
 
 def test_a_cosine_goes_with_a_cosine(table: Table, spec: PipelineSpec) -> None:
