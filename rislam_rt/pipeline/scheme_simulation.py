@@ -89,7 +89,7 @@ class SchemeSimulation:
             self.agent, outcome = run_cycle(self.agent, room, cycle, self.context)
             cycles.append(outcome)
             tell(self.name, cycle + 1, len(self.motion))
-        given = given_of(self.context.told, first, cycles, self.context.seeds.filter)
+        given = given_of(self.context.told, first, cycles, self.context.seeds.filter, since)
         levels = self.context.panel.levels if self.context.panel is not None else 0
         found = gather(self.name, self.motion.time[first:last], cycles, levels, given)
         # a slice does not know what later ones tell of its end

@@ -212,7 +212,7 @@ def read_given(folder: Path, scheme: str) -> tuple[Inputs, np.random.Generator]:
     except (KeyError, ValueError, TypeError, ConfigError, StoreError) as error:
         cause = f"{type(error).__name__}: {error}"[:120]
         raise ResultError(f"{files[0]}: damaged ({cause}); run again with another --out") from None
-    return inputs._replace(time=inputs.time - inputs.time[0], since=float(inputs.time[0])), rng
+    return inputs._replace(time=inputs.time - inputs.time[0], since=inputs.since + float(inputs.time[0])), rng
 
 
 def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: Mapping[str, Any]) -> None:

@@ -66,7 +66,7 @@ class Inputs(NamedTuple):
     codes: tuple[RisCode | None, ...]
     """(K,) phase code that the agent holds to be applied; None without a panel."""
     since: float = 0.0
-    """[s] First cycle's time by the clock of a user's own file, from which `time` counts."""
+    """[s] First cycle's time by the clock of a recording or of a user's own file, from which `time` counts."""
 
 
 class RecordedInputs(NamedTuple):
@@ -78,14 +78,15 @@ class RecordedInputs(NamedTuple):
 
 
 def given_of(
-    told: "AssumedModel", first: int, cycles: "Sequence[Cycle]", seed: np.random.SeedSequence
+    told: "AssumedModel", first: int, cycles: "Sequence[Cycle]", seed: np.random.SeedSequence, since: float = 0.0
 ) -> RecordedInputs:
-    """Record of an estimator's inputs in consecutive cycles from `first` on, from the assumed model and the cycles."""
+    """Record of an estimator's inputs in consecutive cycles from `first` on, from the assumed model and the cycles;
+    `since` [s] is the first of all cycles' time by the trajectory's clock."""
     span = slice(first, first + len(cycles))
     time, heading = told.time[span] - told.time[0], told.heading[span]
     measurements = tuple(cycle.measurement for cycle in cycles)
     codes = tuple(cycle.believed for cycle in cycles)
-    return RecordedInputs(Inputs(told.start, told.body, told.panel, time, heading, measurements, codes), seed)
+    return RecordedInputs(Inputs(told.start, told.body, told.panel, time, heading, measurements, codes, since), seed)
 
 
 def given_to_dataset(result: SchemeResult) -> "xr.Dataset":
@@ -110,6 +111,8 @@ def inputs_to_dataset(inputs: Inputs, **about: Any) -> "xr.Dataset":
     values |= {"tx_offset": inputs.body.tx_offset, "rx_offset": inputs.body.rx_offset}
     names = ("heading", "position_std", "velocity_std", "heading_std")
     attributes: dict[str, Any] = {f"start_{name}": getattr(inputs.start, name) for name in names}
+    if inputs.since:
+        attributes["since"] = inputs.since
     codes = [code for code in inputs.codes if code is not None]
     if inputs.panel is not None and len(codes) == len(inputs.codes):
         values["code"] = np.array([code.index for code in codes])
@@ -135,7 +138,7 @@ def dataset_to_inputs(data: "xr.Dataset") -> Inputs:
     panel, codes = _panel(data)
     body = Body(data["tx_offset"].to_numpy(), data["rx_offset"].to_numpy())
     time, heading = data["time"].to_numpy(), data["heading"].to_numpy()
-    return Inputs(start, body, panel, time, heading, _measurements(data), codes)
+    return Inputs(start, body, panel, time, heading, _measurements(data), codes, float(marks.get("since", 0.0)))
 
 
 def marked_rng(data: "xr.Dataset") -> np.random.Generator | None:

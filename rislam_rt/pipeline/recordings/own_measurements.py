@@ -110,7 +110,7 @@ def read_inputs(file: str | Path, start: StartPrior | None, radio: RadioConfig, 
             made = _check_inputs(dataset_to_inputs(data), str(file))
             if not len(made.time):
                 raise ConfigError(f"{file}: no cycles; give at least one")
-            return made._replace(time=made.time - made.time[0], since=float(made.time[0]))
+            return made._replace(time=made.time - made.time[0], since=made.since + float(made.time[0]))
         except RislamError as error:
             raise ConfigError(str(error) if str(file) in str(error) else f"{file}: {error}") from None
         except (KeyError, ValueError, TypeError) as error:

@@ -1,5 +1,6 @@
 """What stands in a run's files: labels for `.sel`, and measurements that give the run's estimate again."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,16 @@ import xarray as xr
 
 from rislam_rt.model import RisCode, RisSpec
 from rislam_rt.model.ris import RisSpecs
-from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, inputs_to_dataset
+from rislam_rt.pipeline import load_spec
+from rislam_rt.pipeline.recordings.answer_files import true_positions
+from rislam_rt.pipeline.recordings.inputs import dataset_to_inputs, given_to_dataset, inputs_to_dataset
 from rislam_rt.pipeline.recordings.own_measurements import localise, read_inputs, run_rng
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.radio import build_radio
 from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run
+from rislam_rt.scene.write import tum_bytes
+from rislam_rt.storage.netcdf import write_dataset
 
 ROOT = Path(__file__).parents[3]
 
@@ -76,6 +81,21 @@ def test_the_same_measurements_give_the_same_estimate(stored, short_spec, scheme
     np.testing.assert_array_equal(found, result.schemes[scheme].position)
     covariance = np.array([one.covariance for one in answers.estimates])
     np.testing.assert_array_equal(covariance, result.schemes[scheme].covariance)
+
+
+def test_a_recordings_clock_stays_with_its_measurements(room, run_short, short_result, tmp_path):
+    """Truth, estimates and what `slam` makes of the measurements have one clock, also where it does not begin at 0."""
+    agent = replace(room.agent, time=room.agent.time + 1.7e9)
+    result = run_short('schemes=["random"]', scene=replace(room, agent=agent))
+    scheme = result.schemes["random"]
+    write_dataset(given_to_dataset(scheme), tmp_path / "random.nc")
+    inputs = read_inputs(tmp_path / "random.nc", None, build_radio(load_spec("trace_then_slam").radio))
+    assert inputs.time[0] == 0.0
+    np.testing.assert_array_equal(inputs.time + inputs.since, agent.time[: len(inputs.time)])
+    true = result.scene.agent
+    (tmp_path / "truth.tum").write_bytes(tum_bytes(true.time, true.position, true.heading))
+    assert len(true_positions(tmp_path / "truth.tum", inputs.time + inputs.since)) == len(inputs.time)
+    assert "since" not in given_to_dataset(short_result.schemes["random"]).attrs  # its clock begins at 0
 
 
 def test_several_panels_are_written_and_read(stored):
