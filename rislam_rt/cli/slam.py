@@ -107,12 +107,13 @@ def command(
             where = "a CSV file does not say where Tx and Rx sit on the agent"
             raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
         inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
-    for line in (*input_warnings(inputs), *(found.line.partition(": ")[2] for found in array_warnings(radio, "radio"))):
+    blind = (found.line.partition(": ")[2] for found in array_warnings(radio, "radio"))
+    for line in (*input_warnings(inputs, spec), *blind):
         warn(f"{measurements}: {line}")
     true = None if truth is None else true_positions(truth, inputs.time + inputs.since)
     folder = _new_folder(out or Path(f"{measurements.stem}-slam"))
     drawn = None if any(word.startswith("seed=") for word in set_ or ()) else run_rng(measurements)
-    answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed))
+    answers = localise(inputs, spec, rng=drawn or np.random.default_rng(spec.seed), place=str(measurements))
     summary = summarise_answers(inputs, answers, true)
     write_all(_new_folder(folder), answer_files(inputs, answers))  # another command may have filled it meanwhile
     for name, value in summary.items():

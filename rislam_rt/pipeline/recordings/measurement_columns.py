@@ -66,7 +66,10 @@ RANGES: dict[str, tuple[float, float, str]] = {
 
 def check_names(columns: Mapping[str, Floats], place: str) -> None:
     """Raise an error for columns of a user's measurements that are unknown, missing, redundant or of unequal length."""
-    for name in columns:
+    for number, name in enumerate(columns, start=1):
+        if not name or name.startswith("Unnamed: "):
+            what = "has no name, as the index of a data frame that was written with the rest"
+            raise ConfigError(f"{place}: column {number}: {what}; leave it out (to_csv(..., index=False)), or name it")
         if name not in COLUMNS:
             hint = did_you_mean(nearest(name, COLUMNS)) or "mend its name:"
             raise ConfigError(f"{place}: {name}: unknown column; {hint} the known ones are {', '.join(COLUMNS)}")

@@ -1,7 +1,7 @@
 """A user's own measurements: reads a table, a CSV or a NetCDF file, checks it, and estimates pose and map from it."""
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.blas_threads import in_one_blas_thread
+from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.errors import ConfigError, RislamError, StoreError
 from rislam_rt.information import amplitude_std, measurement_std
 from rislam_rt.input_messages import parse_number
@@ -30,7 +31,7 @@ from rislam_rt.pipeline.recordings.measurement_columns import (
 from rislam_rt.pipeline.recordings.replay import Answers, replay
 from rislam_rt.pipeline.room.array_warnings import untold_axes
 from rislam_rt.pipeline.run_datasets import dataset_checksum
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
+from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.storage.netcdf import NETCDF, read_dataset
 
@@ -39,12 +40,14 @@ LONGEST_STEP = 10.0
 LONGEST_STRIDE = 5.0
 """[m] Way at the start's speed in a median time above `LONGEST_STEP` from which on the times are refused: an agent that
 goes across a room from one cycle to the next has its times in another unit."""
+EARLY = 0.05
+"""Part of the way from Tx to Rx by which a path may be shorter without a warning: tape measures err by so much."""
 SHORTEST_STEP = 1e-3
 """[s] Median time between cycles of one component each below which the times are warned of: each row has its own."""
 
 
 @in_one_blas_thread
-def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) -> Answers:
+def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator, place: str = "measurements") -> Answers:
     """Estimate pose and map, cycle by cycle, from recorded or own measurements alone: no scene, channel or truth.
 
     Parameters
@@ -53,6 +56,8 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
         From `read_inputs`, `inputs_of` or a recording.
     spec
         Radio, receiver and estimator; the estimator is that of the first of its schemes.
+    place
+        Where the inputs are from, as errors name it.
 
     Raises
     ------
@@ -62,8 +67,8 @@ def localise(inputs: Inputs, spec: PipelineSpec, *, rng: np.random.Generator) ->
     if np.isnan(inputs.heading).any():
         if spec.slam.heading == "known":
             raise ConfigError(
-                "heading_rad: no such column, and slam.heading = 'known' takes it for the compass; add the column, or "
-                "set slam.heading=estimated"
+                f"{place}: heading_rad: no such column, and slam.heading = 'known' takes it for the compass; add the "
+                "column, or set slam.heading=estimated"
             )
         inputs = inputs._replace(heading=np.full(len(inputs.time), inputs.start.heading))
     return replay(inputs, spec.model_dump(), spec.schemes[0], rng=rng)
@@ -189,9 +194,9 @@ def inputs_of(
     return _check_inputs(made, place)
 
 
-def input_warnings(inputs: Inputs) -> list[str]:
+def input_warnings(inputs: Inputs, spec: PipelineSpec) -> list[str]:
     """Lines about a user's own measurements that are allowed, and most often a mistake: times in another unit, each
-    component with a time of its own, or components that are there twice."""
+    component with a time of its own, components that are there twice, too weak for the receiver or too early."""
     step = usual_step(inputs.time)
     counts, lines, row = {len(one) for one in inputs.measurements}, [], 0
     copies: list[str] = []
@@ -211,7 +216,38 @@ def input_warnings(inputs: Inputs) -> list[str]:
     if copies:
         what = "component is an exact copy" if len(copies) == 1 else "components are exact copies"
         lines.append(f"{len(copies)} {what} of another in the same cycle, the first in {copies[0]}; leave copies out")
-    return lines
+    return [*lines, *_weak_components(inputs, spec), *_early_paths(inputs)]
+
+
+def _weak_components(inputs: Inputs, spec: PipelineSpec) -> Iterator[str]:
+    """Line about a user's own measurements of which most components are too weak for their receiver to report them."""
+    settings = build_settings(spec)
+    snr = np.concatenate([settings.radio.integrated_snr(one.amplitude) for one in inputs.measurements])
+    weak = int(np.count_nonzero(snr < settings.sensor.threshold))
+    if weak > 0.5 * len(snr):
+        decibels = 10.0 * np.log10([float(np.median(snr)), settings.sensor.threshold])
+        yield (
+            f"amplitude or snr_db: {weak} of {len(snr)} components are below the detection threshold of "
+            f"{decibels[1]:.3g} dB, the middle one at {decibels[0]:.3g} dB, and the filter takes few for landmarks, or "
+            "none; give the modulus of the gain, not power, and the radio's energy, noise_psd and array"
+        )
+
+
+def _early_paths(inputs: Inputs) -> Iterator[str]:
+    """Line about a user's own measurements whose shortest path is mostly shorter than from Tx to Rx, by more than it
+    errs: no path is, by clocks that agree."""
+    baseline, cycles, early = float(np.linalg.norm(inputs.body.tx_offset - inputs.body.rx_offset)), 0, []
+    for one in inputs.measurements:
+        if len(one):
+            cycles, first = cycles + 1, int(np.argmin(one.tau))
+            length, error = SPEED_OF_LIGHT * one.tau[first], SPEED_OF_LIGHT * one.tau_std[first]
+            early += [float(length)] if length + 5.0 * error < (1.0 - EARLY) * baseline else []
+    if len(early) > 0.5 * cycles:
+        yield (
+            f"delay_s: in {len(early)} of {cycles} cycles the shortest path ({np.median(early):.3g} m) is shorter than "
+            f"from Tx to Rx ({baseline:.3g} m), which is taken for clocks that are apart, if at all; give delays "
+            "of the whole way, not halves or from the first path on, and Tx and Rx where they are"
+        )
 
 
 def _check_inputs(inputs: Inputs, place: str) -> Inputs:
@@ -243,7 +279,10 @@ def _check_inputs(inputs: Inputs, place: str) -> Inputs:
             if not good.all():
                 raise ConfigError(f"{where}: {name} of {value[~good][0]:g} received; give positive, finite numbers")
         if (one.tau_std < FINEST_STD).any():
-            raise ConfigError(f"{where}: tau_std of {one.tau_std.min():g} s received; give seconds")
+            raise ConfigError(
+                f"{where}: tau_std of {one.tau_std.min():g} s received; give seconds (left out, it follows from the "
+                "SNR: then mend amplitude, snr_db or radio.noise_psd)"
+            )
         told = one.from_panel
         if told is not None and not ((told >= 0.0) & (told <= 1.0)).all():
             raise ConfigError(f"{where}: from_panel: not from 0 to 1; give probabilities")

@@ -131,8 +131,8 @@ def test_without_a_compass_the_heading_has_to_be_estimated(table: Table, spec: P
     """Zeros in its stead would be taken for a compass that shows them: nothing is taken for known that nothing told."""
     rows = {name: column for name, column in table.items() if name != "heading_rad"}
     inputs = inputs_of(rows, StartPrior(np.zeros(3), np.zeros(3), 0.3), build_radio(spec.radio))
-    with pytest.raises(ConfigError, match="heading_rad: no such column"):
-        localise(inputs, spec, rng=np.random.default_rng(0))
+    with pytest.raises(ConfigError, match=r"^mine\.csv: heading_rad: no such column"):
+        localise(inputs, spec, rng=np.random.default_rng(0), place="mine.csv")
     free = spec.model_copy(update={"slam": spec.slam.model_copy(update={"heading": "estimated"})})
     answers = localise(inputs, free, rng=np.random.default_rng(0))
     assert answers.estimates[0].heading == pytest.approx(0.3, abs=1e-12)
@@ -241,9 +241,44 @@ def test_times_that_are_most_often_a_mistake_are_warned_of(
 ) -> None:
     times = [factor * time + apart * row for row, time in enumerate(table["time_s"])]
     start, radio = StartPrior(np.zeros(3), np.zeros(3), 0.0), build_radio(spec.radio)
-    assert not input_warnings(inputs_of(table, start, radio))
-    (line,) = input_warnings(inputs_of({**table, "time_s": times}, start, radio))
+    assert not input_warnings(inputs_of(table, start, radio), spec)
+    (line,) = input_warnings(inputs_of({**table, "time_s": times}, start, radio), spec)
     assert said in line
+
+
+def test_components_too_weak_for_the_receiver_are_warned_of(
+    recorded: tuple[Inputs, np.ndarray], table: Table, spec: PipelineSpec
+) -> None:
+    """Power given for amplitude; a noise density of a thousand times what it is."""
+    radio, start, rows = build_radio(spec.radio), recorded[0].start, len(table["time_s"])
+    power = {**table, "amplitude": [value**2 for value in table["amplitude"]]}
+    (line,) = input_warnings(inputs_of(power, start, radio), spec)
+    found = re.match(
+        rf"amplitude or snr_db: (\d+) of {rows} components are below the detection threshold of 10 dB", line
+    )
+    assert found
+    assert int(found[1]) > 0.9 * rows
+    noisy = load_spec(find_pipeline("trace_then_slam"), [*CHANGES, "radio.noise_psd=1.0"])
+    (line,) = input_warnings(inputs_of(table, start, build_radio(noisy.radio)), noisy)
+    assert line.startswith(f"amplitude or snr_db: {rows} of {rows} components")
+
+
+def test_a_direct_path_shorter_than_from_tx_to_rx_is_warned_of(
+    recorded: tuple[Inputs, np.ndarray], table: Table, spec: PipelineSpec
+) -> None:
+    """Half delays, or a Tx said to be farther off than it is; an error of five per cent of the baseline passes."""
+    radio, (inputs, _) = build_radio(spec.radio), recorded
+    baseline = np.linalg.norm(inputs.body.tx_offset - inputs.body.rx_offset)
+
+    def said(part: float) -> list[str]:
+        delays = [part * delay for delay in table["delay_s"]]
+        return input_warnings(inputs_of({**table, "delay_s": delays}, inputs.start, radio, inputs.body), spec)
+
+    assert said(0.96) == []
+    (line,) = said(0.5)
+    assert line.startswith(
+        f"delay_s: in {CYCLES} of {CYCLES} cycles the shortest path ({baseline / 2:.3g} m) is shorter"
+    )
 
 
 def test_times_in_which_the_agent_would_cross_rooms_are_refused(table: Table, spec: PipelineSpec) -> None:
@@ -273,12 +308,12 @@ def test_rows_that_are_there_twice_are_warned_of(
         (late, f"2 components are exact copies of another in the same cycle, the first in row {count + 1} of the data"),
     ):
         given = {name: [column[row] for row in rows] for name, column in table.items()}
-        (line,) = input_warnings(inputs_of(given, start, radio))
+        (line,) = input_warnings(inputs_of(given, start, radio), spec)
         assert line.startswith(said)
     silent = {name: [np.nan, *column] for name, column in table.items()}  # a first cycle without a component
     silent["time_s"][0], silent["heading_rad"][0] = -1.0, 0.0
     again = {name: [*column[:2], column[1], *column[2:]] for name, column in silent.items()}
-    (line,) = input_warnings(inputs_of(again, start, radio))
+    (line,) = input_warnings(inputs_of(again, start, radio), spec)
     assert line.startswith("1 component is an exact copy of another in the same cycle, the first in row 3 of the data")
 
 

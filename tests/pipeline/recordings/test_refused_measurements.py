@@ -136,6 +136,11 @@ def test_a_column_given_twice_is_refused(tmp_path: Path, spec: PipelineSpec) -> 
             "theta_r_rad: no finite number in row 3 of the data; fill it, or leave the component out",
         ),
         (
+            ",time_s,heading_rad,delay_s,cos_x,cos_y,snr_db\n0,0,0,1e-8,0,0,30\n",
+            "column 1: has no name, as the index of a data frame that was written with the rest; leave it out "
+            "(to_csv(..., index=False)), or name it",
+        ),
+        (
             "time_s,heading_rad,delay_s,cos_x,cos_y,snr_db\n0,0,1e-8,0,0,3000\n",
             "snr_db: 3000 in row 1 of the data; give decibels, -200 to 200",
         ),
