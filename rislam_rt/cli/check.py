@@ -55,7 +55,7 @@ def command(
     from rislam_rt.pipeline import load_spec
     from rislam_rt.pipeline.room.array_warnings import array_warnings
     from rislam_rt.pipeline.room.late_paths import late_path_warnings
-    from rislam_rt.pipeline.room.motion_warnings import motion_warnings
+    from rislam_rt.pipeline.room.motion_warnings import motion_warnings, short_motion_warnings
     from rislam_rt.pipeline.specification.pipeline_spec import build_settings
     from rislam_rt.scene import check_scene
     from rislam_rt.scene.load import read_draft
@@ -65,6 +65,7 @@ def command(
     if carrier_ghz is not None:
         changed += [f"radio.carrier_ghz={carrier_ghz}", f"radio.bandwidth_ghz={min(1.0, carrier_ghz)}"]
     file = pipeline or pipeline_file(str(MAIN_JOB))
+    told = f"pipeline '{file.stem}'" if is_shipped(file) else str(file)
     spec = load_spec(file, changed)
     settings = build_settings(spec)
     if picture is not None:
@@ -77,10 +78,11 @@ def command(
         checked = read_draft(Path(scene)).scene
     if checked is not None:
         looked = survey(checked, settings)
-        places = str(scene_file(scene)), "--set" if is_shipped(file) else str(file)
+        places = str(scene_file(scene)), told
         findings += _run_errors(checked, spec, places, changed, named=names_schemes(spec, file, changed))
         findings += motion_warnings(checked, settings.radio, settings.receiver, spec.budget, places[0])
-        findings += array_warnings(settings.radio, places[1])
+        findings += short_motion_warnings(checked, spec.budget, places[0])
+        findings += array_warnings(settings.radio, _place("radio.array", told, changed))
         findings += late_path_warnings(looked.paths, looked.settings, places[0])
         findings += return_warnings(looked, places[0])
     for finding in findings:
@@ -99,8 +101,8 @@ def _run_errors(
     scene: "Scene", spec: "PipelineSpec", files: tuple[str, str], changed: Sequence[str], *, named: bool
 ) -> "list[Finding]":
     """Part of `rislam-rt check`: the error that `rislam-rt run` would end with at once, of a pipeline that does not fit
-    a scene. Its place is one of the `files` of scene and pipeline, or `--set` for what is `changed` there, or stands
-    in a file that comes with the package; `named`: whether the user named the schemes."""
+    a scene. Its place is one of the `files` of scene and pipeline, or `--set` for what is `changed` there; `named`:
+    whether the user named the schemes."""
     from rislam_rt.cli.run import panel_schemes, without_schemes
     from rislam_rt.pipeline.run import check_run
     from rislam_rt.scene.findings import error_at
@@ -110,11 +112,15 @@ def _run_errors(
     except ConfigError as error:
         field, _, told = str(error).partition(": ")
         message, _, mend = told.partition("; ")
-        place = files[0] if field.startswith("ris.") else files[1]
-        if any(setting.partition("=")[0].strip() == field for setting in changed):
-            place = "--set"
+        place = _place(field, files[0] if field.startswith("ris.") else files[1], changed)
         return [error_at(place, field, message, mend)]
     return []
+
+
+def _place(field: str, file: str, changed: Sequence[str]) -> str:
+    """Part of `rislam-rt check`: where a setting comes from, `--set` if it or one below it was `changed`, or a file."""
+    keys = [setting.partition("=")[0].strip() for setting in changed]
+    return "--set" if any(f"{key}.".startswith(f"{field}.") for key in keys) else file
 
 
 def _advise(scene: "Scene", settings: "Records", picture: Path | None, looked: "Survey") -> dict[str, object]:

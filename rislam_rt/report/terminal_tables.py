@@ -261,13 +261,16 @@ def print_cards(rows: Sequence["Row"], timings: Sequence[Mapping[str, Any]]) -> 
 
 
 def print_scene(scene: Scene) -> None:
-    """Print the contents of a scene as a table: reflectors, scatterers, panels, trajectory, bounds."""
+    """Print the contents of a scene as a table: reflectors, occluders, scatterers, panels, trajectory, bounds."""
     low, high = scene.bounds
     table = Table("what", "name", "where \\[m]")
     for reflector in scene.reflectors:
         table.add_row("reflector", reflector.name, f"{len(reflector.faces)} triangles, {reflector.material.words}")
+    for shade in scene.occluders:
+        table.add_row("occluder", shade.name, f"{len(shade.faces)} triangles")
     for scatterer in scene.scatterers:
-        table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2")
+        shades = ", shades" if scatterer.shade is not None else ""
+        table.add_row("scatterer", scatterer.name, f"{_point(scatterer.position)}, {scatterer.rcs:.3g} m2{shades}")
     for panel in scene.panels:
         spec = panel.spec
         table.add_row("panel", panel.name, f"{_point(panel.center)}, {spec.rows} x {spec.cols}, {spec.levels} levels")

@@ -57,6 +57,19 @@ def test_an_array_that_tells_no_direction_is_said_before_it_runs(check):
     assert "warning: --set: radio.array.spacing_wavelengths: antennas 1 wavelengths apart" in out
 
 
+@pytest.mark.parametrize(("rows", "said"), [(1, "1 cycle, 0.1 s"), (2, "2 cycles, 0.2 s"), (20, "")])
+def test_a_motion_too_short_to_locate_anything_is_said_before_it_runs(check, tmp_path, rows, said):
+    room = tmp_path / "room"
+    shutil.copytree(SCENES / "paper_room", room)
+    scene = (room / "scene.toml").read_text()
+    (room / "scene.toml").write_text(scene[: scene.index("[agent]")] + '[agent]\ntrajectory = "way.csv"\n')
+    lines = [f"{0.1 * row:.1f},{3.0 + 0.01 * row:.2f},3.0,0.5" for row in range(rows)]
+    (room / "way.csv").write_text("\n".join(["time,x,y,z", *lines, ""]))
+    told = [line for line in check(room)[1].splitlines() if "a motion of" in line]
+    assert len(told) == bool(said)
+    assert all(f"warning: {room / 'scene.toml'}: agent: a motion of {said}: " in line for line in told)
+
+
 def test_a_scene_without_a_panel_has_no_map(check, tmp_path):
     code, out, _ = check("empty_box", "--picture", "map.png")
     assert code == 0
@@ -106,7 +119,8 @@ def test_a_cycle_that_the_budget_does_not_sum_to_is_refused_as_by_the_run(check,
     told = run("run", "trace_then_slam", "--scene", room, "--no-report")[2].removeprefix("error: ")
     code, out, _ = check(room, *words)
     assert code == 2
-    assert f"error: --set: {told}" in out
+    assert f"error: pipeline 'trace_then_slam': {told}" in out  # nobody gave --set
+    assert f"error: --set: {told[:30]}" in check(room, *words, "--set", "budget.optimise_s=0.05")[1]
     assert "the four steps sum to 0.1 s; make them the scene's cycle of 0.05 s (--set budget.optimise_s=0.025 " in out
     mend = re.search(r"\((--set .*)\)", told).group(1).split()
     assert check(room, *words, *mend)[0] == 0

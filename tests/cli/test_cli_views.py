@@ -1,8 +1,11 @@
 """`show --html`: files that stand alone, and one line for what cannot be."""
 
 import json
+import re
+import shutil
 from pathlib import Path
 
+from rislam_rt.shipped import find_room
 from rislam_rt.storage.checksums import seal
 
 SHORT = ("--set", "channel=image_source", "--set", "cycles=3", "--set", "depth=0", "--set", 'schemes=["random"]')
@@ -21,6 +24,18 @@ def test_show_writes_a_page_that_turns_and_a_picture_if_asked(run, tmp_path):
     assert code == 0
     assert (tmp_path / "box.png").stat().st_size > 10_000
     assert "box.png" in out
+
+
+def test_show_lists_what_only_shades(run, tmp_path):
+    room = tmp_path / "room"
+    shutil.copytree(find_room("shaded_room"), room)
+    with (room / "scene.toml").open("a") as scene:
+        scene.write('\n[[shade]]\nname = "curtain"\nmesh = "meshes/curtain.obj"\n')
+    (room / "meshes" / "curtain.obj").write_text("v 3 1 0\nv 3 2 0\nv 3 2 2\nv 3 1 2\nf 1 2 3 4\n")
+    code, out, _ = run("show", room, "--html", "room.html", "--depth", 0)
+    assert code == 0
+    assert re.search(r"occluder +│ curtain +│ 2 triangles ", out)
+    assert re.search(r"ball +│ \(2.40, 3.20, 1.30\), 0.196 m2, shades ", out)
 
 
 def test_a_view_that_cannot_be_is_one_line(run, tmp_path):

@@ -1,4 +1,5 @@
-"""Warnings of a motion of the agent that receiver or filter does not reckon with: too fast, or manoeuvring too hard."""
+"""Warnings of a motion of the agent that receiver or filter does not reckon with: too fast, too short, or
+manoeuvring too hard."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,10 +8,12 @@ import numpy as np
 
 from rislam_rt.channel.doppler import end_velocities
 from rislam_rt.constants import MAX_SPEED
+from rislam_rt.input_messages import counted
 from rislam_rt.measurement import ReceiverConfig
 from rislam_rt.measurement.slot_motion import slot_weights
 from rislam_rt.model import RadioConfig, Scene
 from rislam_rt.pipeline.cycle import usual_step
+from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.pipeline.specification.pipeline_spec import BudgetSection
 from rislam_rt.scene.findings import Finding, warning_at
 from rislam_rt.slam.model_constants import CONSTANTS
@@ -34,6 +37,20 @@ def motion_warnings(
         yield from _fast_agent(scene, receiver.top_speed, file)
     yield from _averaged_returns(scene, radio, receiver, budget, file)
     yield from _manoeuvring_agent(scene, file)
+
+
+def short_motion_warnings(scene: Scene, budget: BudgetSection, file: str) -> Iterator[Finding]:
+    """Warning of a motion too short for anything to count as heard; `file` is what it names as its place."""
+    time = scene.agent.time
+    lasts = float(time[-1] - time[0]) + (usual_step(time) or budget.total)
+    if lasts < HEARD * (1.0 - ROUNDING):
+        yield warning_at(
+            file, "agent",
+            f"a motion of {counted(len(time), 'cycle')}, {lasts:.2g} s: walls, points and panels are told apart by how "
+            f"their paths change as the agent moves, and count as heard from {HEARD:g} s on, so that a run locates "
+            "little or nothing",
+            f"give {HEARD:g} s or more; to look at single places, 'trace' and 'compare' are enough",
+        )  # fmt: skip
 
 
 def _averaged_returns(
