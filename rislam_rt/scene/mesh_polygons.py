@@ -17,6 +17,17 @@ _CUT_OR_COUNTED = re.compile(
     rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^f[^\n]*[ \t]-\d|^f[^\n]*#|^[ \t]+[fv][ \t]|\\\n", re.MULTILINE
 )
 """Where an OBJ file has polygons, corners counted backwards, comments behind faces, indented or continued lines."""
+_PLY_HEAD = re.compile(
+    rb"ply\r?\nformat binary_(little|big)_endian 1\.0\r?\n((?:(?:element|property)[ \t][^\n]*\n)*)end_header\r?\n"
+)
+_PLY_ELEMENT = re.compile(rb"element (\w+) (\d{1,9})\s*\n((?:property [^\n]*\n)+)")
+_PLY_TYPES = {
+    b"char": "i1", b"uchar": "u1", b"short": "i2", b"ushort": "u2", b"int": "i4", b"uint": "u4", b"float": "f4",
+    b"double": "f8", b"int8": "i1", b"uint8": "u1", b"int16": "i2", b"uint16": "u2", b"int32": "i4", b"uint32": "u4",
+    b"float32": "f4", b"float64": "f8",
+}  # fmt: skip
+_CORNERS = ("vertex_index", "vertex_indices")
+"""Names that exporters of PLY files give to the corners of a face."""
 _MEND = "cut it into triangles where the mesh is made"
 
 
@@ -178,24 +189,81 @@ def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
     Raises
     ------
     Fault
-        A face crosses itself.
+        A face crosses itself, or is read at the wrong place.
     """
     raw: dict[str, Any] = next((one.metadata.get("_ply_raw", {}) for one in loaded.geometry.values()), {})
     data, at = (raw.get(key, {}).get("data") for key in ("face", "vertex"))
     if data is None or at is None:
         return None
     names = list(data) if isinstance(data, dict) else list(data.dtype.names)
-    name = next((name for name in names if name in ("vertex_index", "vertex_indices")), names[0])
+    name = next((name for name in names if name in _CORNERS), names[0])
     rows = data[name] if isinstance(data, dict) else data[name]["f1"]
+    if not isinstance(data, dict) and (data[name]["f0"] != rows.shape[1]).any():
+        raise Fault("its faces have different numbers of corners", "export it as text (ASCII), or of triangles alone")
     if isinstance(rows, np.ndarray) and rows.ndim == 2 and rows.shape[1] < 4:
         return None
     polygons = [row for row in (np.asarray(row, dtype=np.int64).reshape(-1) for row in rows) if len(row) > 2]
     points = np.column_stack([np.asarray(at[axis], dtype=np.float64).reshape(-1) for axis in "xyz"])
-    if max((len(polygon) for polygon in polygons), default=0) < 4 or not np.isfinite(points).all():
-        return None
-    if min(p.min() for p in polygons) < 0 or max(p.max() for p in polygons) >= len(points):
-        return None
-    cuts = polygon_triangles(points, [polygon.tolist() for polygon in polygons])
+    cuts = _ply_cuts(points, polygons)
     if all(np.array_equal(cut, fan(len(polygon))) for cut, polygon in zip(cuts, polygons, strict=True)):
         return None
     return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
+
+
+def mixed_ply_faces(content: bytes) -> tuple[Floats, Integers] | None:
+    """Vertices (V, 3) and triangles (F, 3) of a binary PLY file whose faces have different numbers of corners, which
+    trimesh does not read; None for any other file, and for one that does not hold what its header says.
+
+    Raises
+    ------
+    Fault
+        A face crosses itself.
+    """
+    head = _PLY_HEAD.match(content)
+    if head is None:
+        return None
+    order, at, found = "<" if head[1] == b"little" else ">", head.end(), dict[bytes, Any]()
+    for name, count, lines in _PLY_ELEMENT.findall(head[2]):
+        properties = [line.split()[1:] for line in lines.splitlines()]
+        try:
+            if any(words[0] == b"list" for words in properties):
+                found[name], at = _list_rows(content, at, int(count), properties, order)
+            else:
+                row = np.dtype([(words[1].decode("latin-1"), order + _PLY_TYPES[words[0]]) for words in properties])
+                found[name], at = np.frombuffer(content, row, int(count), at), at + int(count) * row.itemsize
+        except (LookupError, ValueError, TypeError):
+            return None
+    vertices, polygons = found.get(b"vertex"), [p for p in found.get(b"face", []) if len(p) > 2]
+    if vertices is None or not {"x", "y", "z"} <= set(vertices.dtype.names or ()) or len({*map(len, polygons)}) < 2:
+        return None
+    points = np.column_stack([vertices[axis].astype(np.float64) for axis in "xyz"])
+    cuts = _ply_cuts(points, polygons)
+    return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
+
+
+def _list_rows(
+    content: bytes, at: int, count: int, properties: list[list[bytes]], order: str
+) -> tuple[list[Integers], int]:
+    """Corners of each face of a binary PLY file's element with lists, and where it ends; errors where it is damaged."""
+    rows: list[Integers] = []
+    for _ in range(count):
+        for words in properties:
+            size = 1
+            if words[0] == b"list":
+                sizes = np.dtype(order + _PLY_TYPES[words[1]])
+                size, at = int(np.frombuffer(content, sizes, 1, at)[0]), at + sizes.itemsize
+            kind = np.dtype(order + _PLY_TYPES[words[-2]])
+            if size < 0 or at + size * kind.itemsize > len(content):
+                raise ValueError("the file ends within a list")
+            if words[-1].decode("latin-1") in _CORNERS:
+                rows.append(np.frombuffer(content, kind, size, at).astype(np.int64))
+            at += size * kind.itemsize
+    return rows, at
+
+
+def _ply_cuts(points: Floats, polygons: Sequence[Integers]) -> list[Integers]:
+    """Triangles within each face of a PLY file; fans where a face cannot be looked at, of which the mesh is told."""
+    named = np.concatenate([*polygons, np.zeros(0, dtype=np.int64)])
+    if not np.isfinite(points).all() or named.min(initial=0) < 0 or named.max(initial=-1) >= len(points):
+        return [fan(len(polygon)) for polygon in polygons]
+    return polygon_triangles(points, [polygon.tolist() for polygon in polygons])

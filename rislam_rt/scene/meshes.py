@@ -17,7 +17,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.mesh_polygons import obj_with_triangles, ply_faces
+from rislam_rt.scene.mesh_polygons import mixed_ply_faces, obj_with_triangles, ply_faces
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""
@@ -107,7 +107,13 @@ class MeshReader:
         mesh = _own_ply(content) if suffix == ".ply" else None
         if mesh is None:
             if self._key != (suffix, content):
-                self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
+                try:
+                    self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
+                except Fault:
+                    mixed = mixed_ply_faces(content) if suffix == ".ply" else None
+                    if mixed is None:
+                        raise
+                    return sound_mesh(Mesh(*mixed), max_faces, reach)
             with _errors_as_faults(suffix[1:]):
                 cut = ply_faces(self._loaded) if suffix == ".ply" else None
                 mesh = Mesh(*cut) if cut else _flatten(self._loaded, node)

@@ -83,6 +83,31 @@ def test_convex_faces_are_as_they_were() -> None:
     assert mixed.faces.tolist() == [[0, 2, 3], [3, 1, 0], [2, 4, 5]]
 
 
+@pytest.mark.parametrize("order", ["little", "big"])
+def test_a_binary_ply_file_may_mix_triangles_quads_and_concave_faces(order: str) -> None:
+    """As Blender writes it, normals beside the positions: trimesh reads faces of one size alone."""
+    points = np.insert(np.array([*DOORWAY, (5, 0), (5, 2.8), (6, 0)], dtype=float), 2, 1.0, axis=1)
+    faces = [range(8), (5, 8, 9, 6), (8, 10, 9)]
+    end = "<" if order == "little" else ">"
+    head = (
+        f"ply\nformat binary_{order}_endian 1.0\ncomment by hand\nelement vertex {len(points)}\n"
+        + "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+        + f"element face {len(faces)}\nproperty uchar flags\nproperty list uchar uint vertex_indices\nend_header\n"
+    )
+    rows = b"".join(bytes([7, len(face)]) + np.array(face, f"{end}u4").tobytes() for face in faces)
+    content = head.encode() + np.hstack([points, 0.0 * points]).astype(f"{end}f4").tobytes() + rows
+    mesh = MeshReader().parse(content, "a.ply")
+    crosses = triangle_cross(mesh.triangles)
+    assert crosses[:, 2].sum() / 2 == pytest.approx(9.1 + 2.8 + 1.4, rel=1e-6)
+    assert crosses[:, 2].min() > 0.0
+    for cut in (1, 9, 40):
+        with pytest.raises(Fault, match="not a readable PLY mesh"):
+            MeshReader().parse(content[:-cut], "a.ply")
+    wrong = content.replace(np.array([8, 10, 9], f"{end}u4").tobytes(), np.array([8, 10, 99], f"{end}u4").tobytes())
+    with pytest.raises(Fault, match="a face names vertex 99 of 11"):
+        MeshReader().parse(wrong, "a.ply")
+
+
 def test_a_face_with_a_window_joined_by_a_bridge_keeps_the_window() -> None:
     outer, window = [(0, 0), (4, 0), (4, 3), (0, 3)], [(1, 1), (1, 2), (2, 2), (2, 1)]
     points = np.insert(np.array(outer + window, dtype=float), 2, 0.0, axis=1)
