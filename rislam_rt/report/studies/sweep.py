@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.input_messages import unit_of
-from rislam_rt.report.style import save_figure, scheme_colour, styled
+from rislam_rt.report.style import legend_below, save_figure, scheme_styles, styled
 from rislam_rt.report.swept.error_curves import log_metres
 from rislam_rt.shipped import short_names
 from rislam_rt.studies.pipeline_sweep import SchemeScore
@@ -37,6 +37,7 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
     groups: dict[tuple[str, str], list[SchemeScore]] = {}
     for score in scores:
         groups.setdefault((score.scheme, _others(score.point, along)), []).append(score)
+    styles = scheme_styles(score.scheme for score in scores)
     kinds = list(dict.fromkeys(others for _, others in groups))
     step = min(0.12, 0.8 / len(groups))
     with styled():
@@ -51,7 +52,7 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
             middle = np.array([score.overall for score in group])
             ends = np.array([score.interval or (score.overall, score.overall) for score in group])
             label = ", ".join(part for part in (scheme, others) if part)
-            axis.errorbar(x, middle, np.abs(ends.T - middle), color=scheme_colour(scheme), label=label, **style)
+            axis.errorbar(x, middle, np.abs(ends.T - middle), color=styles[scheme].colour, label=label, **style)
         if not numeric:
             axis.set_xticks(range(len(ticks)), [*short_names(ticks).values()] if along == "scene" else ticks)
         log_metres(axis)
@@ -60,7 +61,7 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
         runs = sorted({len(score.rmse) for score in scores})
         count = " to ".join(map(str, runs[:: max(len(runs) - 1, 1)]))
         axis.set_title(f"{count} runs a point, 95 % bootstrap intervals")
-        figure.legend(loc="outside lower center", ncols=3, fontsize=9)
+        legend_below(figure, axis.get_legend_handles_labels()[0], columns=3)
     return figure
 
 
