@@ -37,7 +37,7 @@ CAPTIONS = {
     "levels": "Gain of the strongest path of each class, and its SNR over all antennas. The panel's direct path "
     "depends on the code: until the panel is in the map, designed codes are beams in search of it; most of them miss.",
     "paths": "Paths with at most one wall bounce, halfway through the run, with the levels of the first scheme.",
-    "codes": "Phase levels of the panel at five moments, and the gain of its direct path under them.",
+    "codes": "Phase levels of the panel over the run, and the gain of its direct path under them.",
     "timing": "Median of each step, with a whisker to the 99th percentile.",
 }
 
