@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from rislam_rt.arrays import Floats
-from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.evaluate import rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.channels import prepare_channel
@@ -148,19 +148,19 @@ def slam_sweep(
     )  # fmt: skip
 
 
-def default_folder(sweeps: Path, name: str, scene: str) -> Path:
-    """Folder of a pipeline's sweep within `sweeps`, `<name>-<scene>`, or, where that holds the sweep of another scene
-    of the same name, `<name>-<scene>-<hash of the scene's path>`.
+def default_folder(sweeps: Path, sweep: Sweep) -> Path:
+    """Folder of a pipeline's sweep within `sweeps`, `<name>-<scene>`, or, where that holds the sweep of other settings
+    or of another scene of the same name, `<name>-<scene>-<hash of the settings>`.
 
-    Raises
-    ------
-    ResultError
-        The folder's `sweep.json` was changed since it was written.
+    Other axes and repetitions of the same settings share a folder, and their cells.
     """
-    folder = sweeps / f"{name}-{Path(scene).name}"
-    if not (folder / SWEEP_FILE).is_file() or read_sealed(folder / SWEEP_FILE)["base"].get("scene") == scene:
+    folder = sweeps / f"{sweep.name}-{Path(str(sweep.base['scene'])).name}"
+    try:
+        other = checksum(read_sealed(folder / SWEEP_FILE)["base"])
+    except ResultError:  # none, or a damaged one: the cells there tell what they are of
         return folder
-    return sweeps / short_name(folder.name, checksum(scene))
+    own = checksum(sweep.base)
+    return folder if own == other else sweeps / short_name(folder.name, own)
 
 
 def typed_axis(axis: Axis) -> Axis:
