@@ -14,7 +14,8 @@ from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words
 from rislam_rt.pipeline.scores.summary import panel_track
 from rislam_rt.pipeline.scores.true_loss import words_of_silence
 from rislam_rt.pipeline.scores.wall_scores import found_of_heard
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings, build_settings
+from rislam_rt.pipeline.specification.stored_spec import stored_spec
 from rislam_rt.slam.step_info import StepOutcome
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
@@ -129,7 +130,7 @@ def _lost(scores: Mapping[str, Any]) -> Iterator[str]:
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
     """Conclusions on landmarks that are missing in a scheme's last map, one line each, with the reason."""
-    spec = PipelineSpec.model_validate(dict(result.config))
+    spec = stored_spec(result.config)
     settings = build_settings(spec, len(result.scene.panels) if scheme.levels else 0)
     threshold = build_sensor(settings.radio, settings.receiver).threshold
     paths = result.paths
