@@ -36,8 +36,11 @@ def draw_agent_error(result: SlamResult) -> Figure:
             error = position_errors(scheme.position, result.scene.agent.position)
             believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
             colour, shown = styles[name].colour, _on_log_axis(error)
+            look = _look(styles[name], number / len(result.schemes), len(time))
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
-            handles += axis.plot(time, shown, lw=1.6, label=label, **_look(styles[name], number, len(time)))
+            handles += axis.plot(
+                time, shown, lw=1.6, label=label, **_look(styles[name], number / len(result.schemes), len(time))
+            )
             axis.plot(time, _on_log_axis(believed), color=colour, lw=1.0, ls="--", alpha=0.7)
             lost = np.array([outcome == StepOutcome.DIVERGED for outcome in scheme.outcome], dtype=np.bool_)
             axis.plot(time[lost], shown[lost], color=colour, ls="none", marker="x", ms=6.0)
@@ -55,11 +58,11 @@ def draw_agent_error(result: SlamResult) -> Figure:
     return figure
 
 
-def _look(style: SchemeStyle, number: int, cycles: int) -> dict[str, Any]:
+def _look(style: SchemeStyle, share: float, cycles: int) -> dict[str, Any]:
     """Colour and marker of a scheme's curve over time, as arguments of `plot`; markers stand at about `MARKS` cycles,
-    those of another `number` beside them, so that curves which lie on each other can be told apart."""
+    from the `share` of their distance on, so that curves which lie on each other can be told apart."""
     step = max(cycles // MARKS, 1)
-    return {"color": style.colour, "marker": style.marker, "ms": 5.0, "markevery": (number * step // 6 % step, step)}
+    return {"color": style.colour, "marker": style.marker, "ms": 5.0, "markevery": (int(share * step), step)}
 
 
 def _on_log_axis(error: Floats) -> Floats:
@@ -83,7 +86,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
         axes = figure.subplots(1, max(len(scene.landmarks), 1), sharey=True, squeeze=False)[0]
         for place, (name, errors) in reversed(list(enumerate(tracks.items()))):
             for number, axis in enumerate(axes[: errors.shape[1]]):
-                look = _look(styles[name], place, len(time))
+                look = _look(styles[name], place / len(tracks), len(time))
                 axis.plot(time, 100.0 * errors[:, number], lw=1.4, label=name, **look)
         never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
         for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
@@ -122,7 +125,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
             if np.isfinite(level).any():
                 random = name == "random"
                 width, order = (0.7, 2) if random else (1.8, 3)
-                look = _look(styles[name], number, len(time))
+                look = _look(styles[name], number / len(result.schemes), len(time))
                 axis.plot(time, level, lw=width, zorder=order, label=f"RIS, {name}", **look)
         threshold = detection_snr_db - snr_per_gain_db
         axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")

@@ -76,6 +76,15 @@ def test_curves_of_a_run_have_a_colour_and_a_marker_each(six, name):
     assert all(len(set(to_rgb(colour))) == 1 for colour in others)  # what is no scheme is grey
 
 
+def test_markers_of_curves_that_lie_on_each_other_do_not(run_short):
+    run = run_short("receiver.estimator=bound", "cycles=24", 'schemes=["no_ris"]')
+    (scheme,) = run.schemes.values()
+    three = replace(run, schemes={name: replace(scheme, scheme=name) for name in NAMES[-3:]})
+    (axis,) = draw_agent_error(three).axes
+    first = [line.get_markevery()[0] for line in axis.lines if line.get_linestyle() == "-"]
+    assert sorted(first) == [0, 1, 2]
+
+
 def test_views_and_animations_of_a_run_have_its_colours(six):
     wanted = [scheme_styles(NAMES)[name].colour for name in NAMES]
     assert [scheme["colour"] for scheme in run_data(six)["schemes"]] == wanted
