@@ -36,7 +36,6 @@ def draw_agent_error(result: SlamResult) -> Figure:
             error = position_errors(scheme.position, result.scene.agent.position)
             believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
             colour, shown = styles[name].colour, _on_log_axis(error)
-            look = _look(styles[name], number / len(result.schemes), len(time))
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
             handles += axis.plot(
                 time, shown, lw=1.6, label=label, **_look(styles[name], number / len(result.schemes), len(time))
