@@ -78,7 +78,9 @@ def _recording_file(folder: Path, run: Path, scheme: str) -> Path:
     """Path of the recording of a scheme, checked: the score card is not computed if it cannot be written."""
     if not folder.is_dir() and (folder.exists() or folder.suffix == ".nc"):
         raise ConfigError(f"--save {folder}: names a file; give a folder, for one recording of each scheme")
-    file = folder / f"{run.resolve().name}_{scheme}.nc"
+    from rislam_rt.pipeline.run_datasets import part_name
+
+    file = folder / part_name(run.resolve().name, scheme)
     check_output(file, "--save ")
     return file
 

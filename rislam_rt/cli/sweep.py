@@ -10,6 +10,7 @@ from rislam_rt.cli.interrupts import Interrupted
 from rislam_rt.cli.options import MAIN_JOB, JsonFile, PipelineFile, SceneOption, Settings, check_one_scene
 from rislam_rt.cli.output_files import write_json
 from rislam_rt.cli.progress_bars import show_sweep
+from rislam_rt.input_messages import counted
 
 if TYPE_CHECKING:
     from rislam_rt.sweeps import Row, Sweep, SweepOptions, SweepReport
@@ -49,12 +50,13 @@ def command(
     from rislam_rt.report.terminal_tables import print_sweep
     from rislam_rt.studies.pipeline_sweep import default_folder, load_section, score_rows, slam_sweep
     from rislam_rt.sweeps import SweepOptions
+    from rislam_rt.sweeps.store import count_others
 
     check_one_scene(scene, set_)
     sweep = slam_sweep(pipeline, set_ or (), axis or (), scene=scene, repeat=repeat)
     limit = time_limit if time_limit is not None else load_section(pipeline, set_ or ()).time_limit_s
     effort = SweepOptions(jobs or os.cpu_count() or 1, dask, limit, retry, estimate)
-    target = out or default_folder(Path("sweeps"), sweep.name, str(sweep.base["scene"]))
+    target = out or default_folder(Path("sweeps"), sweep)
     try:
         report = _run(sweep, target, effort)
     except KeyboardInterrupt:
@@ -63,7 +65,9 @@ def command(
         return
     scores = score_rows(report.rows)
     print_sweep(scores)
-    typer.echo(f"sweep folder: {target}")
+    others = count_others(target, (row.cell for row in report.rows))
+    more = f" (besides {counted(others, 'cell')} of other settings or repetitions, kept and not in its tables)"
+    typer.echo(f"sweep folder: {target}{more if others else ''}")
     write_json(json, {"rows": [score.as_dict() for score in scores], "failed": len(report.failed)})
     if report.failed:
         raise typer.Exit(1)

@@ -9,12 +9,13 @@ import hashlib
 import inspect
 import re
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
+from sysconfig import get_path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from rislam_rt.model import DataSheet, Paths, RadioConfig, RisCode, Scene, SlamE
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
+INSTALLED = {Path(__file__).parents[1], *(Path(get_path(name)) for name in ("stdlib", "purelib", "platlib"))}
+"""Folders of this package, of Python and of installed libraries, whose files are no file of a user's own."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -100,6 +103,27 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
     """
     files = {name: _file(load_own(name)) for name in sorted(set(names)) if is_own(name)}
     return {name: own_digest(Path(file)) if file else "" for name, file in files.items()}
+
+
+def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
+    """Source files of a user's own methods, given by name with their `own_digests`, and of all that these count.
+
+    Content by path, relative to the folder from which they are imported.
+
+    Left out are installed ones, and files that have changed since: they are not what has run.
+    """
+    found: dict[str, bytes] = {}
+    for name, digest in digests.items():
+        if not digest or not _FORM.fullmatch(name) or own_digest(Path(_file(load_own(name)) or "")) != digest:
+            continue
+        named = Path(import_module(name.partition(":")[0]).__file__ or "")  # it may import what it names
+        for file in (named, Path(_file(load_own(name)) or "")):
+            if INSTALLED.isdisjoint(file.parents):
+                root = _root(file)
+                packages = {folder / "__init__.py" for folder in file.parents if root in folder.parents}
+                sources = _closure(file) | {one for one in packages if one.is_file()}
+                found |= {one.relative_to(root).as_posix(): one.read_bytes() for one in sorted(sources)}
+    return found
 
 
 def own_code(
@@ -209,16 +233,22 @@ def own_digest(file: Path) -> str:
     Of its bytes alone if there is nothing of that kind. Installed libraries are left out, as are imports by names that
     are computed at run time.
     """
-    files, left = {file}, [file]
-    while left:
-        fresh = set(_imported(left.pop())) - files
-        files |= fresh
-        left += fresh
+    files = _closure(file)
     if len(files) == 1:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     root = _root(file)
     parts = [f"{one.relative_to(root)}\0{hashlib.sha256(one.read_bytes()).hexdigest()}\n" for one in sorted(files)]
     return hashlib.sha256("".join(parts).encode()).hexdigest()
+
+
+def _closure(file: Path) -> set[Path]:
+    """The file of a user's own method, and all that it imports, directly or not, from its own folder or package."""
+    files, left = {file}, [file]
+    while left:
+        fresh = set(_imported(left.pop())) - files
+        files |= fresh
+        left += fresh
+    return files
 
 
 def _imported(file: Path) -> Iterator[Path]:

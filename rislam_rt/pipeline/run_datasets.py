@@ -130,6 +130,18 @@ def dataset_to_scheme(data: "xr.Dataset") -> SchemeResult:
     )  # fmt: skip
 
 
+def part_name(kind: str, scheme: str, ending: str = ".nc") -> str:
+    """Name of the file of a scheme's datasets, `<kind>_<scheme>`; a colon, which Windows allows in no name, as `@`."""
+    return f"{kind}_{scheme.replace(':', '@')}{ending}"
+
+
+def part_file(folder: Path, kind: str, scheme: str) -> Path:
+    """Path of the file of a scheme's datasets in a folder: as `part_name` has it or, without one, by the name with a
+    colon that earlier runs gave it."""
+    file, earlier = folder / part_name(kind, scheme), folder / f"{kind}_{scheme}.nc"
+    return earlier if earlier.is_file() and not file.is_file() else file
+
+
 def seal_dataset(data: "xr.Dataset", **about: str) -> "xr.Dataset":
     """Seal a run's data set by attributes: `about`, schema version, number of cycles, checksum of its content."""
     found = data.assign_attrs(about, schema=SCHEMA, cycles=int(data.sizes["time"]))

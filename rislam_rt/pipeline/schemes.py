@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from pydantic import ValidationInfo
+
 from rislam_rt.errors import ConfigError
 from rislam_rt.input_messages import did_you_mean, nearest
 from rislam_rt.pipeline.own_methods import is_own, load_own
@@ -52,7 +54,11 @@ SCHEMES = Schemes(
 """Built-in schemes by name; a user's own are loaded when they are asked for."""
 
 
-def check_scheme(name: str) -> str:
+STORED = "stored"
+"""Context of a validation in which methods of a user's own are not loaded, as they need not be there."""
+
+
+def check_scheme(name: str, info: ValidationInfo) -> str:
     """Return `name` if it is that of a built-in scheme or of a user's own method.
 
     Raises
@@ -60,7 +66,7 @@ def check_scheme(name: str) -> str:
     ValueError
         It is not; the message lists the built-in ones.
     """
-    if name in SCHEMES:
+    if name in SCHEMES or info.context == STORED:
         return name
     if not is_own(name):
         hint = did_you_mean(nearest(name, SCHEMES))

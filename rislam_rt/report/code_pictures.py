@@ -23,7 +23,8 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
     if not schemes:
         return None
     sheet = result.scene.ris.spec if result.scene.ris is not None else None
-    cycles = ((np.arange(number) + 0.5) / number * len(result.scene.agent)).astype(np.int64)
+    cycles = np.unique(((np.arange(number) + 0.5) / number * len(result.scene.agent)).astype(np.int64))
+    number = len(cycles)  # fewer in a run of fewer cycles
     direct = np.flatnonzero(result.paths.kind == PathKind.RIS)
     with styled():
         figure = Figure(figsize=(2.1 * number + 0.8, 2.25 * len(schemes) + 0.6))
@@ -33,7 +34,7 @@ def draw_run_codes(result: SlamResult, number: int = 5) -> Figure | None:
                 _draw_code(axis, scheme.applied[cycle], scheme.levels, sheet)
                 gain = np.abs(scheme.gain[cycle, direct]).max(initial=0.0)
                 level = f"{20.0 * np.log10(gain):.1f} dB" if gain > 0.0 else "not seen"
-                axis.set_title(f"t = {result.scene.agent.elapsed[cycle]:.0f} s, {level}", fontsize=9)
+                axis.set_title(f"t = {result.scene.agent.elapsed[cycle]:.1f} s, {level}", fontsize=9)
             row[0].set_ylabel(scheme.scheme, weight="bold")
         _colour_bar(figure, axes, schemes[0].levels)
         figure.suptitle("What the panel was set to, and the gain of its direct path", weight="bold")

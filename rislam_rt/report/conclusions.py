@@ -14,7 +14,8 @@ from rislam_rt.pipeline.scores.loss_causes import UNNOTICED, is_unnoticed, words
 from rislam_rt.pipeline.scores.summary import panel_track
 from rislam_rt.pipeline.scores.true_loss import words_of_silence
 from rislam_rt.pipeline.scores.wall_scores import found_of_heard
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, Settings, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import Settings, build_settings
+from rislam_rt.pipeline.specification.stored_spec import stored_spec
 from rislam_rt.slam.step_info import StepOutcome
 
 CODES = {"optimized": "optimised codes", "random": "random codes", "no_ris": "no panel", "exact": "exact codes"}
@@ -50,9 +51,15 @@ def judge_run(result: SlamResult, summary: Mapping[str, Any]) -> Conclusions:
 
 
 def _headline(schemes: Mapping[str, Any]) -> str:
-    """Headline of a run's conclusions: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random ...`"""
+    """Headline of a run's conclusions: `The agent is off by 2.7 cm with optimised codes, 6.7 cm with random ...`
+
+    The error relative to the start stands beside it: of the other, most may be the start's own.
+    """
     parts = [f"{_centimetres(scores['rmse_m'])} with {_words(name)}" for name, scores in schemes.items()]
     text = f"The agent is off by {', '.join(parts)} (RMSE)"
+    known = [scores["relative_rmse_m"] for scores in schemes.values() if scores["relative_rmse_m"] is not None]
+    if len(known) == len(schemes):
+        text += f"; relative to its start by {', '.join(map(_centimetres, known))}"
     diverged = [_words(name) for name, scores in schemes.items() if scores["diverged"]]
     lost = [
         _words(name) for name, s in schemes.items() if not s["diverged"] and s["true_loss"] and s["true_loss"]["lost"]
@@ -63,9 +70,7 @@ def _headline(schemes: Mapping[str, Any]) -> str:
 
 def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> str:
     """Conclusion on one scheme in words: RMSE and bound, panel, scatterers and walls mapped."""
-    over = scores["over_bound"]
-    bound = f"{_centimetres(scores['bound_m'])} would be possible" if scores["bound_m"] else "no bound"
-    parts = [f"{_centimetres(scores['rmse_m'])}, " + ("at the bound" if over and over <= AT_BOUND else bound)]
+    parts = list(_errors(scores))
     panels = result.scene.panels if scheme.levels else ()
     for number, panel in enumerate(panels):
         found, name = panel_found_at(result, scheme, number), "panel" if len(panels) == 1 else panel.name
@@ -76,6 +81,22 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
     walls = found_of_heard(scores["walls"])  # of a run in slices, whatever was heard
     parts.append(f"{walls} walls" + (" that were heard" if " of " in walls else ""))
     return "; ".join(parts)
+
+
+def _errors(scores: Mapping[str, Any]) -> Iterator[str]:
+    """Conclusions on the errors of one scheme: RMSE, and RMSE relative to the start, each with its bound.
+
+    Whether it is at the bound is said of the error relative to the start where that is known: the start's own error is
+    in both the other and its bound, and may be most of them.
+    """
+    over, relative, least = scores["over_bound"], scores["relative_rmse_m"], scores["relative_bound_m"]
+    near, known = bool(over) and over <= AT_BOUND, relative is not None and bool(least)
+    bound = f"{_centimetres(scores['bound_m'])} would be possible" if scores["bound_m"] else "no bound"
+    text = _centimetres(scores["rmse_m"])
+    yield text if near and known else f"{text}, {'at the bound' if near else bound}"
+    if known:
+        at = "at the bound" if relative <= AT_BOUND * least else f"{relative / least:.1f} times the bound"
+        yield f"{_centimetres(relative)} relative to its start, {at}"
 
 
 def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:
@@ -109,7 +130,7 @@ def _lost(scores: Mapping[str, Any]) -> Iterator[str]:
 
 def _missing(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) -> Iterator[str]:
     """Conclusions on landmarks that are missing in a scheme's last map, one line each, with the reason."""
-    spec = PipelineSpec.model_validate(dict(result.config))
+    spec = stored_spec(result.config)
     settings = build_settings(spec, len(result.scene.panels) if scheme.levels else 0)
     threshold = build_sensor(settings.radio, settings.receiver).threshold
     paths = result.paths

@@ -15,8 +15,10 @@ from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
 from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
 from rislam_rt.report.drawing_geometry import ellipse, plane_trace, section, wall_edges
-from rislam_rt.report.style import TRUTH, WALL, close_up, scheme_colour, styled
+from rislam_rt.report.style import TRUTH, WALL, close_up, fix_layout, legend_below, scheme_styles, styled
 
+ABREAST = 3
+"""Most maps in a row: more would be wider than a page."""
 ZOOM = 0.25
 """Half the width [m] of the close-up of the trajectory's end, unless the error is larger."""
 INSET, LEAST_ZOOM = 0.36, 2.0
@@ -33,32 +35,42 @@ WALL_NAME, MOST_NAMES = "#54606e", 40
 
 
 def draw_above(result: SlamResult) -> Figure:
-    """Draw a run's true and estimated trajectory, landmarks and walls from above, for each scheme side by side.
+    """Draw a run's true and estimated trajectory, landmarks and walls from above, for each scheme, `ABREAST` in a row.
 
     Each has a close-up of the trajectory's end, but for estimates that end too far off for one.
     """
     schemes = list(result.schemes.values())
     low, high = result.scene.bounds
     aspect = (high[1] - low[1]) / (high[0] - low[0])
+    styles = scheme_styles(result.schemes)
     rows = 2 if len(schemes) > 1 else 4  # of the legend, which is wider than one map
+    high_up, across = -(-len(schemes) // ABREAST), min(len(schemes), ABREAST)
     with styled():
-        figure = Figure(figsize=(5.4 * len(schemes), 5.4 * aspect + 1.0 + 0.2 * rows))
-        axes = figure.subplots(1, len(schemes), squeeze=False, sharex=True, sharey=True)[0]
+        figure = Figure(figsize=(5.4 * across, (5.4 * aspect + 0.6) * high_up + 0.4 + 0.2 * rows))
+        places = figure.subplots(high_up, across, squeeze=False, sharex=True, sharey=True)
+        axes, spare = places.flat[: len(schemes)], places.flat[len(schemes) :]
         final = [scheme.position[-1, :2] - result.scene.agent.position[-1, :2] for scheme in schemes]
         need = 2.5 * np.linalg.norm(final, axis=1)
         near = need <= max(ZOOM, 0.5 * INSET * float(np.min(high[:2] - low[:2])) / LEAST_ZOOM)
         half = max(ZOOM, float(need[near].max(initial=0.0)))
         for axis, scheme, close in zip(axes, schemes, near.tolist(), strict=True):
             draw_plan(axis, result.scene)
-            _draw_estimate(axis, result.scene, scheme)
+            colour = styles[scheme.scheme].colour
+            _draw_estimate(axis, result.scene, scheme, colour)
             if close:
-                _draw_close_up(axis, result.scene, scheme, half)
+                _draw_close_up(axis, result.scene, scheme, half, colour)
             error = float(np.sqrt(np.mean(np.sum((scheme.position - result.scene.agent.position) ** 2, axis=1))))
             length = f"{100.0 * error:.1f} cm" if error < 1.0 else f"{error:.2f} m"
             axis.set_title(f"{scheme.scheme}: agent RMSE {length}", weight="bold")
+        for axis in axes[-across:]:
             axis.set_xlabel("x [m]")
-        axes[0].set_ylabel("y [m]")
-        figure.legend(handles=_legend(), loc="outside lower center", ncols=8 // rows, fontsize=9)
+            axis.tick_params(labelbottom=True)
+        for axis in places[:, 0]:
+            axis.set_ylabel("y [m]")
+        for axis in spare:
+            axis.remove()
+        legend_below(figure, _legend(), columns=8 // rows)
+        fix_layout(figure)
     return figure
 
 
@@ -119,9 +131,8 @@ def _mark(axis: Axes, point: Floats, name: str, marker: str) -> None:
                   va="center", fontsize=9, zorder=7, bbox=paper)  # fmt: skip
 
 
-def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
+def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult, colour: str) -> None:
     """Draw the estimated trajectory, and the walls and landmarks of a scheme's last map that match true ones."""
-    colour = scheme_colour(scheme.scheme)
     axis.plot(scheme.position[:, 0], scheme.position[:, 1], color=colour, lw=1.4, zorder=4)
     walls = build_walls(scene)
     low, high = scene.bounds
@@ -149,10 +160,9 @@ def _draw_estimate(axis: Axes, scene: Scene, scheme: SchemeResult) -> None:
                           ha="right", fontsize=8, color=colour, zorder=7)  # fmt: skip
 
 
-def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float) -> None:
+def _draw_close_up(axis: Axes, scene: Scene, scheme: SchemeResult, half: float, colour: str) -> None:
     """Draw a close-up of the trajectory's end beside the map, with the 2 sigma ellipse of the last position."""
     truth, estimate = scene.agent.position[-1, :2], scheme.position[-1, :2]
-    colour = scheme_colour(scheme.scheme)
     low, high = scene.bounds[:, :2]
     # The corner of the room that is farthest from everything drawn holds the close-up.
     busy = np.concatenate([scene.agent.position[:, :2], scene.landmark_positions[:, :2]])

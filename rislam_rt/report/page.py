@@ -13,7 +13,8 @@ from rislam_rt.model import SlamResult
 from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.pipeline.scores.summary import DIVERGED
 from rislam_rt.pipeline.scores.true_loss import FAR_OVER, LASTING, LOST
-from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.pipeline_spec import build_settings
+from rislam_rt.pipeline.specification.stored_spec import stored_spec
 from rislam_rt.report.code_pictures import draw_run_codes
 from rislam_rt.report.conclusions import judge_run
 from rislam_rt.report.map_from_above import draw_above
@@ -37,7 +38,7 @@ CAPTIONS = {
     "levels": "Gain of the strongest path of each class, and its SNR over all antennas. The panel's direct path "
     "depends on the code: until the panel is in the map, designed codes are beams in search of it; most of them miss.",
     "paths": "Paths with at most one wall bounce, halfway through the run, with the levels of the first scheme.",
-    "codes": "Phase levels of the panel at five moments, and the gain of its direct path under them.",
+    "codes": "Phase levels of the panel over the run, and the gain of its direct path under them.",
     "timing": "Median of each step, with a whisker to the 99th percentile.",
 }
 
@@ -75,7 +76,7 @@ def write_report(result: SlamResult, summary: Mapping[str, Any], folder: Path) -
 
 def draw_figures(result: SlamResult) -> dict[str, bytes]:
     """Draw all figures of a run's report as PNG, by name, in the order of the page."""
-    spec = PipelineSpec.model_validate(dict(result.config))
+    spec = stored_spec(result.config)
     settings = build_settings(spec)
     snr = 10.0 * float(np.log10(settings.radio.integrated_snr(np.ones(()))))
     threshold = 10.0 * float(np.log10(build_sensor(settings.radio, settings.receiver).threshold))
@@ -116,7 +117,7 @@ def build_page(result: SlamResult, summary: Mapping[str, Any], pictures: Mapping
         f'{base64.b64encode(picture).decode()}"><figcaption>{html.escape(CAPTIONS[name])}</figcaption></figure>'
         for name, picture in pictures.items()
     )
-    radio = build_settings(PipelineSpec.model_validate(dict(result.config))).radio
+    radio = build_settings(stored_spec(result.config)).radio
     faint = (finding.line for finding in faint_slabs(result.scene, "scene/scene.toml", radio))
     lines = [*result.warnings, *faint]
     warnings = "".join(f'<p class="note">Warning: {html.escape(line)}</p>\n' for line in lines)

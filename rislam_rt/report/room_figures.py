@@ -12,10 +12,12 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.model import PathKind, Paths, Scene
 from rislam_rt.report.drawing_geometry import wall_edges
 from rislam_rt.report.map_from_above import SHADE, WALL_NAME, draw_plan, name_walls, wall_places
-from rislam_rt.report.style import KIND, TRUTH, WALL, save_figure, styled
+from rislam_rt.report.style import KIND, TRUTH, WALL, fix_layout, save_figure, styled
 
 LABEL = np.array([0.02, 0.0, 0.014])
 """Offset of an object's name in the three-dimensional figure, relative to the room's size."""
+ZOOMS = (0.9, 0.8, 0.7, 0.6)
+"""Scales of the three-dimensional view beside a plan, of which the first is taken whose axis labels have room."""
 
 
 def draw_paths(scene: Scene, paths: Paths, gain: Floats, cycle: int, title: str) -> Figure:
@@ -47,10 +49,14 @@ def draw_scene(scene: Scene, path: Path) -> Path:
         flat.set_title(f"{scene.name} from above", weight="bold")
         axis: Any = figure.add_subplot(1, 2, 2, projection="3d", computed_zorder=False)
         _draw_room_3d(axis, scene)
-        axis.set_box_aspect(scene.bounds[1] - scene.bounds[0], zoom=0.9)
         for name, point in wall_places(scene):
             axis.text(*point, name, fontsize=7, color=WALL_NAME, ha="center", zorder=4)
         _draw_objects_3d(axis, scene, 0)
+        for zoom in ZOOMS:
+            axis.set_box_aspect(scene.bounds[1] - scene.bounds[0], zoom=zoom)
+            fix_layout(figure)
+            if axis.get_tightbbox().x1 <= figure.bbox.x1:
+                break
         return save_figure(figure, path)
 
 

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 WHOLE_LABELS = 2
 """Schemes of a run up to which a terminal of 80 columns has room for the labels of a table in one line each."""
 
+ERROR, RELATIVE = "agent RMSE (95 %)", "relative to its start"
+"""Columns of a sweep's table that break between an error and its interval."""
+
 
 def print_summary(summary: Mapping[str, Any]) -> None:
     """Print the scores of a run as a table, a column for each scheme: RMSE of agent, landmarks and walls, bound."""
@@ -233,17 +236,33 @@ def print_designs(name: str, point: "Floats", designs: Mapping[str, "Design"], t
 
 
 def print_sweep(scores: Sequence["SchemeScore"]) -> None:
-    """Print the scores of a sweep as a table, a line for each point of the axes and scheme."""
-    keys = [key.rpartition(".")[2] for key in scores[0].point if key != "schemes"]
-    table = Table(*keys, "scheme", "agent RMSE", "95 %", "runs", "diverged", "failed")
+    """Print the scores of a sweep as a table, a line for each point of the axes and scheme.
+
+    Names break where a terminal has no room for them; what goes to a file or a pipe is as wide as it needs.
+    """
+    keys = [key for key in scores[0].point if key != "schemes"]
+    counts = {"diverged": [score.diverged for score in scores], "failed": [score.failed for score in scores]}
+    counts = {"runs": [len(score.rmse) for score in scores]} | {
+        name: all_ for name, all_ in counts.items() if any(all_)
+    }
     rooms = short_names(str(score.point["scene"]) for score in scores if "scene" in score.point)
-    for score in scores:
-        interval = f"{score.interval[0]:.3f}-{score.interval[1]:.3f}" if score.interval else ""
-        overall = f"{score.overall:.3f} m" if score.overall is not None else "none"
-        counts = (str(len(score.rmse)), str(score.diverged), str(score.failed))
-        point = (rooms.get(str(value), str(value)) for key, value in score.point.items() if key != "schemes")
-        table.add_row(*point, score.scheme, overall, interval, *counts)
-    _show("sweep", table)
+    columns = {
+        **{key.rpartition(".")[2]: [rooms.get(str(s.point[key]), str(s.point[key])) for s in scores] for key in keys},
+        "scheme": [score.scheme for score in scores],
+        ERROR: [_between(score.overall, score.interval, "none") for score in scores],
+        RELATIVE: [_between(score.relative, score.relative_interval, "-") for score in scores],
+        **{name: [str(count) for count in all_] for name, all_ in counts.items()},
+    }
+    console = Console(highlight=False)
+    longest = [max(len(word) for cell in (name, *cells) for word in cell.split()) for name, cells in columns.items()]
+    needed = sum(longest) + 3 * len(longest) + 1
+    if not console.is_terminal:
+        console.width = max(console.width, needed)
+    whole = needed <= console.width
+    table = Table(*(Column(name, overflow="fold", no_wrap=whole and name not in (ERROR, RELATIVE)) for name in columns))
+    for cells in zip(*columns.values(), strict=True):
+        table.add_row(*map(escape, cells))
+    _show("sweep", table, console)
 
 
 def print_cards(rows: Sequence["Row"], timings: Sequence[Mapping[str, Any]]) -> None:
@@ -280,9 +299,9 @@ def print_scene(scene: Scene) -> None:
     _show(scene.name, table)
 
 
-def _show(title: str, table: Table) -> None:
+def _show(title: str, table: Table, console: Console | None = None) -> None:
     """Print a table on the terminal under its title, which rich would wrap at the table's width."""
-    console = Console(highlight=False)
+    console = console or Console(highlight=False)
     console.print(title, style="bold", markup=False)
     console.print(table)
 
@@ -292,6 +311,14 @@ def _metres(value: float | None, unknown: str = "not found") -> str:
     if value is None:
         return unknown
     return f"{100.0 * value:.1f} cm" if value < 1.0 else f"{value:.2f} m"
+
+
+def _between(value: float | None, ends: tuple[float, float] | None, unknown: str) -> str:
+    """Cell of a terminal table: an error of three digits with its interval, in a unit that suits it."""
+    if value is None:
+        return unknown
+    scale, unit = (1000.0, "mm") if value < 0.01 else (100.0, "cm") if value < 1.0 else (1.0, "m")
+    return f"{scale * value:.3g} {unit}" + (f" ({scale * ends[0]:.2g}-{scale * ends[1]:.2g})" if ends else "")
 
 
 def _wall(plane: PlaneScore) -> str:

@@ -1,6 +1,7 @@
 """Figures of curves against time (errors, gains of path classes), and of the computing times of a cycle's steps."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,8 +12,16 @@ from rislam_rt.arrays import Floats
 from rislam_rt.evaluate import position_errors
 from rislam_rt.model import STEPS, PathKind, SchemeResult, SlamResult
 from rislam_rt.pipeline.scores.summary import landmark_track
-from rislam_rt.report.style import KIND, scheme_colour, styled
+from rislam_rt.report.style import SchemeStyle, legend_below, scheme_styles, styled
 from rislam_rt.slam.step_info import StepOutcome
+
+MARKS = 8
+"""About how many markers a curve over time has."""
+CLASSES: dict[PathKind, dict[str, Any]] = {
+    PathKind.LOS: {"color": "black"}, PathKind.VT: {"color": "#999999"},
+    PathKind.PS: {"color": "black", "ls": ":"}, PathKind.VS: {"color": "#999999", "ls": ":"},
+}  # fmt: skip
+"""Curves of the path classes that no code changes: grey, since colours are those of schemes."""
 
 
 def draw_agent_error(result: SlamResult) -> Figure:
@@ -22,13 +31,15 @@ def draw_agent_error(result: SlamResult) -> Figure:
     with styled():
         figure = Figure(figsize=(8.6, 4.1))
         axis = figure.subplots()
-        handles, crosses = [], False
-        for name, scheme in reversed(list(result.schemes.items())):
+        handles, crosses, styles = [], False, scheme_styles(result.schemes)
+        for number, (name, scheme) in reversed(list(enumerate(result.schemes.items()))):
             error = position_errors(scheme.position, result.scene.agent.position)
             believed = np.sqrt(np.einsum("kii->k", scheme.covariance[:, :3, :3]))
-            colour, shown = scheme_colour(name), _on_log_axis(error)
+            colour, shown = styles[name].colour, _on_log_axis(error)
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
-            handles += axis.plot(time, shown, color=colour, lw=1.6, label=label)
+            handles += axis.plot(
+                time, shown, lw=1.6, label=label, **_look(styles[name], number / len(result.schemes), len(time))
+            )
             axis.plot(time, _on_log_axis(believed), color=colour, lw=1.0, ls="--", alpha=0.7)
             lost = np.array([outcome == StepOutcome.DIVERGED for outcome in scheme.outcome], dtype=np.bool_)
             axis.plot(time[lost], shown[lost], color=colour, ls="none", marker="x", ms=6.0)
@@ -42,8 +53,15 @@ def draw_agent_error(result: SlamResult) -> Figure:
         more = [Line2D([], [], color="#555555", lw=1.0, ls="--", label="the filter's own σ")]
         if crosses:
             more += [Line2D([], [], color="#555555", ls="none", marker="x", label="held itself for lost")]
-        figure.legend(handles=[*handles[::-1], *more], loc="outside lower center", ncols=5, fontsize=9)
+        legend_below(figure, [*handles[::-1], *more], columns=5)
     return figure
+
+
+def _look(style: SchemeStyle, share: float, cycles: int) -> dict[str, Any]:
+    """Colour and marker of a scheme's curve over time, as arguments of `plot`; markers stand at about `MARKS` cycles,
+    from the `share` of their distance on, so that curves which lie on each other can be told apart."""
+    step = max(cycles // MARKS, 1)
+    return {"color": style.colour, "marker": style.marker, "ms": 5.0, "markevery": (int(share * step), step)}
 
 
 def _on_log_axis(error: Floats) -> Floats:
@@ -61,12 +79,14 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
     """Draw the position errors of a run's landmarks against time, for all schemes: distance to the matched estimate."""
     scene, time = result.scene, result.scene.agent.elapsed
     tracks = {name: landmark_track(scene, scheme).error for name, scheme in result.schemes.items()}
+    styles = scheme_styles(tracks)
     with styled():
         figure = Figure(figsize=(8.6, 3.9))
         axes = figure.subplots(1, max(len(scene.landmarks), 1), sharey=True, squeeze=False)[0]
-        for name, errors in reversed(tracks.items()):
+        for place, (name, errors) in reversed(list(enumerate(tracks.items()))):
             for number, axis in enumerate(axes[: errors.shape[1]]):
-                axis.plot(time, 100.0 * errors[:, number], color=scheme_colour(name), lw=1.4, label=name)
+                look = _look(styles[name], place / len(tracks), len(time))
+                axis.plot(time, 100.0 * errors[:, number], lw=1.4, label=name, **look)
         never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
         for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
             axis.set_title(landmark, weight="bold")
@@ -75,8 +95,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
             if number in never:
                 axis.text(0.5, 0.5, "never found", transform=axis.transAxes, ha="center", color="#555555")
         axes[0].set_ylabel("landmark position error [cm]")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=5, fontsize=9)
+        legend_below(figure, axes[0].get_legend_handles_labels()[0][::-1], columns=5)
     return figure
 
 
@@ -95,16 +114,18 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
         figure = Figure(figsize=(8.6, 4.8))
         axis = figure.subplots()
         first = next(iter(result.schemes.values()))
-        for kind in (PathKind.LOS, PathKind.VT, PathKind.PS, PathKind.VS):
+        for kind, look in CLASSES.items():
             level = strongest_db(first, paths.kind == kind)
             if np.isfinite(level).any():
-                axis.plot(time, level, color=KIND[kind], lw=1.6, label=f"{kind.name}, strongest")
-        for name, scheme in result.schemes.items():
+                axis.plot(time, level, lw=1.6, label=f"{kind.name}, strongest", **look)
+        styles = scheme_styles(result.schemes)
+        for number, (name, scheme) in enumerate(result.schemes.items()):
             level = strongest_db(scheme, paths.kind == PathKind.RIS)
             if np.isfinite(level).any():
                 random = name == "random"
                 width, order = (0.7, 2) if random else (1.8, 3)
-                axis.plot(time, level, color=scheme_colour(name), lw=width, zorder=order, label=f"RIS, {name}")
+                look = _look(styles[name], number / len(result.schemes), len(time))
+                axis.plot(time, level, lw=width, zorder=order, label=f"RIS, {name}", **look)
         threshold = detection_snr_db - snr_per_gain_db
         axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")
         axis.set(xlim=time_limits(time), xlabel="time [s]", ylabel="path gain [dB]")
@@ -112,7 +133,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
         right = axis.secondary_yaxis("right", functions=shift)
         right.set_ylabel("SNR over all antennas [dB]")
         axis.set_title("What each class of paths brings", weight="bold")
-        figure.legend(loc="outside lower center", ncols=4, fontsize=9)
+        legend_below(figure, axis.get_legend_handles_labels()[0], columns=4)
     return figure
 
 
@@ -127,7 +148,7 @@ def strongest_db(scheme: SchemeResult, columns: Floats) -> Floats:
 def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
     """Draw the computing times of the cycle's steps: median (bar), 99th percentile (whisker), and `budget` [s]."""
     schemes = result.schemes
-    height = 0.8 / len(schemes)
+    height, styles = 0.8 / len(schemes), scheme_styles(schemes)
     with styled():
         figure = Figure(figsize=(8.6, 1.4 + 0.45 * len(STEPS) * max(len(schemes), 2) / 2))
         axis = figure.subplots()
@@ -135,7 +156,7 @@ def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
             at = np.arange(len(STEPS)) - 0.4 + (number + 0.5) * height
             median, high = 1e3 * np.percentile(scheme.seconds, [50.0, 99.0], axis=0)
             whisker = np.stack([np.zeros(len(STEPS)), high - median])
-            axis.barh(at, median, 0.9 * height, xerr=whisker, color=scheme_colour(name), label=name,
+            axis.barh(at, median, 0.9 * height, xerr=whisker, color=styles[name].colour, label=name,
                       error_kw={"lw": 1.0, "capsize": 2})  # fmt: skip
         for step, limit in enumerate(budget):
             axis.plot([1e3 * limit] * 2, [step - 0.45, step + 0.45], color="black", lw=2.0)
@@ -146,5 +167,5 @@ def draw_timing(result: SlamResult, budget: Sequence[float]) -> Figure:
         axis.set_title("Steps of a cycle against their budgets", weight="bold")
         handles, _ = axis.get_legend_handles_labels()
         budget_line = Line2D([], [], color="black", lw=2.0, label="budget")
-        figure.legend(handles=[*handles, budget_line], loc="outside lower center", ncols=5, fontsize=9)
+        legend_below(figure, [*handles, budget_line], columns=5)
     return figure

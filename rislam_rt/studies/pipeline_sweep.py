@@ -9,7 +9,8 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 import numpy as np
 from pydantic import BaseModel, Field
 
-from rislam_rt.errors import ConfigError, RislamError
+from rislam_rt.arrays import Floats
+from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.evaluate import rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.channels import prepare_channel
@@ -64,6 +65,11 @@ class SchemeScore(NamedTuple):
     """Number of repetitions that failed."""
     missing: int
     """Number of repetitions that have not run yet."""
+    relative: float | None = None
+    """RMSE relative to the start [m] over all repetitions that ended; None where it is not known. Of the other, most
+    may be the start's own error, which all schemes share."""
+    relative_interval: tuple[float, float] | None = None
+    """Its 95 % bootstrap interval [m]; None for a single one."""
 
     @property
     def overall(self) -> float | None:
@@ -74,7 +80,9 @@ class SchemeScore(NamedTuple):
         """Scores of a scheme in a pipeline's sweep as plain data, one level deep but for the list of RMSEs."""
         low, high = self.interval or (None, None)
         counts = {"runs": len(self.rmse), "diverged": self.diverged, "failed": self.failed, "missing": self.missing}
-        scores = {"rmse_m": self.overall, "low_m": low, "high_m": high, **counts, "each_m": list(self.rmse)}
+        ends = self.relative_interval or (None, None)
+        relative = {"relative_rmse_m": self.relative, "relative_low_m": ends[0], "relative_high_m": ends[1]}
+        scores = {"rmse_m": self.overall, "low_m": low, "high_m": high, **relative, **counts, "each_m": list(self.rmse)}
         return {**self.point, "scheme": self.scheme, **scores}
 
 
@@ -140,19 +148,19 @@ def slam_sweep(
     )  # fmt: skip
 
 
-def default_folder(sweeps: Path, name: str, scene: str) -> Path:
-    """Folder of a pipeline's sweep within `sweeps`, `<name>-<scene>`, or, where that holds the sweep of another scene
-    of the same name, `<name>-<scene>-<hash of the scene's path>`.
+def default_folder(sweeps: Path, sweep: Sweep) -> Path:
+    """Folder of a pipeline's sweep within `sweeps`, `<name>-<scene>`, or, where that holds the sweep of other settings
+    or of another scene of the same name, `<name>-<scene>-<hash of the settings>`.
 
-    Raises
-    ------
-    ResultError
-        The folder's `sweep.json` was changed since it was written.
+    Other axes and repetitions of the same settings share a folder, and their cells.
     """
-    folder = sweeps / f"{name}-{Path(scene).name}"
-    if not (folder / SWEEP_FILE).is_file() or read_sealed(folder / SWEEP_FILE)["base"].get("scene") == scene:
+    folder = sweeps / f"{sweep.name}-{Path(str(sweep.base['scene'])).name}"
+    try:
+        other = checksum(read_sealed(folder / SWEEP_FILE)["base"])
+    except ResultError:  # none, or a damaged one: the cells there tell what they are of
         return folder
-    return sweeps / short_name(folder.name, checksum(scene))
+    own = checksum(sweep.base)
+    return folder if own == other else sweeps / short_name(folder.name, own)
 
 
 def typed_axis(axis: Axis) -> Axis:
@@ -250,7 +258,15 @@ def _split(summary: Mapping[str, Any], *, times: bool) -> dict[str, Any]:
 def _score(group: Group, scheme: str) -> SchemeScore:
     """Scores of one scheme at one point of a pipeline's sweep."""
     found = group.column(scheme, "rmse_m")
-    rmse, known = tuple(found[~np.isnan(found)].tolist()), spread(found)
-    interval = (known.lower, known.upper) if known and len(rmse) > 1 else None
+    rmse, (_, interval) = tuple(found[~np.isnan(found)].tolist()), _value_and_ends(found)
     failed, diverged = group.failed(scheme), group.diverged(scheme)
-    return SchemeScore(group.point, scheme, rmse, interval, diverged, failed, group.missing)
+    relative = _value_and_ends(group.column(scheme, "relative_rmse_m"))
+    return SchemeScore(group.point, scheme, rmse, interval, diverged, failed, group.missing, *relative)
+
+
+def _value_and_ends(rmse: Floats) -> tuple[float | None, tuple[float, float] | None]:
+    """RMSE of a pipeline's sweep over its repetitions (R,) [m], and its interval; None where there is none."""
+    known = spread(rmse)
+    if known is None:
+        return None, None
+    return known.value, None if np.isnan(known.lower) else (known.lower, known.upper)

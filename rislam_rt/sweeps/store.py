@@ -7,12 +7,12 @@ timings.jsonl            seconds and machine of every cell that ran, in the orde
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rislam_rt.errors import RislamError
+from rislam_rt.errors import ResultError, RislamError
 from rislam_rt.storage import files
 from rislam_rt.storage.checksums import flatten, read_sealed, seal
 from rislam_rt.storage.lock import LOCK_FILE, hold
@@ -54,10 +54,27 @@ def check_folder(folder: Path) -> None:
     ConfigError
         It holds something else.
     ResultError
-        `sweep.json` was changed since it was written.
+        `sweep.json` was changed since it was written, and no cell tells that the folder is a sweep's.
     """
     if files.has_marker(folder, SWEEP_FILE, LOCK_FILE, "sweep"):
-        read_sealed(folder / SWEEP_FILE)
+        try:
+            read_sealed(folder / SWEEP_FILE)
+        except ResultError:  # it is written anew where the cells, each with a checksum of its own, are there
+            if not any(map(_is_cell, (folder / "cells").glob("*.json"))):
+                raise
+
+
+def _is_cell(file: Path) -> bool:
+    """Whether a file stores a cell of a sweep, as it was written."""
+    try:
+        return read_sealed(file)["ident"] == file.stem
+    except (RislamError, KeyError):
+        return False
+
+
+def count_others(folder: Path, cells: Iterable[Cell]) -> int:
+    """Number of stored cells in a sweep folder that are none of these: of other settings, axes or repetitions."""
+    return len({file.stem for file in (folder / "cells").glob("*.json")} - {cell.ident for cell in cells})
 
 
 @contextmanager

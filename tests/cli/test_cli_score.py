@@ -1,6 +1,7 @@
 """`score`: the card of a run in a room of one's own, its recordings, and one line for what cannot be."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 import rislam_rt
+from rislam_rt.pipeline.own_methods import own_digests, own_sources
+from rislam_rt.storage.checksums import seal
 from rislam_rt.studies.score_card.score import OVER_TIME
 
 ROOT = Path(__file__).parents[2]
@@ -95,3 +98,54 @@ def test_what_is_no_run_is_one_line(run, tmp_path, folder):
     assert (code, out) == (2, "")
     assert err == f"error: {folder}: not a completed run (no run.json); give a folder that `run` wrote\n"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_of_a_method_of_ones_own_is_reported_and_repeated_where_its_file_is_not(run, tmp_path):
+    module = f"repeated_{tmp_path.name}"
+    (tmp_path / f"{module}.py").write_text(f"from {module}_more import *\n")
+    (tmp_path / f"{module}_more.py").write_text(OWN)
+    name = f"{module}:Resting"
+    words = (*RUN[:2], *RUN[4:-2], "--set", f'schemes=["{name}"]', "--set", "cycles=6")
+    assert run(*words, "--out", "mine")[0] == 0
+    names = {file.name for file in (tmp_path / "mine").iterdir()}
+    assert not any(":" in one for one in names)  # which Windows allows in no name
+    assert {f"{module}.py", f"{module}_more.py", f"scheme_{module}@Resting.nc"} <= names
+    shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
+    for file in tmp_path.glob(f"{module}*.py"):
+        file.unlink()
+
+    def away(*words):
+        line = (sys.executable, "-m", "rislam_rt", *words)
+        return subprocess.run(line, cwd=tmp_path / "away", capture_output=True, text=True, check=False)
+
+    (tmp_path / "away").mkdir()
+    done = away("report", tmp_path / "mine", "--json", "summary.json")
+    assert done.returncode == 0, done.stderr
+    assert f"'{name}': no module '{module}'; these scores are those that the run stored\n" in done.stderr
+    stored, told = (json.loads(Path(one, "summary.json").read_text())["schemes"] for one in ("mine", "away"))
+    assert stored == told
+    assert name in (tmp_path / "mine" / "report.html").read_text()
+    # a run of before, with colons in the names of its files
+    marker = json.loads((tmp_path / "mine" / "run.json").read_text())
+    for one in [*names]:
+        if "@" in one:
+            (tmp_path / "mine" / one).rename(tmp_path / "mine" / one.replace("@", ":"))
+    files = {one.replace("@", ":"): digest for one, digest in marker.pop("files").items()}
+    marker = seal({key: marker[key] for key in marker if key not in ("schema", "checksum")} | {"files": files})
+    (tmp_path / "mine" / "run.json").write_text(json.dumps(marker))
+    assert away("report", tmp_path / "mine").returncode == 0
+    done = away("run", tmp_path / "mine" / "config.toml", "--no-report", "--out", "again")
+    assert done.returncode == 0, done.stderr
+    again = tmp_path / "away" / "again" / f"estimate_{module}@Resting.tum"
+    assert again.read_bytes() == (tmp_path / "mine" / f"estimate_{module}:Resting.tum").read_bytes()
+
+
+def test_a_copy_of_a_method_that_is_not_what_ran_is_not_kept(run, tmp_path, monkeypatch):
+    module = f"edited_{tmp_path.name}"
+    file = tmp_path / f"{module}.py"
+    file.write_text(OWN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    digests = own_digests([f"{module}:Resting", "json:dumps"])
+    assert own_sources(digests) == {file.name: file.read_bytes()}  # what is installed is not copied
+    file.write_text(OWN + "\n# edited while it ran\n")
+    assert own_sources(digests) == {}

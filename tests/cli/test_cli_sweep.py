@@ -70,6 +70,42 @@ def test_scenes_of_one_name_get_a_folder_each(sweep, tmp_path, here, undrawn):
     assert all(len(list((folder / "cells").iterdir())) == 1 for folder, _ in tables.values())
 
 
+def test_other_settings_get_a_folder_and_fewer_repetitions_are_told(sweep, tmp_path, here, undrawn):
+    """The scores of the first sweep once were replaced by those of the second without a word."""
+    words = (PIPELINE, *TINY, "--axis", "slam.sigma_a=0.01,0.1", "--jobs", "1")
+    first = tmp_path / "sweeps" / "trace_then_slam-paper_room"
+    assert sweep(*words, "--repeat", "2")[1].endswith("sweep folder: sweeps/trace_then_slam-paper_room\n")
+    before = (first / "scores.csv").read_bytes()
+    code, out, _ = sweep(*words, "--repeat", "1", "--set", "cycles=4")
+    folder = tmp_path / out.rpartition("sweep folder: ")[2].strip()
+    assert (code, len(list((folder / "cells").iterdir()))) == (0, 2)
+    assert re.fullmatch("trace_then_slam-paper_room-[0-9a-f]{8}", folder.name)
+    assert (first / "scores.csv").read_bytes() == before
+    _, out, err = sweep(*words, "--repeat", "1")
+    assert "nothing left to do" in err
+    assert "trace_then_slam-paper_room (besides 2 cells of other settings or repetitions, kept" in out
+    assert "besides" not in sweep(*words, "--repeat", "2")[1]
+    assert (first / "scores.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"schema": 1}'])
+def test_a_damaged_sweep_file_costs_no_cell(sweep, tmp_path, here, undrawn, text):
+    words = (PIPELINE, *TINY, "--repeat", "1", "--jobs", "1")
+    sweep(*words)
+    file = tmp_path / "sweeps" / "trace_then_slam-paper_room" / "sweep.json"
+    before = file.read_bytes()
+    file.write_text(text)
+    code, _, err = sweep(*words)
+    assert (code, "nothing left to do" in err) == (0, True)
+    assert file.read_bytes() == before
+    file.write_text(text)
+    for cell in (file.parent / "cells").iterdir():
+        cell.write_text("{}")  # no sweep's folder for certain: nothing there is touched
+    code, _, err = sweep(*words)
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert file.read_text() == text
+
+
 def test_a_failed_run_is_told_and_exit_1(sweep, tmp_path):
     # no run can be done in a millisecond: the limit stops each of them
     code, out, err = sweep(PIPELINE, *TINY, "--repeat", "2", "--time-limit", "0.001", "--jobs", "2", "--out", "mine")

@@ -155,3 +155,18 @@ def test_a_scheme_that_ends_a_metre_away_is_called_lost(result):
     both = replace(result, schemes={**result.schemes, "random": astray})
     assert judge_run(both, summarise(both)).headline.endswith("diverged with random codes.")
     assert "diverged" not in judge_run(result, summarise(result)).headline
+
+
+def test_a_run_that_only_its_start_puts_at_the_bound_is_not_called_so(result):
+    """37 times the bound relative to its start: most of the absolute error and of its bound are the start's."""
+    summary = summarise(result)
+    errors = {"rmse_m": 0.013, "bound_m": 0.0128, "over_bound": 1.02, "relative_bound_m": 0.0002}
+    for relative, words in ((0.0075, "1.3 cm; 0.75 cm relative to its start, 37.5 times the bound;"),
+                            (0.0003, "1.3 cm; 0.03 cm relative to its start, at the bound;"),
+                            (None, "1.3 cm, at the bound;")):  # fmt: skip
+        for scores in summary["schemes"].values():
+            scores |= {**errors, "relative_rmse_m": relative}
+        said = judge_run(result, summary)
+        assert said.schemes["random"].startswith(f"random codes: {words}")
+        assert ("relative to its start by" in said.headline) == (relative is not None)
+    assert "at the bound" not in said.headline

@@ -1,6 +1,8 @@
 """Sweeps of pipeline files: axes typed by the settings, cells checked before any runs, scores with their failures."""
 
+import csv
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report.studies.sweep import main_axis, scores_figure
 from rislam_rt.report.terminal_tables import print_sweep
 from rislam_rt.scene import load_scene
-from rislam_rt.studies.pipeline_sweep import load_section, run_cell, score_rows, slam_sweep, write_scores
+from rislam_rt.studies.pipeline_sweep import SchemeScore, load_section, run_cell, score_rows, slam_sweep, write_scores
 from rislam_rt.sweeps import build_cells, run_sweep
 from rislam_rt.sweeps.store import DONE, Row
 
@@ -196,7 +198,49 @@ def test_a_sweep_counts_what_is_lost_and_keeps_what_was_said(capsys):
     assert [score.diverged for score in scores] == [0, 1]
     print_sweep(scores)
     lines = [line.split("│") for line in capsys.readouterr().out.splitlines() if "no_ris" in line]
-    assert [[cell.strip() for cell in line[-4:-1]] for line in lines] == [["1", "0", "0"], ["1", "1", "0"]]
+    assert [[cell.strip() for cell in line[-3:-1]] for line in lines] == [["1", "0"], ["1", "1"]]
+
+
+def made_up(scheme, relative, ends):
+    """A score of three runs at one point, of which the start's error is 1.8 cm."""
+    point = {"radio.reference_snr_db": 0.0, "slam.sigma_a": 0.01}
+    return SchemeScore(point, scheme, (0.018, 0.018, 0.018), (0.005, 0.031), 0, 0, 0, relative, ends)
+
+
+def test_two_methods_that_share_the_error_of_their_start_are_told_apart(tmp_path, capsys):
+    scores = [
+        made_up("optimized", 0.0021, (0.0012, 0.0034)),
+        made_up("mine:my_designer", 0.0093, (0.0081, 0.0102)),
+        made_up("my_package.filters:DeadReckoning", None, None),
+    ]
+    write_scores(scores, tmp_path)
+    with (tmp_path / "scores.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["relative_rmse_m"] for row in rows] == ["0.0021", "0.0093", ""]
+    assert [row["relative_high_m"] for row in rows] == ["0.0034", "0.0102", ""]
+    print_sweep(scores)
+    table = capsys.readouterr().out
+    for words in ("my_package.filters:DeadReckoning", "reference_snr_db", "1.8 cm", "(0.5-3.1)", "2.1 mm", "(1.2-3.4)"):
+        assert words in table
+    assert "…" not in table
+    axes = scores_figure(scores).axes
+    labels = [axis.get_ylabel() for axis in axes]
+    assert labels == ["RMSE of the agent's position [m]", "RMSE relative to its start [m]"]
+    drawn = [container.lines[0].get_ydata().tolist() for container in axes[1].containers]
+    assert drawn[:2] == [[0.0021], [0.0093]]
+    assert np.isnan(drawn[2]).all()
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_a_terminal_without_room_breaks_names_and_drops_none(width, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    print_sweep([made_up("mine:my_quite_long_designer", 0.0021, (0.0012, 0.0034))])
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in capsys.readouterr().out.splitlines()]
+    assert max(map(len, lines)) <= width
+    assert "…" not in "".join(lines)
+    name = "".join(line.split("│")[3].strip() for line in lines if "│" in line)
+    assert name == "mine:my_quite_long_designer"
 
 
 def test_more_repetitions_and_values_are_added_to_those_that_ran():

@@ -3,7 +3,7 @@
 Completed runs, in slices or not, are read here: their results, and the inputs that each scheme's estimator was given.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +19,12 @@ from rislam_rt.pipeline.long.tally import Tally
 from rislam_rt.pipeline.own_methods import is_own
 from rislam_rt.pipeline.recordings.inputs import PADDING, Inputs, dataset_to_inputs, marked_rng
 from rislam_rt.pipeline.run import late_warnings, library_versions, run_warnings, set_scene
+from rislam_rt.pipeline.run_datasets import part_file, part_name
+from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.scores.summary import summarise, summary_table
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
+from rislam_rt.pipeline.specification.stored_spec import stored_spec
 from rislam_rt.pipeline.store import run_folder
 from rislam_rt.pipeline.store.exports import record_files
 from rislam_rt.progress import Tell
@@ -81,15 +84,23 @@ def run_long(
     return found
 
 
-def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> LongRun:
-    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in its marker."""
+def _gather(
+    folder: Path, scene: Scene, about: Mapping[str, Any], run: str, summary: dict[str, Any] | None = None
+) -> LongRun:
+    """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in its marker.
+
+    Scores that are given as `summary` are not counted anew.
+    """
     schemes, scores, paths, motion = {}, {}, None, scene.agent
-    spec = PipelineSpec.model_validate(dict(about["config"]))
+    spec = stored_spec(about["config"])
     settings = build_settings(spec)
     for name in about["schemes"]:
+        parts = slices.read_parts(folder, name, scene, run)
+        if summary is not None:
+            motion, paths, schemes[name] = slices.subsample_scheme(parts, scene)
+            continue
         tally = Tally(scene, about["config"]["budget"], use_vt=uses_wall_returns(name, settings))
-        parts = tally.counting(slices.read_parts(folder, name, scene, run))
-        motion, paths, schemes[name] = slices.subsample_scheme(parts, scene)
+        motion, paths, schemes[name] = slices.subsample_scheme(tally.counting(parts), scene)
         scores[name] = tally.scores()
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
@@ -97,11 +108,13 @@ def _gather(folder: Path, scene: Scene, about: Mapping[str, Any], run: str) -> L
     late = late_warnings(replace(scene, agent=motion), paths, spec)
     lines = (*about["warnings"], *late, f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
     shown = run_folder.result_of_marker({**about, "warnings": lines}, replace(scene, agent=motion), paths, schemes)
-    return LongRun(summary_table(shown, scores, len(scene.agent)), shown)
+    return LongRun(summary or summary_table(shown, scores, len(scene.agent)), shown)
 
 
 def read_any(folder: Path) -> LongRun:
     """Read a completed run folder, in slices or not, score it anew, and return scores and the cycles for figures.
+
+    Where a method of the user's own cannot be loaded, the scores are those that the run stored, and a warning says so.
 
     Raises
     ------
@@ -110,12 +123,29 @@ def read_any(folder: Path) -> LongRun:
     ConfigError
         The folder is not a completed run.
     """
-    about = checked_slices(folder)
-    if about is None:
-        result = run_folder.read_run(folder)
-        return LongRun(summarise(result), result)
+    about, summary = checked_slices(folder, methods=False), None
+    result = run_folder.read_run(folder) if about is None else None
+    if why := _why_not_scored((result.config if result else about or {})["schemes"]):
+        summary = run_folder.read_summary(folder, run_folder.read_marker(folder))
+        summary["warnings"] = [
+            *summary["warnings"],
+            f"{why.partition(';')[0]}; these scores are those that the run stored",
+        ]
+    if about is None or result is not None:
+        assert result is not None
+        return LongRun(summary or summarise(result), result)
     with run_folder.reading_run(folder):
-        return _gather(folder, run_folder.read_room(folder, about), about, about["identity"])
+        return _gather(folder, run_folder.read_room(folder, about), about, about["identity"], summary)
+
+
+def _why_not_scored(schemes: Iterable[str]) -> str:
+    """Why a run of these schemes, long or not, cannot be scored anew: one of the user's own cannot be loaded."""
+    for name in schemes:
+        try:
+            SCHEMES[name]
+        except ConfigError as error:
+            return str(error)
+    return ""
 
 
 def read_whole(folder: Path) -> SlamResult:
@@ -141,9 +171,9 @@ def read_whole(folder: Path) -> SlamResult:
         return run_folder.result_of_marker(about, scene, slices.join_paths(paths), schemes)
 
 
-def checked_slices(folder: Path) -> dict[str, Any] | None:
+def checked_slices(folder: Path, *, methods: bool = True) -> dict[str, Any] | None:
     """Marker of a completed run in slices, whose settings this version knows and whose files are as they were written;
-    None if the run is not in slices.
+    None if the run is not in slices. Without `methods`, those of the user's own need not be there.
 
     Raises
     ------
@@ -154,7 +184,7 @@ def checked_slices(folder: Path) -> dict[str, Any] | None:
     """
     about = run_folder.read_marker(folder) if (folder / run_folder.RUN_FILE).is_file() else {}
     if "config" in about:
-        _check_settings(folder, about["config"])
+        _check_settings(folder, about["config"], methods)
     if "slices" not in about:
         return None
     if about["state"] != run_folder.DONE:
@@ -163,10 +193,10 @@ def checked_slices(folder: Path) -> dict[str, Any] | None:
     return about
 
 
-def _check_settings(folder: Path, config: Mapping[str, Any]) -> None:
+def _check_settings(folder: Path, config: Mapping[str, Any], methods: bool) -> None:
     """Check that this version knows all settings of a run read from `folder`, as its bounds are computed from them."""
     try:
-        PipelineSpec.model_validate(dict(config))
+        PipelineSpec.model_validate(dict(config)) if methods else stored_spec(config)
     except ValidationError as error:
         first = error.errors()[0]
         if first["type"] == "value_error" and is_own(str(first["input"])):  # and its file is not to be found
@@ -190,12 +220,12 @@ def read_given(folder: Path, scheme: str) -> tuple[Inputs, np.random.Generator]:
     ResultError
         There are none, or they are damaged.
     """
-    name = f"measurements_{scheme}.nc"
-    files = [folder / name] if (folder / name).is_file() else sorted((folder / slices.FOLDER).glob(f"*/{name}"))
+    one = part_file(folder, "measurements", scheme)
+    places = sorted((folder / slices.FOLDER).glob("*"))
+    files = [one] if one.is_file() else [part_file(place, "measurements", scheme) for place in places]
+    files = [file for file in files if file.is_file()]
     if not files:
-        raise ResultError(
-            f"{folder / name}: no such file, as another version wrote the run; run again with another --out"
-        )
+        raise ResultError(f"{one}: no such file, as another version wrote the run; run again with another --out")
     try:
         data, *more = (read_dataset(file) for file in files)
         if more:
@@ -222,13 +252,13 @@ def _complete(store: run_folder.RunFolder, scene: Scene, found: LongRun, about: 
     tracks = {"truth.tum": (tum_bytes(motion.time, motion.position, motion.heading) for motion in whole)}
     for name in about["schemes"]:
         parts = zip(slices.slice_bounds(len(agent)), slices.read_schemes(store.folder, name, scene, run), strict=True)
-        tracks[f"estimate_{name}.tum"] = (
+        tracks[part_name("estimate", name, ".tum")] = (
             tum_bytes(agent.time[first:last], part.position, part.heading) for (first, last), part in parts
         )
     for name, pieces in tracks.items():
         write_pieces(store.folder / name, pieces)
     store.adopt(tracks)
-    for name, content in record_files(found.shown, scene, found.summary).items():
+    for name, content in record_files(found.shown, scene, found.summary, store.identity.content.get("own", {})).items():
         store.put(name, content)
     store.mark(run_folder.DONE, about)
 

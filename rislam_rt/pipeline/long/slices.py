@@ -89,8 +89,8 @@ def run_slices(
         own = paths if walk.foresight == 0 else subsampled_paths(paths, np.arange(last - first))
         for file, data in (
             (slice_file(folder, number, PATHS_FILE), run_datasets.paths_to_dataset(own, scene.agent[first:last])),
-            (slice_file(folder, number, f"scheme_{name}.nc"), run_datasets.scheme_to_dataset(part)),
-            (slice_file(folder, number, f"measurements_{name}.nc"), given_to_dataset(part)),
+            (slice_file(folder, number, run_datasets.part_name("scheme", name)), run_datasets.scheme_to_dataset(part)),
+            (slice_file(folder, number, run_datasets.part_name("measurements", name)), given_to_dataset(part)),
         ):
             write_dataset(run_datasets.seal_dataset(data, run=run, slice=str(number)), file)
     return seconds
@@ -101,7 +101,7 @@ def slice_files(name: str, cycles: int) -> list[str]:
     return [
         str(slice_file(Path(), number, file))
         for number in range(len(slice_bounds(cycles)))
-        for file in (PATHS_FILE, f"scheme_{name}.nc", f"measurements_{name}.nc")
+        for file in (PATHS_FILE, *(run_datasets.part_name(kind, name) for kind in ("scheme", "measurements")))
     ]
 
 
@@ -123,7 +123,7 @@ def read_parts(folder: Path, name: str, scene: Scene, run: str) -> Iterator[Slic
 
 def read_schemes(folder: Path, name: str, scene: Scene, run: str) -> Iterator[SchemeResult]:
     """Results of one scheme alone, slice by slice, as `read_parts` reads them with paths; its errors are the same."""
-    file = f"scheme_{name}.nc"
+    file = run_datasets.part_file(slice_file(folder, 0, ""), "scheme", name).name
     for number, (first, last) in enumerate(slice_bounds(len(scene.agent))):
         scheme = run_datasets.dataset_to_scheme(_read_slice(folder, number, file, run, last - first))
         if scheme.scheme != name:

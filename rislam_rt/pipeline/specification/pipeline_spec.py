@@ -4,7 +4,7 @@ from dataclasses import fields
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator, Field, create_model, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, create_model, model_validator
 
 from rislam_rt.design import DESIGNERS, DesignConfig
 from rislam_rt.errors import ConfigError
@@ -12,7 +12,7 @@ from rislam_rt.information import GradientMode
 from rislam_rt.measurement import HardwareConfig, ReceiverConfig, build_sensor
 from rislam_rt.model import RadioConfig, SensorModel
 from rislam_rt.pipeline.own_methods import is_own
-from rislam_rt.pipeline.schemes import SCHEMES, check_scheme
+from rislam_rt.pipeline.schemes import SCHEMES, STORED, check_scheme
 from rislam_rt.pipeline.specification.mismatch import AssumedSection
 from rislam_rt.pipeline.specification.radio import RadioSection, build_radio, linear
 from rislam_rt.pipeline.specification.section import (
@@ -91,9 +91,9 @@ class HardwareSection(_table_of(HardwareConfig)):  # type: ignore[misc]
     """Impairments of the receiver's front end (with `receiver.estimator = "waveform"`); none by default."""
 
 
-def _check_channel(name: str) -> str:
+def _check_channel(name: str, info: ValidationInfo) -> str:
     """Check the setting of a pipeline file that names the channel: a built-in one, or a user's own."""
-    if name not in CHANNELS and not is_own(name):
+    if name not in CHANNELS and not is_own(name) and info.context != STORED:
         raise ValueError(f"give one of {', '.join(CHANNELS)}, or module:Class of your own")
     return name
 

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.model import MapEstimate, Scene, SlamResult
+from rislam_rt.pipeline.own_methods import own_sources
+from rislam_rt.pipeline.run_datasets import part_name
 from rislam_rt.scene.write import scene_files, tum_bytes
 from rislam_rt.storage.files import json_file
 from rislam_rt.toml import toml_bytes
@@ -15,21 +17,26 @@ ROOM = "scene"
 """Folder of an exported room; the exported configuration names it, so that the run can be repeated from its folder."""
 
 
-def export_files(result: SlamResult, summary: Mapping[str, Any]) -> dict[str, bytes]:
+def export_files(result: SlamResult, summary: Mapping[str, Any], own: Mapping[str, str]) -> dict[str, bytes]:
     """Exported files of a run by name: trajectories, maps, scene, configuration and scores."""
     motion = result.scene.agent
     files = {"truth.tum": tum_bytes(motion.time, motion.position, motion.heading)}
     for name, scheme in result.schemes.items():
-        files[f"estimate_{name}.tum"] = tum_bytes(motion.time, scheme.position, scheme.heading)
-    return files | record_files(result, result.scene, summary)
+        files[part_name("estimate", name, ".tum")] = tum_bytes(motion.time, scheme.position, scheme.heading)
+    return files | record_files(result, result.scene, summary, own)
 
 
-def record_files(result: SlamResult, scene: Scene, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Exported files of a run by name that do not grow with its cycles: maps, configuration, scores and scene."""
+def record_files(
+    result: SlamResult, scene: Scene, summary: Mapping[str, Any], own: Mapping[str, str]
+) -> dict[str, bytes]:
+    """Exported files of a run by name that do not grow with its cycles: maps, configuration, scores, scene, and the
+    sources of methods of the user's own (`own`: by name, with their SHA-256) beside the configuration, where they are
+    looked for."""
     maps = {name: map_table(scheme.map) for name, scheme in result.schemes.items()}
     settings = _without_none({**result.config, "scene": ROOM})
     files = {"map.json": json_file(maps, indent=2), "config.toml": toml_bytes(settings)}
     files |= {f"{ROOM}/{name}": content for name, content in scene_files(scene).items()}
+    files |= own_sources(own)
     return files | {SUMMARY_FILE: json_file(summary, indent=2)}
 
 

@@ -50,7 +50,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
         data = run_datasets.seal_dataset(run_datasets.scheme_to_dataset(result), **self._stamp())
         if result.given is not None:
             given = run_datasets.seal_dataset(given_to_dataset(result), **self._stamp())
-            self.put(f"measurements_{name}.nc", dataset_bytes(given))
+            self.put(run_datasets.part_name("measurements", name), dataset_bytes(given))
         self.put(scheme_file(self.folder, name).name, dataset_bytes(data))
         self.mark(RUNNING)
 
@@ -61,7 +61,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
 
     def __iter__(self) -> Iterator[str]:
         schemes = (file for file in sorted(self.files) if file.startswith("scheme_"))
-        return (file.removeprefix("scheme_").removesuffix(".nc") for file in schemes)
+        return (file.removeprefix("scheme_").removesuffix(".nc").replace("@", ":") for file in schemes)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -94,7 +94,7 @@ class RunFolder(MutableMapping[str, SchemeResult]):
             run_datasets.paths_to_dataset(result.paths, result.scene.agent), **self._stamp()
         )
         self.put(PATHS_FILE, dataset_bytes(paths))
-        for name, content in export_files(result, summary).items():
+        for name, content in export_files(result, summary, self.identity.content.get("own", {})).items():
             self.put(name, content)
         told = {
             "name": result.name, "seed": result.seed, "cycles": len(result.scene.agent),
@@ -238,7 +238,7 @@ def read_summary(folder: Path, about: Mapping[str, Any]) -> dict[str, Any]:
 
 def scheme_file(folder: Path, name: str) -> Path:
     """Path of a scheme's NetCDF file in the run folder."""
-    return folder / f"scheme_{name}.nc"
+    return run_datasets.part_file(folder, "scheme", name)
 
 
 def read_run(folder: Path) -> SlamResult:

@@ -14,7 +14,7 @@ from rislam_rt.model import SchemeResult, SlamResult
 from rislam_rt.progress import Tell, tell_nobody
 from rislam_rt.report.drawing_geometry import ellipse
 from rislam_rt.report.map_from_above import draw_plan
-from rislam_rt.report.style import TRUTH, close_up, scheme_colour, styled
+from rislam_rt.report.style import TRUTH, SchemeStyle, close_up, fix_layout, scheme_styles, styled
 from rislam_rt.report.view.room_data import spread
 from rislam_rt.report.view.run_data import KNOWN
 from rislam_rt.storage.files import MARK
@@ -44,7 +44,7 @@ def gif_bytes(result: SlamResult, tell: Tell = tell_nobody) -> bytes:
             moving = _draw_moment(room, near, result, int(cycle))
             canvas.draw()
             pixels = np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
-            pictures.append(Image.fromarray(pixels).quantize(64))
+            pictures.append(Image.fromarray(pixels).quantize(256))
             for artist in moving:
                 artist.remove()
             tell("frames", number + 1, len(rows))
@@ -65,9 +65,10 @@ def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     room, near = figure.subplots(1, 2, width_ratios=(2.0, 1.0))
     draw_plan(room, result.scene)
     room.set(xlabel="x [m]", ylabel="y [m]")
-    room.set_title(" ", weight="bold")
-    for scheme in result.schemes:
-        near.plot([], [], color=scheme_colour(scheme), lw=2.0, label=scheme)
+    room.set_title(result.scene.name, weight="bold")
+    styles = scheme_styles(result.schemes)
+    for name in result.schemes:
+        near.plot([], [], color=styles[name].colour, marker=styles[name].marker, ms=5, lw=2.0, label=name)
     near.plot([], [], "o", color=TRUTH, ms=5, label="agent")
     half = _half_width(result)
     near.plot(*result.scene.agent.position[:, :2].T, color=TRUTH, lw=5.0, alpha=0.2)
@@ -75,9 +76,7 @@ def _empty_frame(result: SlamResult) -> tuple[Figure, Axes, Axes]:
     near.grid(False)
     near.set_title(f"{200.0 * half:.0f} cm wide", fontsize=9)
     near.legend(loc="upper center", bbox_to_anchor=(0.5, -0.03), fontsize=9)
-    settled: Any = FigureCanvasAgg(figure)
-    settled.draw()
-    figure.set_layout_engine("none")
+    fix_layout(figure)
     return figure, room, near
 
 
@@ -96,22 +95,23 @@ def _draw_moment(room: Axes, near: Axes, result: SlamResult, cycle: int) -> list
     moving: list[Artist] = []
     for axis in (room, near):
         moving += axis.plot(*truth, "o", color=TRUTH, ms=6, zorder=8)
-    for scheme in result.schemes.values():
-        moving += _draw_belief(room, near, scheme, cycle)
+    styles = scheme_styles(result.schemes)
+    for name, scheme in result.schemes.items():
+        moving += _draw_belief(room, near, scheme, cycle, styles[name])
     near.set(xlim=(truth[0] - half, truth[0] + half), ylim=(truth[1] - half, truth[1] + half))
     room.set_title(f"{scene.name}, t = {scene.agent.elapsed[cycle]:.1f} s", weight="bold")
     return moving
 
 
-def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int) -> list[Artist]:
+def _draw_belief(room: Axes, near: Axes, scheme: SchemeResult, cycle: int, style: SchemeStyle) -> list[Artist]:
     """Frame of an animation: a scheme's estimated trajectory, 2 sigma ellipse and landmarks up to a cycle."""
-    colour, done = scheme_colour(scheme.scheme), scheme.position[: cycle + 1, :2]
+    colour, done = style.colour, scheme.position[: cycle + 1, :2]
     ring = ellipse(done[-1], scheme.covariance[cycle, :2, :2])
     moving: list[Artist] = []
     for axis in (room, near):
         moving += axis.plot(*done.T, color=colour, lw=1.4, zorder=6)
         moving += axis.plot(*ring.T, color=colour, lw=1.0, zorder=6)
-    moving += near.plot(*done[-1], "o", color=colour, ms=5, zorder=7)
+    moving += near.plot(*done[-1], style.marker, color=colour, ms=5, zorder=7)
     points = scheme.held[cycle] & (scheme.parent < 0)
     known = points & (scheme.ris_probability[cycle] > KNOWN)
     for shown, marker in ((known, "s"), (points & ~known, "x")):

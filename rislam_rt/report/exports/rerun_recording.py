@@ -1,5 +1,6 @@
 """Export of a run as a recording for the Rerun viewer: room, true trajectory, and each scheme's estimates over time."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from rislam_rt.channel.walls import build_walls
 from rislam_rt.errors import SetupError
 from rislam_rt.model import Scene, SchemeResult, SlamResult
 from rislam_rt.report.drawing_geometry import wall_edges
-from rislam_rt.report.style import scheme_colour
+from rislam_rt.report.style import scheme_styles
 
 TIMELINE = "time"
 TWO_SIGMA = 2.0
@@ -39,15 +40,16 @@ def recording_bytes(result: SlamResult, identity: str) -> bytes:
     stream.set_log_tick_enabled(False)
     sink = stream.binary_stream()
     _log_room(rerun, stream, result.scene)
+    colours = _colours(result.schemes)
     for cycle, time in enumerate(result.scene.agent.time):
         stream.set_time(TIMELINE, duration=float(time))
         stream.log("truth/agent", rerun.Points3D([result.scene.agent.position[cycle]], radii=0.03, colors=[GREY]))
         for name, scheme in result.schemes.items():
-            _log_cycle(rerun, stream, name, scheme, cycle)
+            _log_cycle(rerun, stream, scheme, cycle, colours[name])
             error = float(np.linalg.norm(scheme.position[cycle] - result.scene.agent.position[cycle]))
             stream.log(f"error/{name}", rerun.Scalars(error))
     for name, scheme in result.schemes.items():
-        way = rerun.LineStrips3D([scheme.position], colors=[_colour(name)])
+        way = rerun.LineStrips3D([scheme.position], colors=[colours[name]])
         stream.log(f"{name}/way", way, static=True)
     return bytes(sink.read() or b"")
 
@@ -62,7 +64,7 @@ def _log_room(rerun: Any, stream: Any, scene: Scene) -> None:
     stream.log("truth/landmarks", marks, static=True)
 
 
-def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: int) -> None:
+def _log_cycle(rerun: Any, stream: Any, scheme: SchemeResult, cycle: int, colour: tuple[int, ...]) -> None:
     """Add a scheme's estimated position, its 2 sigma ellipsoid and the landmarks of a cycle to a Rerun recording."""
     from scipy.spatial.transform import Rotation
 
@@ -70,7 +72,7 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     place = scheme.position[cycle]
-    colour = _colour(name)
+    name = scheme.scheme
     stream.log(f"{name}/agent", rerun.Points3D([place], radii=0.03, colors=[colour]))
     ellipsoid = rerun.Ellipsoids3D(
         centers=[place],
@@ -87,6 +89,7 @@ def _log_cycle(rerun: Any, stream: Any, name: str, scheme: SchemeResult, cycle: 
     stream.log(f"{name}/landmarks", points)
 
 
-def _colour(scheme: str) -> tuple[int, ...]:
-    """Colour of a scheme in a Rerun recording: red, green, blue from 0 to 255."""
-    return tuple(round(255 * part) for part in to_rgb(scheme_colour(scheme)))
+def _colours(schemes: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """Colours of a run's schemes in a Rerun recording, by name: red, green, blue from 0 to 255."""
+    styles = scheme_styles(schemes)
+    return {name: tuple(round(255 * part) for part in to_rgb(style.colour)) for name, style in styles.items()}

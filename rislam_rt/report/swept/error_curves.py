@@ -10,27 +10,30 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from rislam_rt.arrays import Floats
-from rislam_rt.report.style import MARKER, TRUTH, scheme_colour
+from rislam_rt.report.style import TRUTH, SchemeStyle
 
+Curves = Mapping[str, Sequence[Mapping[str, Any]]]
+"""Error curves of schemes by name: the entries of each, sorted along x."""
 GAP = 0.055
 """Least distance between the names of two curves, relative to the height of the axes."""
 
 
-def draw_schemes(axis: Axes, x: Sequence[float], curves: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
+def draw_schemes(axis: Axes, x: Sequence[float], curves: Curves, styles: Mapping[str, SchemeStyle]) -> None:
     """Draw RMSE and posterior bound of each scheme along x on a logarithmic axis [m], names to the right."""
     for scheme, entries in curves.items():
-        axis.plot(x, numbers(entries, "bound_m"), color=scheme_colour(scheme), ls="--", lw=1.1)
-        draw_error(axis, x, entries, scheme, "rmse")
+        axis.plot(x, numbers(entries, "bound_m"), color=styles[scheme].colour, ls="--", lw=1.1)
+        draw_error(axis, x, entries, styles[scheme], "rmse")
     log_metres(axis)
-    label_ends(axis, curves, "rmse_m")
+    label_ends(axis, curves, styles, "rmse_m")
 
 
-def draw_error(axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, Any]], scheme: str, name: str) -> None:
+def draw_error(
+    axis: Axes, x: Sequence[float], entries: Sequence[Mapping[str, Any]], style: SchemeStyle, name: str
+) -> None:
     """Draw one error of a scheme along x as a curve with its interval as a band."""
     value, low, high = (numbers(entries, f"{name}{end}_m") for end in ("", "_low", "_high"))
-    colour = scheme_colour(scheme)
-    axis.fill_between(x, low, high, color=colour, alpha=0.13, lw=0.0)
-    axis.plot(x, value, color=colour, marker=MARKER.get(scheme, "o"), ms=5, lw=1.7)
+    axis.fill_between(x, low, high, color=style.colour, alpha=0.13, lw=0.0)
+    axis.plot(x, value, color=style.colour, marker=style.marker, ms=5, lw=1.7)
 
 
 def log_metres(axis: Axes, which: str = "y") -> None:
@@ -58,7 +61,7 @@ def numbers(entries: Sequence[Mapping[str, Any]], name: str) -> Floats:
     return np.array([np.nan if entry[name] is None else entry[name] for entry in entries], dtype=np.float64)
 
 
-def label_ends(axis: Axes, curves: Mapping[str, Sequence[Mapping[str, Any]]], name: str) -> None:
+def label_ends(axis: Axes, curves: Curves, styles: Mapping[str, SchemeStyle], name: str) -> None:
     """Write each scheme's name at the height where its error curve ends, moved apart so that names do not overlap."""
     known = {scheme: [entry[name] for entry in entries if entry[name]] for scheme, entries in curves.items()}
     ends = {scheme: values[-1] for scheme, values in known.items() if values}
@@ -73,7 +76,7 @@ def label_ends(axis: Axes, curves: Mapping[str, Sequence[Mapping[str, Any]]], na
             place[row] = min(place[row], place[row + 1] - GAP)
     for name, height in zip(order, place, strict=True):
         axis.annotate(
-            name, (1.02, height), xycoords="axes fraction", color=scheme_colour(name), va="center", weight="bold",
+            name, (1.02, height), xycoords="axes fraction", color=styles[name].colour, va="center", weight="bold",
             fontsize=9,
         )  # fmt: skip
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.report import markdown
-from rislam_rt.report.style import styled
+from rislam_rt.report.style import scheme_styles, styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_schemes, explain_lines
 from rislam_rt.studies.swept import Fig4bSpec, Group, paired_difference, paired_gain
@@ -55,13 +55,14 @@ def gain_entries(group: Group) -> list[dict[str, Any]]:
 def draw_fig4b(content: Mapping[str, Any], spec: Fig4bSpec) -> Figure:
     """Draw Fig. 4(b): RMSE of all schemes against SNR, a part for each case, the paper's SNR along the top."""
     cases = [case for case in spec.cases if any(e["case"] == case.name for e in content["entries"])]
+    styles = scheme_styles(entry["scheme"] for entry in content["entries"])
     with styled():
         figure = Figure(figsize=(1.2 + 5.2 * len(cases), 5.0))
         axes = figure.subplots(1, len(cases), squeeze=False)[0]
         for axis, case in zip(axes, cases, strict=True):
             entries = [entry for entry in content["entries"] if entry["case"] == case.name]
             snr = sorted({entry["snr_db"] for entry in entries})
-            draw_schemes(axis, snr, by_scheme(entries, "snr_db"))
+            draw_schemes(axis, snr, by_scheme(entries, "snr_db"), styles)
             axis.set_title(f"{case.name}: {case.note}" if case.note else case.name, fontsize=9, weight="bold")
             axis.set_xlabel("SNR of a 5 cm sphere at 3 m, over signal and all antennas [dB]")
             shift = float(np.mean([entry["paper_snr_db"] - entry["snr_db"] for entry in entries]))

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rislam_rt.report.markdown import metres, metres_between, percent_between, picture, ratio, table_lines
-from rislam_rt.report.style import styled
+from rislam_rt.report.style import scheme_styles, styled
 from rislam_rt.report.swept.entries import by_scheme, interval_entry, panels_of, scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import draw_error, draw_schemes, explain_lines, label_ends, log_metres
 from rislam_rt.studies.swept import Fig4cSpec, Group, paired_gain, spread
@@ -32,16 +32,17 @@ def draw_fig4c(content: Mapping[str, Any], spec: Fig4cSpec) -> Figure:
     entries = content["entries"]
     sizes = sorted({entry["size"] for entry in entries})
     curves = by_scheme(entries, "size")
+    styles = scheme_styles(curves)
     with styled():
         figure = Figure(figsize=(11.0, 4.8))
         agent, panel = figure.subplots(1, 2)
-        draw_schemes(agent, sizes, curves)
+        draw_schemes(agent, sizes, curves, styles)
         explain_lines(figure, agent)
         for scheme, own in curves.items():
             if any(entry["panel_m"] is not None for entry in own):
-                draw_error(panel, sizes, own, scheme, "panel")
+                draw_error(panel, sizes, own, styles[scheme], "panel")
         log_metres(panel)
-        label_ends(panel, curves, "panel_m")
+        label_ends(panel, curves, styles, "panel_m")
         for axis, what in ((agent, "agent's position"), (panel, "panel's position at the end")):
             axis.set_xticks(sizes, [f"{size} x {size}" for size in sizes], fontsize=9)
             axis.set(xlabel="elements of the panel", ylabel=f"RMSE of the {what} [m]")

@@ -10,7 +10,7 @@ from rislam_rt.evaluate import NEAR_ANGLE, NEAR_WALL
 from rislam_rt.input_messages import share_text
 from rislam_rt.pipeline.scores.audible_paths import HEARD
 from rislam_rt.report.markdown import metres, metres_between, paragraph, picture, ratio, table_lines
-from rislam_rt.report.style import MARKER, scheme_colour, styled
+from rislam_rt.report.style import legend_below, scheme_styles, styled
 from rislam_rt.report.swept.entries import scheme_entry, what_limits
 from rislam_rt.report.swept.error_curves import ends_of, log_metres
 from rislam_rt.shipped import short_names
@@ -70,6 +70,7 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
     entries = content["entries"]
     rooms = list(dict.fromkeys(entry["room"] for entry in entries))
     series = {entry["series"]: entry["scheme"] for entry in entries}
+    styles = scheme_styles(series.values())
     with styled():
         figure = Figure(figsize=(max(6.0, 2.5 + 1.05 * len(rooms)), 4.6))
         axis = figure.subplots()
@@ -81,9 +82,9 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
             value = np.array([own[room]["rmse_m"] for room in shown])
             ends = np.array([ends_of(own[room]) for room in shown]).reshape(-1, 2)
             bound = [own[room]["bound_m"] for room in shown]
-            colour = scheme_colour(scheme)
+            colour, marker = styles[scheme]
             axis.errorbar(
-                x, value, np.abs(ends.T - value), color=colour, ls="none", marker=MARKER.get(scheme, "o"), ms=5,
+                x, value, np.abs(ends.T - value), color=colour, ls="none", marker=marker, ms=5,
                 capsize=2, label=name, mfc=colour if name == scheme else "white",
             )  # fmt: skip
             axis.hlines(bound, x - 0.06, x + 0.06, color=colour, lw=2.0, ls=(0, (1, 0.6)))
@@ -93,7 +94,7 @@ def draw_rooms(content: Mapping[str, Any], spec: RoomsSpec) -> Figure:
         axis.set_xticks(range(len(rooms)), rooms, rotation=20, ha="right")
         axis.set_ylabel("RMSE of the agent's position [m]")
         axis.set_title("Marks: RMSE over seeds with 95 % interval; short bars: posterior bound", fontsize=10)
-        figure.legend(loc="outside lower center", ncols=6, fontsize=9)
+        legend_below(figure, axis.get_legend_handles_labels()[0], columns=6)
     return figure
 
 

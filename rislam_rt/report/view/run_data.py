@@ -6,7 +6,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.model import SchemeResult, SlamResult
-from rislam_rt.report.style import scheme_colour
+from rislam_rt.report.style import scheme_styles
 from rislam_rt.report.view.room_data import room_data, rounded, spread
 
 FRAMES = 150
@@ -20,19 +20,20 @@ KNOWN = 0.5
 def run_data(result: SlamResult) -> dict[str, Any]:
     """Data of a run for the interactive view: room, true trajectory and every scheme, at up to `FRAMES` cycles."""
     rows = spread(len(result.scene.agent), FRAMES)
+    styles = scheme_styles(result.schemes)
     return room_data(result.scene) | {
         "kind": "run", "above": True, "first": len(rows) - 1, "time": rounded(result.scene.agent.elapsed[rows]),
         "truth": rounded(result.scene.agent.position[rows], FINE),
-        "schemes": [_scheme(result, scheme, rows) for scheme in result.schemes.values()],
+        "schemes": [_scheme(result, one, rows, styles[name].colour) for name, one in result.schemes.items()],
     }  # fmt: skip
 
 
-def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers) -> dict[str, Any]:
+def _scheme(result: SlamResult, scheme: SchemeResult, rows: Integers, colour: str) -> dict[str, Any]:
     """Data of one scheme for the view of a run: trajectory, 2 sigma ellipses, errors, landmarks, codes."""
     error = np.linalg.norm(scheme.position - result.scene.agent.position, axis=1)[rows]
     sigma = np.sqrt(np.maximum(np.trace(scheme.covariance[rows, :2, :2], axis1=1, axis2=2), 0.0))
     data = {
-        "name": scheme.scheme, "colour": scheme_colour(scheme.scheme), "position": rounded(scheme.position[rows], FINE),
+        "name": scheme.scheme, "colour": colour, "position": rounded(scheme.position[rows], FINE),
         "ellipse": [_ellipse(scheme.covariance[row, :2, :2]) for row in rows],
         "error": rounded(np.column_stack([error, sigma]), FINE), "lost": _lost(scheme, rows),
         "landmarks": [mark for column in range(len(scheme.ident)) if (mark := _landmark(scheme, column, rows))],

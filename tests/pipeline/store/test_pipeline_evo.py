@@ -15,7 +15,7 @@ from rislam_rt.pipeline.store.exports import export_files
 
 def test_evo_ape_reads_a_run_and_agrees(short_result, tmp_path):
     summary = summarise(short_result)
-    for name, content in export_files(short_result, summary).items():
+    for name, content in export_files(short_result, summary, {}).items():
         if name.endswith(".tum"):
             (tmp_path / name).write_bytes(content)
     scheme = next(iter(short_result.schemes))
