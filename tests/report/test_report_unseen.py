@@ -26,8 +26,8 @@ def scores(error: float, lost: bool, **more: Any) -> dict[str, Any]:
     names = (
         "rmse_m", "bound_m", "ratio", "relative_rmse_m", "relative_bound_m", "relative_ratio", "late_rmse_m",
         "late_bound_m", "late_ratio", "late_relative_rmse_m", "late_relative_bound_m", "late_relative_ratio",
-        "dead_reckoning_m", "nees", "horizontal_nees", "wall_deg", "wall_m", "wall_delay_s", "point_m",
-        "point_delay_s", "panel_delay_s", "gospa_m",
+        "dead_reckoning_m", "nees", "horizontal_nees", "expected_ratio", "expected_nees", "wall_deg", "wall_m",
+        "wall_delay_s", "point_m", "point_delay_s", "panel_delay_s", "gospa_m",
     )  # fmt: skip
     counts = {"walls_heard": 5, "walls_found": 4, "walls_good": 3, "points_heard": 2, "points_found": 1}
     counts |= {"births": 6, "births_judged": 4, "births_right": 3, "ghost_walls": 1, "ghost_points": 0}

@@ -1,5 +1,6 @@
 """The whole filter in the paper's room, 45 cycles near the panel: what it finds, and what it does not depend on."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -125,6 +126,18 @@ def test_errs_no_more_than_a_few_deviations(receiver: str, request: pytest.Fixtu
     own = np.array([np.trace(e.covariance[:2, :2]) for e in course.estimates])
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < 3.0 * np.sqrt(own.mean())
     assert StepOutcome.DIVERGED not in {info.outcome for info in course.infos}
+
+
+def test_who_is_told_another_start_is_off_by_it_and_by_nothing_else(normal: tuple[Heard, Course]) -> None:
+    """Nothing of the room is told, so that it moves with the start: to rounding of places within 10 m, which births and
+    90 solves carry on. What is expected over the start's error rests on that."""
+    heard, course = normal
+    by = np.array([0.03, -0.02, 0.0])
+    moved = go(heard._replace(start=replace(heard.start, position=heard.start.position + by)))
+    for one, other in zip(course.estimates, moved.estimates, strict=True):
+        np.testing.assert_allclose(other.position - by, one.position, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(other.map.position - by, one.map.position, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(other.covariance, one.covariance, rtol=1e-6, atol=1e-12)
 
 
 def test_walls_are_walls_of_the_room(clear: tuple[Heard, Course]) -> None:

@@ -55,6 +55,7 @@ def _yes(name: str) -> Show:
 ROWS: dict[str, Show] = {
     "RMSE [mm]": _value("rmse_m", MILLI, 1),
     "RMSE / bound": _value("ratio"),
+    "RMSE / bound, expected over the start's error": _value("expected_ratio", digits=3),
     "relative RMSE [mm]": _value("relative_rmse_m", MILLI),
     "relative RMSE / relative bound": _value("relative_ratio"),
     f"relative RMSE after {SETTLED:g} s [mm]": _value("late_relative_rmse_m", MILLI),
@@ -63,6 +64,7 @@ ROWS: dict[str, Show] = {
     "dead reckoning [mm]": _value("dead_reckoning_m", MILLI, 0),
     "NEES per degree of freedom": _value("nees"),
     "NEES across (x and y) per degree of freedom": _value("horizontal_nees"),
+    "NEES across, expected over the start's error": _value("expected_nees"),
     "lost": lambda entry: f"from {entry['lost_at_s']:.1f} s on" if entry["lost"] else "no",
     "silently lost": _yes("silent"),
     "births": _over_time("births"),

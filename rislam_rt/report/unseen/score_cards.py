@@ -94,8 +94,8 @@ def card(runs: Sequence[SchemeRun]) -> dict[str, Any]:
     entry: dict[str, Any] = {"runs": len(good), "failed": len(runs) - len(good)}
     for name in (
         "rmse_m", "ratio", "late_rmse_m", "late_ratio", "relative_rmse_m", "relative_ratio", "late_relative_rmse_m",
-        "late_relative_ratio", "relative_bound_m", "dead_reckoning_m", "nees", "horizontal_nees", "wall_delay_s",
-        "point_delay_s", "panel_delay_s", "wall_deg", "wall_m", "point_m", "gospa_m",
+        "late_relative_ratio", "relative_bound_m", "dead_reckoning_m", "nees", "horizontal_nees", "expected_ratio",
+        "expected_nees", "wall_delay_s", "point_delay_s", "panel_delay_s", "wall_deg", "wall_m", "point_m", "gospa_m",
     ):  # fmt: skip
         entry |= _spread(name, column(good, name))
     nees = column(good, "nees")

@@ -34,7 +34,8 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
     walls, landmarks, births.
 
     None where there is nothing to score, and of delays and births where the last map alone is known. Relative errors
-    are without the error of the start prior, which no measurement reduces. `lost` is by the truth, from `LOST` [m] on:
+    are without the error of the start prior, which no measurement reduces; `expected_` scores are expected over all
+    draws of that error, one of which `ratio` and `nees` show. `lost` is by the truth, from `LOST` [m] on:
     a run's summary may say that it has not `diverged` (0.5 m), and `silent` that the estimator did not notice.
 
     Raises
@@ -60,6 +61,8 @@ def score_run(truth: Truth, inputs: Inputs, answers: Answers) -> dict[str, Any]:
         "dead_reckoning_m": evaluate.root_mean_square(np.linalg.norm(drift, axis=1)),
         "nees": _nees(offset, covariance, 3),
         "horizontal_nees": _nees(offset, covariance, 2),
+        "expected_ratio": _expected_ratio(relative, truth),
+        "expected_nees": _expected_nees((offset - told)[:, :2], covariance[:, :2, :2], inputs.start.position_std),
     }
     own = np.array([np.sqrt(np.trace(one[:3, :3])) for one in covariance])
     outcomes = [info.outcome for info in answers.infos]
@@ -174,6 +177,26 @@ def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
     """Score card: position RMSE [m], RMS posterior bound and their ratio, by name."""
     rmse, least = evaluate.root_mean_square(errors), evaluate.root_mean_square(bound)
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
+
+
+def _expected_ratio(relative: Floats, truth: Truth) -> float:
+    """Score card: position RMSE over the posterior bound as expected over all draws of the start prior's error.
+
+    Who is told nothing of the room moves with the start, to the last digit: the error is that of the start and the
+    `relative` one (K,) [m], which does not hang on it. What the start's draw adds in the mean square is what it adds to
+    the bound.
+    """
+    drawn = truth.bound**2 - truth.relative_bound**2
+    return float(np.sqrt(np.mean(relative**2 + drawn) / np.mean(truth.bound**2)))
+
+
+def _expected_nees(relative: Floats, covariance: Floats, std: float) -> float | None:
+    """Score card: NEES of x and y per degree of freedom as expected over all draws of the start prior's error of
+    deviation `std` [m] along each axis, from the `relative` error (K, 2) [m] and covariances (K, 2, 2)."""
+    if not (np.linalg.det(covariance) > 0.0).all():
+        return None
+    drawn = std**2 * np.trace(np.linalg.inv(covariance), axis1=1, axis2=2)
+    return float(np.mean(evaluate.normalised_squares(relative, covariance) + drawn)) / 2.0
 
 
 def _nees(offset: Floats, covariance: Floats, count: int) -> float | None:

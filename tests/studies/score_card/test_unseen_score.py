@@ -108,6 +108,29 @@ def test_the_height_counts_in_the_nees_but_not_in_that_across() -> None:
     assert scores["nees"] == pytest.approx((across + 2.0**2) / 3.0)
 
 
+def test_what_is_expected_over_the_starts_error_is_the_mean_over_its_draws() -> None:
+    """4000 draws: the mean square of two numbers is within 2.5 % then, four deviations."""
+    given, rng, draws = answers(), np.random.default_rng(3), 4000
+    bent = np.column_stack([0.004 * np.sin(TIME), 0.002 * TIME, np.zeros(K)])
+    spread = np.zeros((6, 6))
+    spread[:2, :2] = [[1.2e-4, 3e-5], [3e-5, 1.6e-4]]
+    drawn = np.sqrt(0.01**2 + 0.01**2 + 0.001**2)  # the start's error along x and y, and what the bound has besides
+    known = truth()._replace(bound=np.full(K, drawn))
+    moved = [
+        replace(each, position=each.position + by, covariance=spread)
+        for each, by in zip(given.estimates, bent, strict=True)
+    ]
+    found = score_run(known, inputs(), given._replace(estimates=tuple(moved)))
+    start = 0.01 * rng.standard_normal((draws, 2))
+    error = (bent[:, :2] + start[:, None]).reshape(-1, 2)
+    assert found["expected_ratio"] == pytest.approx(np.sqrt(np.mean(np.sum(error**2, axis=1))) / drawn, rel=0.0125)
+    inside = np.einsum("ki,ij,kj->k", error, np.linalg.inv(spread[:2, :2]), error)
+    assert found["expected_nees"] == pytest.approx(np.mean(inside) / 2.0, rel=0.025)
+    # the run's own draw tells of neither
+    assert found["ratio"] != pytest.approx(found["expected_ratio"], rel=0.05)
+    assert found["horizontal_nees"] != pytest.approx(found["expected_nees"], rel=0.05)
+
+
 def test_relative_errors_and_what_is_late() -> None:
     error = TOLD + np.outer(np.where(TIME >= 10.0, 0.003, 0.0), [1.0, 0.0, 0.0])
     scores = score_run(truth(), inputs(), answers(error))
