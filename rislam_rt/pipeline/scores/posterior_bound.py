@@ -8,6 +8,7 @@ import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.channel.walls import build_walls
+from rislam_rt.evaluate import root_mean_square
 from rislam_rt.information import (
     LandmarkModel,
     LinearMeasurements,
@@ -145,3 +146,24 @@ def over_distortion(paths: Paths, settings: Settings) -> Complexes:
     power = np.sum(heard**2, axis=1)
     extra = expected_distortion(hardware, radio, receiver, power, np.sum(np.abs(paths.gain[:, direct]) ** 2, axis=1))
     return np.asarray(paths.gain * np.sqrt(radio.noise_psd / (radio.noise_psd + extra))[:, None])
+
+
+def true_motion_bounds(
+    scene: Scene, paths: Paths, gain: Any, scheme: str, config: Mapping[str, Any]
+) -> tuple[Floats, Floats]:
+    """Posterior bounds on the RMS position errors (K,) [m] of a scheme's run under the motion as it truly is, absolute,
+    and relative to the start.
+
+    The motion model is white acceleration with the RMS that the true motion has, horizontally and vertically, whatever
+    a filter assumes. The height after the start is not known if the agent climbs.
+    """
+    problem = bound_problem(scene, paths, gain, scheme, config)
+    axes, time = problem.motion.axes, scene.agent.time
+    push = np.diff(scene.agent.velocity, axis=0) / np.diff(time)[:, None]
+    motion = problem.motion
+    if len(push):
+        motion = replace(motion, acceleration=root_mean_square(push[:, :axes]))
+    if len(push) and axes == 2:
+        motion = replace(motion, axes=3, climb=root_mean_square(push[:, 2]))
+    bound, relative = bounds_of_motion(problem, time, motion)
+    return bound.rms, relative.rms

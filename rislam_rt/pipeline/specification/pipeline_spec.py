@@ -151,7 +151,7 @@ class BudgetSection(Section):
 
     @property
     def total(self) -> float:
-        """Sum [s] of the four steps of the time budget."""
+        """Sum [s] of the four steps of a pipeline file's time budget."""
         return self.optimise_s + self.communicate_s + self.measure_s + self.localise_s
 
     def fills(self, cycle: float) -> bool:

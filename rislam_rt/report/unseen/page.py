@@ -41,10 +41,11 @@ def _meaning() -> list[str]:
     that the agent was told its start with, which no measurement of an unknown room can mend. Bounds are posterior
     bounds of the same motion, codes and settings, with landmarks and walls unknown, the association known, and white
     acceleration of the strength that the motion truly has; the relative one has the start as its origin. Ratios are
-    of root mean squares over a run. A run draws the start's error once, and for the whole of it. Who is told nothing of
-    the room moves with the start, to the last digit, so that one run tells what is expected over all draws: `expected`
-    holds the mean square that the start adds to the bound, in place of that of its draw. Given are medians over the rooms with their 95 % bootstrap intervals, and 95th
-    percentiles; shares with Wilson's intervals. Dead reckoning is the start's told velocity, kept."""
+    of root mean squares over a run. A run draws the start's error once, and for the whole of it. Who is told nothing
+    of the room moves with the start, to the last digit, so that one run tells what is expected over all draws: what
+    the start adds to the bound stands in place of what its draw added. Given are medians over the rooms with their
+    95 % bootstrap intervals, and 95th percentiles; shares with Wilson's intervals. Dead reckoning is the start's
+    told velocity, kept."""
     lost = f"""Lost is a run whose relative error exceeds {LOST:g} m and {FAR_OVER:g} relative bounds for {LASTING:g} s
     on end; silently so, if no cycle from then on says that it diverged, and the error exceeds {FAR_OVER:g} of the
     estimator's own deviations for as long. A wall or landmark counts as heard if a path of

@@ -14,9 +14,10 @@ from rislam_rt.scene.importing.free_space import find_free, is_seen
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.materials import MaterialAssignment, itu_by_word
 from rislam_rt.scene.importing.mesh_source import MeshPart, read_source
+from rislam_rt.scene.importing.part_names import numbered, plain_name, wall_name
 from rislam_rt.scene.importing.placement import place_parts
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, find_facets, weld
-from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces, numbered, plain_name, wall_name
+from rislam_rt.scene.importing.regions.region_groups import RegionGroup, find_pieces
 from rislam_rt.scene.importing.regions.round_surfaces import find_round
 from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, sort_regions
 from rislam_rt.scene.importing.room_draft import RoomDraft

@@ -40,7 +40,7 @@ def partner_clear(view: CycleAssociation, observed: Observations) -> Floats:
 
 
 def _asked(view: CycleAssociation) -> Integers:
-    """Associated clusters with an unresolved partner that may be silent while the leading path is heard."""
+    """Unresolved partners that may be silent while the leading path is heard: rows of their associated clusters."""
     presence = view.groups.presence[view.row]
     return ((view.groups.partner[view.row] >= 0) & (presence < 1.0)).nonzero()[0]
 

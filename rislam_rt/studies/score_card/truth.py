@@ -1,17 +1,14 @@
 """The truth that a run is scored against: motion, landmarks, walls, when they are detectable, the bounds of the run."""
 
-from dataclasses import replace
 from typing import NamedTuple
-
-import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.channel.walls import build_walls
-from rislam_rt.evaluate import Surfaces, root_mean_square
+from rislam_rt.evaluate import Surfaces
 from rislam_rt.model import Paths, Scene, SchemeResult
 from rislam_rt.pipeline.scores.audible_paths import audible_paths, audible_planes, landmarks_audible
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
-from rislam_rt.pipeline.scores.posterior_bound import bound_problem, bounds_of_motion
+from rislam_rt.pipeline.scores.posterior_bound import true_motion_bounds
 from rislam_rt.pipeline.scores.wall_scores import coplanar, wall_surfaces
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 
@@ -52,7 +49,7 @@ class Truth(NamedTuple):
     """(K,) [m] the same relative to the start, which then has no error."""
 
     def walls(self, shift: Floats) -> Surfaces:
-        """Surfaces of the true walls of an unseen room, moved by `shift` (3,) [m]."""
+        """Surfaces of the true walls of a room, moved by `shift` (3,) [m]."""
         return Surfaces(self.wall_middle + shift, self.wall_normal, self.wall_spread)
 
 
@@ -62,28 +59,9 @@ def build_truth(scene: Scene, paths: Paths, result: SchemeResult, spec: Pipeline
     audible = audible_paths(paths.with_gain(result.gain), settings, use_vt=uses_wall_returns(result.scheme, settings))
     group = coplanar(walls)
     surfaces = wall_surfaces(walls, group)
-    bound, relative = run_bounds(scene, paths, result, spec)
+    bound, relative = true_motion_bounds(scene, paths, result.gain, result.scheme, spec.model_dump(mode="json"))
     return Truth(
         scene.agent.position, scene.agent.velocity, scene.landmark_positions, len(scene.panels),
         landmarks_audible(scene, paths, audible), *surfaces, audible_planes(paths, audible, group), paths.kind,
         paths.landmark, result.component_path, bound, relative,
     )  # fmt: skip
-
-
-def run_bounds(scene: Scene, paths: Paths, result: SchemeResult, spec: PipelineSpec) -> tuple[Floats, Floats]:
-    """True posterior bounds on the RMS position errors (K,) [m] of a run in an unseen room, absolute, and relative to
-    the start.
-
-    The motion model is white acceleration with the RMS that the true motion has, horizontally and vertically, whatever
-    a filter assumes. The height after the start is not known if the agent climbs.
-    """
-    problem = bound_problem(scene, paths, result.gain, result.scheme, spec.model_dump(mode="json"))
-    axes, time = problem.motion.axes, scene.agent.time
-    push = np.diff(scene.agent.velocity, axis=0) / np.diff(time)[:, None]
-    motion = problem.motion
-    if len(push):
-        motion = replace(motion, acceleration=root_mean_square(push[:, :axes]))
-    if len(push) and axes == 2:
-        motion = replace(motion, axes=3, climb=root_mean_square(push[:, 2]))
-    bound, relative = bounds_of_motion(problem, time, motion)
-    return bound.rms, relative.rms

@@ -12,7 +12,7 @@ from rislam_rt.scene.importing.floor_plans.floor_plan import FloorPlan, Opening
 from rislam_rt.scene.importing.floor_plans.wall_lines import SAME_LINE, Line, Spans, wall_lines, without_span
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.materials import MaterialAssignment
-from rislam_rt.scene.importing.regions.region_groups import compass_side, numbered, plain_name
+from rislam_rt.scene.importing.part_names import compass_side, numbered, plain_name
 from rislam_rt.scene.importing.room_draft import RoomDraft
 from rislam_rt.scene.meshes import Mesh, as_mesh, joined
 from rislam_rt.scene.polygons import inside_loop, triangulate

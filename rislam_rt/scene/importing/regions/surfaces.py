@@ -68,7 +68,7 @@ class SortedSurfaces(NamedTuple):
 def sort_regions(
     facets: FlatRegions, pieces: list[RegionGroup], rounds: list[RoundPatch], options: ImportOptions
 ) -> SortedSurfaces:
-    """Sort the flat regions of an imported mesh: whether each reflects, hides what lies behind, or is left out."""
+    """Sort the flat regions of an imported mesh into surfaces that reflect, clutter that hides, and what is left."""
     owner = np.zeros(len(facets.area), dtype=np.int64)
     for number, piece in enumerate(pieces):
         owner[piece.regions] = number

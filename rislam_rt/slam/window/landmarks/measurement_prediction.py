@@ -120,8 +120,8 @@ def amplitudes(
     scene: KnownEnvironment,
     code: RisCode | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """Predicted log amplitudes (R,) of returns and their standard deviations (R,): free space, walls' reflectivity,
-    points' strengths, and panels under the phase code."""
+    """Log amplitudes (R,) of returns for the prediction of measurements, and their standard deviations (R,): free
+    space, walls' reflectivity, points' strengths, and panels under the phase code."""
     radio, legs = scene.radio, returns.legs
     if not len(returns.tx):
         return np.zeros(0), np.zeros(0)
