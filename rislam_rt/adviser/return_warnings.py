@@ -39,6 +39,9 @@ JOINED = 1e-4
 BEND = np.deg2rad(15.0)
 """Angle [rad] between facets of a curved wall from which on the filter tells them apart: in galleries of facets of 15,
 20 and 30 degrees it errs by a centimetre, of 10, 7.5 and 5 degrees it is lost (docs/slam_measured.md)."""
+ROUND_BEND = np.deg2rad(36.0)
+"""The same [rad] of a wall that closes round the agent: in round rooms of 6, 8 and 10 facets none of eight runs each
+is lost, of 12, 16 and 20 two, four and six (docs/slam_measured.md)."""
 PARALLEL = np.deg2rad(1.0)
 """Angle [rad] up to which two fronts are parallel: their returns come from directions closer than an array tells."""
 
@@ -201,36 +204,44 @@ def parallel_front_warnings(looked: Survey, file: str) -> Iterator[Finding]:
 
 def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
     """Warning, one for a room, of curved walls: `FACETS` facets or more heard along the way belong together, each
-    turned by less than `BEND` to one beside it, and turn by more in all; `file` is what it names as its place.
+    turned by less than `BEND` to one beside it, or `ROUND_BEND` if they close round the agent, and turn by more in all;
+    `file` is what it names as its place.
 
     Where an agent goes past the edge of two facets they are equally far, their returns come out as one that turns from
-    one direction into the other, and from then on the new facet passes for the old one.
+    one direction into the other, and from then on the new facet passes for the old one. In a round room the nearest
+    facet and the farthest are heard, which face each other: nothing tells of the way along them.
     """
     walls = build_walls(looked.scene)
     wall, facing = _heard_fronts(looked, walls)
-    pairs, turns = _slight_turns(walls)
-    part = connected(pairs, len(walls))[wall]
-    for one in np.unique(part):
-        facets = np.flatnonzero(part == one)
-        if len(facets) >= FACETS and (facing[facets] @ facing[facets].T).min() < np.cos(BEND):
-            break
-    else:
-        return
-    heard = np.isin(pairs, wall[facets]).any(axis=1)
-    sizes = np.rad2deg(turns[heard])
+    for bend, is_round in ((ROUND_BEND, True), (BEND, False)):
+        pairs, turns = _slight_turns(walls, bend)
+        part = connected(pairs, len(walls))
+        for one in np.unique(part[wall]):
+            facets, alike = np.flatnonzero(part[wall] == one), facing[part[wall] == one] @ facing[part[wall] == one].T
+            closes = np.sum(part[pairs[:, 0]] == one) >= np.sum(part == one) and alike.min() < -np.cos(ROUND_BEND)
+            if len(facets) >= FACETS and alike.min() < np.cos(bend) and closes >= is_round:
+                heard = np.isin(pairs, wall[facets]).any(axis=1)
+                yield _curved_wall(walls.names[wall[facets[0]]], len(facets), turns[heard], bend, file)
+                return
+
+
+def _curved_wall(name: str, number: int, turns: Floats, bend: float, file: str) -> Finding:
+    """Warning of a curved wall: so many facets, `name` the first, that turn by less than `bend` [rad] to the next."""
+    sizes = np.rad2deg(turns)
     by = f"{sizes.min():.2g}" + (f" to {sizes.max():.2g}" if sizes.max() > 1.01 * sizes.min() else "")
-    yield warning_at(
+    around = " that close round the agent" if bend == ROUND_BEND else ""
+    return warning_at(
         file, "reflector",
-        f"'{walls.names[wall[facets[0]]]}' and {counted(len(facets) - 1, 'other facet')} of curved walls heard along "
-        f"the way turn by {by} degrees from one to the next: the filter may take the return of one for the next "
-        "one's, and be lost without saying so",
-        f"give a curved wall by facets that turn by {np.rad2deg(BEND):.0f} degrees or more",
+        f"'{name}' and {counted(number - 1, 'other facet')} of curved walls{around} heard along the way turn by {by} "
+        "degrees from one to the next: the filter may take the return of one for the next one's, and be lost without "
+        "saying so",
+        f"give a {'round' if around else 'curved'} wall by facets that turn by {np.rad2deg(bend):.0f} degrees or more",
     )  # fmt: skip
 
 
-def _slight_turns(walls: Walls) -> tuple[Integers, Floats]:
-    """Pairs (P, 2) of facets with a common edge that turn by less than `BEND`, for warnings of curved walls, and their
-    angles (P,) [rad]."""
+def _slight_turns(walls: Walls, bend: float) -> tuple[Integers, Floats]:
+    """Pairs (P, 2) of facets with a common edge that turn by less than `bend` [rad], for warnings of curved walls, and
+    their angles (P,) [rad]."""
     places = np.round(walls.triangles.reshape(-1, 3) / JOINED)
     corner = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 3)
     edges = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -239,7 +250,7 @@ def _slight_turns(walls: Walls) -> tuple[Integers, Floats]:
     next_to = edge[order][1:] == edge[order][:-1]
     pairs = np.stack([owner[order][:-1][next_to], owner[order][1:][next_to]], axis=1)
     turn = np.arccos(np.clip(np.abs(np.vecdot(walls.normal[pairs[:, 0]], walls.normal[pairs[:, 1]])), 0.0, 1.0))
-    slight = (turn > JOINED) & (turn < BEND - PARALLEL)
+    slight = (turn > JOINED) & (turn < bend - PARALLEL)
     return pairs[slight], turn[slight]
 
 

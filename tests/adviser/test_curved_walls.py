@@ -53,10 +53,25 @@ def test_a_curved_wall_is_named_with_its_angle(step: float) -> None:
     assert line in [finding.line for finding in return_warnings(found, "scene.toml")]
 
 
+@pytest.mark.parametrize("step", [10.0, 30.0])
+def test_a_round_room_is_named_up_to_larger_angles(step: float) -> None:
+    (line,) = lines(looked(step, span=360.0))
+    assert "curved walls that close round the agent" in line
+    assert "a round wall by facets that turn by 36 degrees or more" in line
+
+
 @pytest.mark.parametrize(
     "options",
-    [{"step": 20.0}, {"step": 10.0, "span": 20.0}, {"step": 1.5, "span": 9.0}, {"step": 10.0, "gap": 0.01}],
-    ids=["large facets", "one kink", "hardly curved", "apart"],
+    [
+        {"step": 20.0},
+        {"step": 10.0, "span": 20.0},
+        {"step": 1.5, "span": 9.0},
+        {"step": 10.0, "gap": 0.01},
+        {"step": 40.0, "span": 360.0},
+        {"step": 20.0, "span": 320.0},
+        {"step": 20.0, "span": 360.0, "radius": 0.4, "walked": 1.2},
+    ],
+    ids=["large facets", "one kink", "hardly curved", "apart", "few facets", "open", "pillar"],
 )
 def test_what_is_no_curved_wall_is_not_named(options: dict[str, float]) -> None:
     assert not lines(looked(**options))
