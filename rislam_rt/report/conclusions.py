@@ -86,8 +86,8 @@ def _found(result: SlamResult, scheme: SchemeResult, scores: Mapping[str, Any]) 
 def _errors(scores: Mapping[str, Any]) -> Iterator[str]:
     """Conclusions on the errors of one scheme: RMSE, and RMSE relative to the start, each with its bound.
 
-    Whether it is at the bound is said of the error relative to the start where that is known: the start's own error is
-    in both the other and its bound, and may be most of them.
+    Where the error relative to the start is known, it alone is held against its bound: the start's own error is in both
+    the other and its bound, and may be most of them.
     """
     over, relative, least = scores["over_bound"], scores["relative_rmse_m"], scores["relative_bound_m"]
     near, known = bool(over) and over <= AT_BOUND, relative is not None and bool(least)
@@ -95,8 +95,7 @@ def _errors(scores: Mapping[str, Any]) -> Iterator[str]:
     text = _centimetres(scores["rmse_m"])
     yield text if near and known else f"{text}, {'at the bound' if near else bound}"
     if known:
-        at = "at the bound" if relative <= AT_BOUND * least else f"{relative / least:.1f} times the bound"
-        yield f"{_centimetres(relative)} relative to its start, {at}"
+        yield f"{_centimetres(relative)} relative to its start, {relative / least:.1f} times the bound"
 
 
 def panel_found_at(result: SlamResult, scheme: SchemeResult, panel: int = 0) -> float | None:

@@ -162,7 +162,7 @@ def test_a_run_that_only_its_start_puts_at_the_bound_is_not_called_so(result):
     summary = summarise(result)
     errors = {"rmse_m": 0.013, "bound_m": 0.0128, "over_bound": 1.02, "relative_bound_m": 0.0002}
     for relative, words in ((0.0075, "1.3 cm; 0.75 cm relative to its start, 37.5 times the bound;"),
-                            (0.0003, "1.3 cm; 0.03 cm relative to its start, at the bound;"),
+                            (0.0003, "1.3 cm; 0.03 cm relative to its start, 1.5 times the bound;"),
                             (None, "1.3 cm, at the bound;")):  # fmt: skip
         for scores in summary["schemes"].values():
             scores |= {**errors, "relative_rmse_m": relative}
