@@ -53,6 +53,7 @@ def command(
     from rislam_rt.adviser.return_warnings import return_warnings
     from rislam_rt.cli.run import names_schemes
     from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.estimators import use_directions
     from rislam_rt.pipeline.room.array_warnings import array_warnings
     from rislam_rt.pipeline.room.late_paths import late_path_warnings
     from rislam_rt.pipeline.room.motion_warnings import motion_warnings, short_motion_warnings
@@ -82,7 +83,8 @@ def command(
         findings += _run_errors(checked, spec, places, changed, named=names_schemes(spec, file, changed))
         findings += motion_warnings(checked, settings.radio, settings.receiver, spec.budget, places[0])
         findings += short_motion_warnings(checked, spec.budget, places[0])
-        findings += array_warnings(settings.radio, _place("radio.array", told, changed))
+        if use_directions(spec.schemes):
+            findings += array_warnings(settings.radio, _place("radio.array", told, changed))
         findings += late_path_warnings(looked.paths, looked.settings, places[0])
         findings += return_warnings(looked, places[0])
     for finding in findings:

@@ -23,10 +23,14 @@ FARTHEST = 1e5
 def pipeline_file(name: str) -> Path:
     """Command line argument of a pipeline: the path of its file, or of a built-in one by its name.
 
-    Its folder and the working folder are added to Python's module path, so that it can name a user's own methods.
+    Its folder and the working folder are added to Python's module path, so that it can name a user's own methods. Those
+    of a run's folder, copied as they ran, come before those of the working folder, which `python -m` has put first.
     """
     file = find_pipeline(name)
-    look_for_methods_in(str(file.parent.resolve()), os.getcwd())
+    beside, here = str(file.parent.resolve()), os.getcwd()
+    if (file.parent / "run.json").is_file() and here in sys.path and beside not in sys.path:
+        sys.path.insert(sys.path.index(here), beside)
+    look_for_methods_in(beside, here)
     return file
 
 

@@ -85,6 +85,7 @@ def command(
     import numpy as np
 
     from rislam_rt.pipeline import load_spec
+    from rislam_rt.pipeline.estimators import use_directions
     from rislam_rt.pipeline.recordings.answer_files import answer_files, summarise_answers, true_positions
     from rislam_rt.pipeline.recordings.own_measurements import input_warnings, localise, read_inputs, run_rng
     from rislam_rt.pipeline.room.array_warnings import array_warnings
@@ -107,7 +108,8 @@ def command(
             where = "a CSV file does not say where Tx and Rx sit on the agent"
             raise ConfigError(f"{measurements}: {where}; give --tx X,Y,Z and --rx X,Y,Z (m; x forward, y left, z up)")
         inputs = _with_heading(inputs, heading, spec.slam.heading, measurements)
-    blind = (found.line.partition(": ")[2] for found in array_warnings(radio, "radio"))
+    told = array_warnings(radio, "radio") if use_directions(spec.schemes[:1]) else ()  # of which the estimator is
+    blind = (found.line.partition(": ")[2] for found in told)
     for line in (*input_warnings(inputs, spec), *blind):
         warn(f"{measurements}: {line}")
     true = None if truth is None else true_positions(truth, inputs.time + inputs.since)

@@ -1,7 +1,7 @@
 """Estimators of pose and map from measurements, behind one set of functions: the package's SLAM filters, other
 published schemes, and a user's own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from operator import attrgetter
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ from rislam_rt.information.landmark_model import Unknown
 from rislam_rt.model import Body, DataSheet, Measurement, RisCode, SensorModel, SlamEstimate
 from rislam_rt.pipeline.estimate_checks import check_estimate
 from rislam_rt.pipeline.own_methods import fresh_own, own_method_errors
+from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.pipeline.specification.pipeline_spec import Settings
 from rislam_rt.slam import StartPrior
 from rislam_rt.slam.schemes import bp_slam, bp_slam_aoa, channel_slam
@@ -108,3 +109,9 @@ ESTIMATORS = Estimators(
     ),
 )
 """Built-in SLAM estimators by name; a user's own are loaded when they are asked for."""
+
+
+def use_directions(schemes: Iterable[str]) -> bool:
+    """Whether the estimator of any of these schemes uses angles of arrival; one of the user's own counts as such."""
+    found = (ESTIMATORS.get(SCHEMES[name].estimator) for name in schemes)
+    return any(estimator is None or estimator.angles for estimator in found)

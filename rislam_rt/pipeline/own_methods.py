@@ -8,6 +8,7 @@ import ast
 import hashlib
 import inspect
 import re
+import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -27,6 +28,8 @@ GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "r
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
 INSTALLED = {Path(__file__).parents[1], *(Path(get_path(name)) for name in ("stdlib", "purelib", "platlib"))}
 """Folders of this package, of Python and of installed libraries, whose files are no file of a user's own."""
+LARGEST = 1_000_000
+"""Most bytes of a file of a user's own that is copied to a run's folder."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -45,8 +48,10 @@ def load_own(name: str) -> Any:
     try:
         module = import_module(place)
     except ModuleNotFoundError as error:
-        what = f"no module '{place}'" if error.name == place else f"module '{place}' needs '{error.name}'"
-        raise ConfigError(f"'{name}': {what}; put {place}.py beside the pipeline file, or install it") from None
+        absent = f"{place}.".startswith(f"{error.name}.")  # it, or the folder or package that it is to be in
+        what = f"no module '{place}'" if absent else f"module '{place}' needs '{error.name}'"
+        file = f"{place.replace('.', '/')}.py"
+        raise ConfigError(f"'{name}': {what}; put {file} beside the pipeline file, or install it") from None
     except (Exception, SystemExit) as error:  # a user's file may raise anything while it is read
         raise ConfigError(f"'{name}': {place} cannot be loaded ({type(error).__name__}: {error}); mend it") from None
     if not hasattr(module, attribute):
@@ -108,21 +113,44 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
 def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
     """Source files of a user's own methods, given by name with their `own_digests`, and of all that these count.
 
-    Content by path, relative to the folder from which they are imported.
+    Content by path, relative to the folder from which they are imported; of two of one path, that which Python finds.
 
-    Left out are installed ones, and files that have changed since: they are not what has run.
+    Left out are installed ones, those of more than `LARGEST` bytes, and files that have changed since: they are not
+    what has run.
     """
-    found: dict[str, bytes] = {}
-    for name, digest in digests.items():
-        if not digest or not _FORM.fullmatch(name) or own_digest(Path(_file(load_own(name)) or "")) != digest:
-            continue
+    same = [
+        name for name, digest in digests.items()
+        if digest and _FORM.fullmatch(name) and own_digest(Path(_file(load_own(name)) or "")) == digest
+    ]  # fmt: skip
+    return {path: file.read_bytes() for path, file in _copied(same).items() if file.stat().st_size <= LARGEST}
+
+
+def large_sources(names: Iterable[str]) -> list[str]:
+    """A line for each file of a user's own methods that is too large to be copied to a run's folder."""
+    copied = _copied(name for name in sorted(set(names)) if _FORM.fullmatch(name))
+    return [
+        f"{path}: {file.stat().st_size / 1e6:.1f} MB, and a run's folder holds copies of at most {LARGEST / 1e6:g} MB; "
+        "keep it to repeat the run"
+        for path, file in copied.items()
+        if file.stat().st_size > LARGEST
+    ]
+
+
+def _copied(names: Iterable[str]) -> dict[str, Path]:
+    """Files of a user's own methods that a run's folder is to hold, by path relative to the folder of their import."""
+    found: dict[str, Path] = {}
+    installed = {folder.resolve() for folder in INSTALLED}
+    path = [folder for folder in _import_path() if folder not in installed]
+    for name in names:
         named = Path(import_module(name.partition(":")[0]).__file__ or "")  # it may import what it names
         for file in (named, Path(_file(load_own(name)) or "")):
-            if INSTALLED.isdisjoint(file.parents):
+            if file.is_file() and INSTALLED.isdisjoint(file.parents):
                 root = _root(file)
                 packages = {folder / "__init__.py" for folder in file.parents if root in folder.parents}
-                sources = _closure(file) | {one for one in packages if one.is_file()}
-                found |= {one.relative_to(root).as_posix(): one.read_bytes() for one in sorted(sources)}
+                for one in sorted(_closure(file) | {one for one in packages if one.is_file()}):
+                    place = one.relative_to(root).as_posix()
+                    first = next((folder / place for folder in path if (folder / place).is_file()), one)
+                    found[place] = first
     return found
 
 
@@ -280,8 +308,15 @@ def _places(folder: Path, names: list[str]) -> Iterator[Path]:
 
 
 def _root(file: Path) -> Path:
-    """Folder of the outermost package that the file of a user's own method is in; else the file's folder."""
+    """Folder from which Python imports the file of a user's own method: that of the outermost package that it is in,
+    or, where that is not looked in for modules, the nearest above that is; the former if none is."""
     folder = file.parent
     while (folder / "__init__.py").is_file() and folder != folder.parent:
         folder = folder.parent
-    return folder
+    path = set(_import_path())
+    return next((one for one in (folder, *folder.parents) if one.resolve() in path), folder)
+
+
+def _import_path() -> list[Path]:
+    """Folders in which Python looks for modules, a user's own methods among them, the first one first."""
+    return [Path(one).resolve() for one in sys.path]

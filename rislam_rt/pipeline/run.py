@@ -19,7 +19,8 @@ from rislam_rt.pipeline.assumed_model import tilted_motion
 from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
-from rislam_rt.pipeline.estimators import Estimator
+from rislam_rt.pipeline.estimators import Estimator, use_directions
+from rislam_rt.pipeline.own_methods import large_sources
 from rislam_rt.pipeline.room.array_warnings import array_warnings
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.late_paths import direct_path_warnings, late_path_warnings
@@ -219,7 +220,8 @@ def cut_scene(scene: Scene, cycles: int | None) -> Scene:
 def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     """Warnings of a run, one line each: a RIS panel so large that the band resolves its elements' delays, an agent
     faster than the receiver reckons with as it tells the panel's paths from others, or than its slot allows, or
-    manoeuvring as on no floor, or a receive array that cannot tell directions.
+    manoeuvring as on no floor, or a receive array that cannot tell directions that a scheme uses, or a file
+    of an own method too large to be copied.
 
     A path over the panel has one delay in the model. Its gain is summed over the elements, so that it needs no far
     field.
@@ -228,11 +230,12 @@ def run_warnings(scene: Scene, spec: PipelineSpec) -> tuple[str, ...]:
     settings = build_settings(spec, panels)
     place = f"scene '{scene.name}'"
     moving = motion_warnings(scene, settings.radio, settings.receiver, spec.budget, place)
-    blind = array_warnings(settings.radio, f"pipeline '{spec.name}'")
+    blind = array_warnings(settings.radio, f"pipeline '{spec.name}'") if use_directions(spec.schemes) else ()
     bandwidth, agent = spec.radio.bandwidth_ghz * 1e9, scene.agent
     used = scene.panels if panels else ()
     large = (delay_spread_warnings(panel.spec, panel.center, agent.tx, agent.rx, bandwidth) for panel in used)
-    return (*(line for lines in large for line in lines), *(finding.line for finding in (*moving, *blind)))
+    kept = large_sources([*spec.schemes, spec.channel])
+    return (*(line for lines in large for line in lines), *(finding.line for finding in (*moving, *blind)), *kept)
 
 
 def late_warnings(scene: Scene, paths: Paths, spec: PipelineSpec) -> tuple[str, ...]:

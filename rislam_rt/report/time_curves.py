@@ -38,7 +38,7 @@ def draw_agent_error(result: SlamResult) -> Figure:
             colour, shown = styles[name].colour, _on_log_axis(error)
             label = f"{name}, RMSE {100.0 * np.sqrt(np.mean(error**2)):.1f} cm"
             handles += axis.plot(
-                time, shown, lw=1.6, label=label, **_look(styles[name], number / len(result.schemes), len(time))
+                time, shown, lw=1.6, label=label, **_look(styles[name], number, len(result.schemes), len(time))
             )
             axis.plot(time, _on_log_axis(believed), color=colour, lw=1.0, ls="--", alpha=0.7)
             lost = np.array([outcome == StepOutcome.DIVERGED for outcome in scheme.outcome], dtype=np.bool_)
@@ -57,11 +57,13 @@ def draw_agent_error(result: SlamResult) -> Figure:
     return figure
 
 
-def _look(style: SchemeStyle, share: float, cycles: int) -> dict[str, Any]:
+def _look(style: SchemeStyle, number: int, schemes: int, cycles: int) -> dict[str, Any]:
     """Colour and marker of a scheme's curve over time, as arguments of `plot`; markers stand at about `MARKS` cycles,
-    from the `share` of their distance on, so that curves which lie on each other can be told apart."""
-    step = max(cycles // MARKS, 1)
-    return {"color": style.colour, "marker": style.marker, "ms": 5.0, "markevery": (int(share * step), step)}
+    fewer in a short run, and at cycles of its own for each of the `schemes`, so that curves which lie on each other can
+    be told apart."""
+    step = max(cycles // MARKS, min(schemes, cycles))
+    first = number * step // schemes
+    return {"color": style.colour, "marker": style.marker, "ms": 5.0, "markevery": (first, step)}
 
 
 def _on_log_axis(error: Floats) -> Floats:
@@ -85,7 +87,7 @@ def draw_landmark_errors(result: SlamResult) -> Figure:
         axes = figure.subplots(1, max(len(scene.landmarks), 1), sharey=True, squeeze=False)[0]
         for place, (name, errors) in reversed(list(enumerate(tracks.items()))):
             for number, axis in enumerate(axes[: errors.shape[1]]):
-                look = _look(styles[name], place / len(tracks), len(time))
+                look = _look(styles[name], place, len(tracks), len(time))
                 axis.plot(time, 100.0 * errors[:, number], lw=1.4, label=name, **look)
         never = set(np.flatnonzero(~np.any([np.isfinite(e).any(axis=0) for e in tracks.values()], axis=0)).tolist())
         for number, (axis, landmark) in enumerate(zip(axes, scene.landmarks, strict=False)):
@@ -124,7 +126,7 @@ def draw_levels(result: SlamResult, detection_snr_db: float, snr_per_gain_db: fl
             if np.isfinite(level).any():
                 random = name == "random"
                 width, order = (0.7, 2) if random else (1.8, 3)
-                look = _look(styles[name], number / len(result.schemes), len(time))
+                look = _look(styles[name], number, len(result.schemes), len(time))
                 axis.plot(time, level, lw=width, zorder=order, label=f"RIS, {name}", **look)
         threshold = detection_snr_db - snr_per_gain_db
         axis.axhline(threshold, color="#555555", lw=1.0, ls="--", label="detection threshold")

@@ -27,7 +27,7 @@ from rislam_rt.storage.checksums import checksum, read_sealed
 from rislam_rt.storage.files import json_file, write_all
 from rislam_rt.studies.swept.collect import Group, group_rows, spread
 from rislam_rt.sweeps.store import SWEEP_FILE, Row, csv_bytes, rows_by_point
-from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, parse_axis
+from rislam_rt.sweeps.sweep import Axis, Scalar, Sweep, Value, build_cells, parse_axis
 
 FUNCTION = f"{__name__}:run_cell"
 
@@ -150,17 +150,22 @@ def slam_sweep(
 
 def default_folder(sweeps: Path, sweep: Sweep) -> Path:
     """Folder of a pipeline's sweep within `sweeps`, `<name>-<scene>`, or, where that holds the sweep of other settings
-    or of another scene of the same name, `<name>-<scene>-<hash of the settings>`.
+    or of another scene of the same name, `<name>-<scene>-<hash of the settings>`. The latter is kept to once it exists.
 
     Other axes and repetitions of the same settings share a folder, and their cells.
     """
-    folder = sweeps / f"{sweep.name}-{Path(str(sweep.base['scene'])).name}"
-    try:
-        other = checksum(read_sealed(folder / SWEEP_FILE)["base"])
-    except ResultError:  # none, or a damaged one: the cells there tell what they are of
+    folder, own = sweeps / f"{sweep.name}-{Path(str(sweep.base['scene'])).name}", checksum(sweep.base)
+    hashed = sweeps / short_name(folder.name, own)
+    if hashed.is_dir():
+        return hashed
+    if not (folder / SWEEP_FILE).exists():
         return folder
-    own = checksum(sweep.base)
-    return folder if own == other else sweeps / short_name(folder.name, own)
+    try:
+        same = checksum(read_sealed(folder / SWEEP_FILE)["base"]) == own
+    except ResultError:  # damaged: the cells there tell what they are of
+        stored = {file.stem for file in (folder / "cells").glob("*.json")}
+        same = any(cell.ident in stored for cell in build_cells(sweep))
+    return folder if same else hashed
 
 
 def typed_axis(axis: Axis) -> Axis:

@@ -55,6 +55,8 @@ def test_an_array_that_tells_no_direction_is_said_before_it_runs(check):
     _, out, _ = check("empty_box", "--set", "radio.array.rows=1", "--set", "radio.array.spacing_wavelengths=1")
     assert "warning: --set: radio.array.rows: 1 x 4 antennas in a line tell no cosine along the body's x" in out
     assert "warning: --set: radio.array.spacing_wavelengths: antennas 1 wavelengths apart" in out
+    _, out, _ = check("empty_box", "--set", "radio.array.rows=1", "--set", 'schemes=["bp_slam_no_ris"]')
+    assert "radio.array" not in out, "it uses no directions"
 
 
 @pytest.mark.parametrize(("rows", "said"), [(1, "1 cycle, 0.1 s"), (2, "2 cycles, 0.2 s"), (20, "")])

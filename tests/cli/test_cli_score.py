@@ -125,6 +125,11 @@ def test_a_run_of_a_method_of_ones_own_is_reported_and_repeated_where_its_file_i
     stored, told = (json.loads(Path(one, "summary.json").read_text())["schemes"] for one in ("mine", "away"))
     assert stored == told
     assert name in (tmp_path / "mine" / "report.html").read_text()
+    # `python -m` looks in the working folder first: a file edited since is not what ran
+    (tmp_path / "away" / f"{module}.py").write_text("raise SystemExit\n")
+    done = away("run", tmp_path / "mine" / "config.toml", "--no-report", "--out", "copied")
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "away" / f"{module}.py").unlink()
     # a run of before, with colons in the names of its files
     marker = json.loads((tmp_path / "mine" / "run.json").read_text())
     for one in [*names]:

@@ -88,6 +88,26 @@ def test_other_settings_get_a_folder_and_fewer_repetitions_are_told(sweep, tmp_p
     assert (first / "scores.csv").read_bytes() == before
 
 
+def test_a_folder_is_not_taken_over_by_other_settings(sweep, tmp_path, here, undrawn):
+    """A file that was damaged, or a folder that was deleted, once made finished cells of other settings run again."""
+
+    def folder(cycles):
+        code, out, err = sweep(PIPELINE, *TINY, "--repeat", "1", "--jobs", "1", "--set", f"cycles={cycles}")
+        assert code == 0, err
+        found = tmp_path / out.rpartition("sweep folder: ")[2].strip()
+        assert len([*(found / "cells").iterdir()]) == 1
+        return found
+
+    first, second = folder(3), folder(4)
+    (first / "sweep.json").write_text("{")
+    assert folder(4) == second
+    assert len({first, second, folder(2)}) == 3
+    assert folder(3) == first
+    shutil.rmtree(first)
+    assert folder(4) == second
+    assert folder(3) == first
+
+
 @pytest.mark.parametrize("text", ["", "{", '{"schema": 1}'])
 def test_a_damaged_sweep_file_costs_no_cell(sweep, tmp_path, here, undrawn, text):
     words = (PIPELINE, *TINY, "--repeat", "1", "--jobs", "1")

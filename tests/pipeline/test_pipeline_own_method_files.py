@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from rislam_rt.pipeline.own_methods import own_digest
+from rislam_rt.errors import ConfigError
+from rislam_rt.pipeline import own_methods
+from rislam_rt.pipeline.own_methods import large_sources, load_own, own_digest, own_digests, own_sources
 
 FILES = {
     "mine.py": "import numpy as np\nimport beside\nfrom tools import deep\n",
@@ -60,3 +62,55 @@ def test_within_a_package_absolute_names_are_looked_up_from_its_root(folder: Pat
     before = own_digest(folder / "tools" / "deep.py")
     (folder / "tools" / "more.py").write_text("thing = 2\n")
     assert own_digest(folder / "tools" / "deep.py") != before
+
+
+DESIGNER = "def design(belief, panel, radio, *, rng):\n    return 0\n"
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Folder of modules of this test alone, named after it, on the path of imports, ahead of `behind`."""
+    for folder in ("behind", "front"):
+        (tmp_path / folder).mkdir()
+        monkeypatch.syspath_prepend(tmp_path / folder)
+    return tmp_path / "front"
+
+
+def write(folder: Path, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+
+
+def test_a_folder_that_is_no_package_is_kept_in_the_copy(place: Path) -> None:
+    methods = f"methods_{place.parent.name}"
+    name, more = f"{methods}.nm:design", f"import {methods}.more\n"
+    write(place, {f"{methods}/nm.py": more + DESIGNER, f"{methods}/more.py": "x = 1\n"})
+    digests = own_digests([name])
+    assert set(own_sources(digests)) == {f"{methods}/nm.py", f"{methods}/more.py"}
+    write(place, {f"{methods}/more.py": "x = 2\n"})
+    assert own_digests([name]) != digests
+
+
+def test_of_two_files_of_one_name_that_which_is_imported_is_copied(place: Path) -> None:
+    one, two, tool = (f"{word}_{place.parent.name}" for word in ("one", "two", "tool"))
+    write(place, {f"{one}.py": f"import {tool}\n{DESIGNER}", f"{tool}.py": "first = 1\n"})
+    write(place.parent / "behind", {f"{two}.py": f"import {tool}\n{DESIGNER}", f"{tool}.py": "second = 1\n"})
+    found = own_sources(own_digests([f"{one}:design", f"{two}:design"]))
+    assert set(found) == {f"{one}.py", f"{two}.py", f"{tool}.py"}
+    assert found[f"{tool}.py"] == b"first = 1\n"
+
+
+def test_a_large_file_is_not_copied_and_said(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = f"large_{place.parent.name}"
+    write(place, {f"{name}.py": DESIGNER})
+    assert large_sources([f"{name}:design", "random"]) == []
+    monkeypatch.setattr(own_methods, "LARGEST", 10)
+    assert own_sources(own_digests([f"{name}:design"])) == {}
+    (line,) = large_sources([f"{name}:design", "random"])
+    assert line.startswith(f"{name}.py: 0.0 MB, and a run's folder holds copies of at most")
+
+
+def test_the_hint_names_the_file_in_its_folder() -> None:
+    with pytest.raises(ConfigError, match=r"no module 'nowhere\.nm'; put nowhere/nm\.py beside the pipeline file"):
+        load_own("nowhere.nm:design")

@@ -41,3 +41,17 @@ def test_who_knows_all_is_not_shown_to_believe_a_millimetre(run_short):
     (axis,) = draw_agent_error(replace(result, schemes=known)).axes
     dashed = next(line for line in axis.lines if line.get_linestyle() == "--")
     assert np.isnan(dashed.get_ydata()).all()
+
+
+def test_markers_of_a_short_run_do_not_lie_on_each_other(run_short):
+    """Of fewer than 16 cycles all schemes once had theirs at the same cycles."""
+    result = run_short("cycles=6", 'schemes=["random"]')
+    scheme = next(iter(result.schemes.values()))
+    (axis,) = draw_agent_error(replace(result, schemes=dict.fromkeys(("random", "optimized", "no_ris"), scheme))).axes
+    marked = [
+        set(range(6)[line.get_markevery()[0] :: line.get_markevery()[1]])
+        for line in axis.lines
+        if line.get_linestyle() == "-"
+    ]
+    assert [len(cycles) for cycles in marked] == [2, 2, 2]
+    assert set.union(*marked) == set(range(6))

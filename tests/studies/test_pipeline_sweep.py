@@ -231,6 +231,14 @@ def test_two_methods_that_share_the_error_of_their_start_are_told_apart(tmp_path
     assert np.isnan(drawn[2]).all()
 
 
+def test_axes_that_end_in_the_same_word_have_a_column_each(capsys):
+    point = {"start.position_std_m": 0.25, "hardware.position_std_m": 0.0625, "slam.sigma_a": 0.01}
+    print_sweep([made_up("random", None, None)._replace(point=point)])
+    table = capsys.readouterr().out
+    for words in ("start.position_std_m", "hardware.position_std_m", "0.25", "0.0625", " sigma_a"):
+        assert words in table
+
+
 @pytest.mark.parametrize("width", [60, 80])
 def test_a_terminal_without_room_breaks_names_and_drops_none(width, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(width))

@@ -89,7 +89,8 @@ def _gather(
 ) -> LongRun:
     """Read a long run's slices and return its scores, and every n-th cycle for figures; `about` as in its marker.
 
-    Scores that are given as `summary` are not counted anew.
+    Scores that are given as `summary` are not counted anew, and its warnings are taken over: methods of the user's own
+    are then not asked for anything, as they need not be there.
     """
     schemes, scores, paths, motion = {}, {}, None, scene.agent
     spec = stored_spec(about["config"])
@@ -105,8 +106,12 @@ def _gather(
     if paths is None:
         raise ResultError(f"{folder}: a run without schemes; run again with another --out")
     stride = -(-len(scene.agent) // slices.SHOWN)
-    late = late_warnings(replace(scene, agent=motion), paths, spec)
-    lines = (*about["warnings"], *late, f"a run in slices: no posterior bound, and figures show one cycle in {stride}")
+    if summary is None:
+        late = late_warnings(replace(scene, agent=motion), paths, spec)
+        told = f"a run in slices: no posterior bound, and figures show one cycle in {stride}"
+        lines = (*about["warnings"], *late, told)
+    else:
+        lines = tuple(summary["warnings"])
     shown = run_folder.result_of_marker({**about, "warnings": lines}, replace(scene, agent=motion), paths, schemes)
     return LongRun(summary or summary_table(shown, scores, len(scene.agent)), shown)
 

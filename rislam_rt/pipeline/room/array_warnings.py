@@ -32,7 +32,7 @@ def array_warnings(radio: RadioConfig, file: str) -> Iterator[Finding]:
         yield warning_at(
             file, f"radio.array.{AXES[untold[0]]}",
             f"{message}, and the filter finds few walls, points and panels, or none",
-            "give two or more rows and cols (4 x 4 without these keys); 'bp_slam' alone uses no directions",
+            "give two or more rows and cols (4 x 4 without these keys); 'bp_slam' and 'channel_slam' use no directions",
         )  # fmt: skip
     if len(untold) < 2 and array.spacing > WIDEST:
         turn = 1.0 / array.spacing

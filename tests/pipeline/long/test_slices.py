@@ -2,6 +2,7 @@
 
 import hashlib
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +15,13 @@ from rislam_rt.pipeline import load_spec
 from rislam_rt.pipeline.long import slices
 from rislam_rt.pipeline.long.run import read_any, run_long
 from rislam_rt.pipeline.long.slices import is_long, join_paths, join_schemes
+from rislam_rt.pipeline.own_methods import load_own
 from rislam_rt.pipeline.recordings.inputs import PADDING, dataset_to_inputs
 from rislam_rt.pipeline.recordings.own_measurements import localise, run_rng
 from rislam_rt.pipeline.scores.summary import summarise_scheme
 from rislam_rt.pipeline.store.identity import run_identity
 from rislam_rt.pipeline.store.run_folder import open_run
+from rislam_rt.report import write_report
 from rislam_rt.storage.netcdf import read_dataset
 
 ROOT = Path(__file__).parents[3]
@@ -153,3 +156,25 @@ def test_it_can_be_read_again_and_a_changed_slice_is_told(short_slices, done, tm
     file.write_bytes(data)
     with pytest.raises(ResultError, match=r"scheme_random\.nc: changed"):
         read_any(folder)
+
+
+def test_it_is_reported_where_a_method_of_ones_own_is_not(room, short_slices, tmp_path, monkeypatch):
+    """Warnings of late paths once asked the method whether it uses the panel."""
+    module, folder = f"away_{tmp_path.name}", tmp_path / "run"
+    (tmp_path / f"{module}.py").write_text(
+        "def design(belief, panel, radio, *, rng):\n    return 0 * panel.offsets()[..., 0].astype(int)\n"
+    )
+    settings = ["channel=image_source", f"cycles={CYCLES}", "depth=1", f'schemes=["{module}:design"]']
+    with monkeypatch.context() as patch:
+        patch.syspath_prepend(tmp_path)
+        own = load_spec(ROOT / "pipelines" / "trace_then_slam.toml", [*settings, "receiver.estimator=bound"])
+        found = lead(room, own, folder)
+    (tmp_path / f"{module}.py").unlink()
+    sys.modules.pop(module)
+    load_own.cache_clear()
+    again = read_any(folder)
+    assert again.summary["schemes"] == found.summary["schemes"]
+    *same, why = again.summary["warnings"]
+    assert same == found.summary["warnings"]
+    assert why.endswith("these scores are those that the run stored")
+    assert f"{module}:design" in write_report(again.shown, again.summary, folder).read_text()

@@ -29,7 +29,7 @@ def test_an_axis_with_one_antenna_is_said(array, field, what):
     (line,) = said(*array)
     assert line.startswith(f"a.toml: radio.array.{field}: {what}")
     assert line.endswith(
-        "give two or more rows and cols (4 x 4 without these keys); 'bp_slam' alone uses no directions"
+        "give two or more rows and cols (4 x 4 without these keys); 'bp_slam' and 'channel_slam' use no directions"
     )
 
 
@@ -48,3 +48,6 @@ def test_a_run_says_it(room):
 
     assert not lines()
     assert "pipeline 'trace_then_slam': radio.array.rows: 1 x 4 antennas" in lines("radio.array.rows=1")[0]
+    for alone in ("bp_slam", "channel_slam_no_ris"):
+        assert not lines("radio.array.rows=1", f'schemes=["{alone}"]'), "it uses no directions"
+    assert lines("radio.array.rows=1", 'schemes=["bp_slam", "bp_slam_aoa"]')
