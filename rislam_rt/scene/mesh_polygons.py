@@ -13,6 +13,13 @@ from rislam_rt.scene.polygons import signed_area, triangulate
 
 SLIVER = 1e-6
 """Height of a triangle, as a fraction of its polygon's size, up to which it is no more than a line."""
+MARGIN = 1e-3
+"""How far edges must cross to be a fault, as a fraction of the polygon's size: millimetres on a wall.
+
+Less is what rounding and careless snapping leave in a drawing, and what is drawn is still plain.
+"""
+FLAT = 0.05
+"""Spread of a polygon across its mean plane, as a fraction of its width, up to which crossings seen in it are real."""
 _CUT_OR_COUNTED = re.compile(
     rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^f[^\n]*[ \t]-\d|^f[^\n]*#|^[ \t]+[fv][ \t]|\\\n", re.MULTILINE
 )
@@ -35,7 +42,7 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
     """Triangulate a mesh file's polygons: corner numbers within each polygon (T, 3), turned like it, in their order.
 
     A fan from the first corner where that covers the polygon, else ears clipped off in its mean plane. A polygon that
-    is no more than a line stays a fan, of faces without area.
+    is no more than a line stays a fan, of faces without area; so does one that no repair lets clip.
 
     Parameters
     ----------
@@ -47,7 +54,7 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
     Raises
     ------
     PolygonFault
-        One crosses itself.
+        One that is nearly flat crosses itself by more than `MARGIN`.
     """
     sizes = np.array([len(polygon) for polygon in polygons])
     fans = {int(size): fan(int(size)) for size in np.unique(sizes)}
@@ -93,20 +100,73 @@ def _covered_by_fan(corners: Floats) -> Booleans:
 
 
 def _clipped(corners: Floats) -> Integers | None:
-    """Triangulate a mesh file's polygon (k, 3) by clipping ears in its mean plane; None where it crosses itself."""
+    """Triangulate a mesh file's polygon (k, 3) by clipping ears in its mean plane; None where it crosses itself.
+
+    What cannot be clipped and does not cross itself is clipped without repeated corners and spikes, else a fan.
+    """
     centred = corners - corners.mean(axis=0)
     _, spread, axes = np.linalg.svd(centred)
     if spread[1] <= SLIVER * spread[0]:
         return fan(len(corners))
     flat = centred @ axes[:2].T
-    turned = signed_area(flat) < 0.0
-    order = np.arange(len(corners))[::-1] if turned else np.arange(len(corners))
-    ears = triangulate(flat[order], [])
+    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    ears = _ears(flat, np.arange(len(corners)))
+    if ears is None:
+        depth = spread[2] if len(spread) > 2 else 0.0
+        if depth <= FLAT * spread[1] and _crosses_itself(flat, MARGIN * size):
+            return None
+        for level in (SLIVER, MARGIN):
+            ears = _ears(*_thinned(flat, level * size)) if ears is None else ears
+    if ears is None:
+        return fan(len(corners))
+    return ears[triangle_heights(corners[ears]) > SLIVER * size]
+
+
+def _ears(flat: Floats, ring: Integers) -> Integers | None:
+    """Triangles (T, 3) of a polygon's ring of corners (n, 2), turned like it; None where ears cannot be clipped."""
+    turned = len(ring) > 2 and signed_area(flat[ring]) < 0.0
+    order = ring[::-1] if turned else ring
+    ears = triangulate(flat[order], []) if len(ring) > 2 else None
     if ears is None:
         return None
-    ears = order[ears[:, ::-1] if turned else ears]
-    size = float(np.linalg.norm(np.ptp(corners, axis=0)))
-    return ears[triangle_heights(corners[ears]) > SLIVER * size]
+    return np.asarray(order[ears[:, ::-1] if turned else ears])
+
+
+def _crosses_itself(flat: Floats, margin: float) -> bool:
+    """Whether two edges of a polygon (n, 2) cross, each with both ends further than a margin off the other's line."""
+    ends = np.roll(flat, -1, axis=0)
+    along = ends - flat
+    length = np.linalg.norm(along, axis=1)
+    along /= np.where(length > 0.0, length, 1.0)[:, None]
+    for a, b, way in zip(flat, ends, along, strict=True):
+        one, other = (way[0] * (p - a)[:, 1] - way[1] * (p - a)[:, 0] for p in (flat, ends))
+        start, end = (along[:, 0] * (p - flat)[:, 1] - along[:, 1] * (p - flat)[:, 0] for p in (a, b))
+        parted = (one * other < 0.0) & (start * end < 0.0)
+        if (parted & (np.minimum.reduce(np.abs([one, other, start, end])) > margin)).any():
+            return True
+    return False
+
+
+def _thinned(flat: Floats, near: float) -> tuple[Floats, Integers]:
+    """Corners (n, 2) of a polygon, those nearer than a length made one point, and its ring without repeats and spikes.
+
+    A spike is a corner at which the outline turns back along itself.
+    """
+    flat = flat.copy()
+    for k in range(1, len(flat)):
+        flat[k] = flat[np.flatnonzero(np.linalg.norm(flat[: k + 1] - flat[k], axis=1) <= near)[0]]
+    ring, at = list(range(len(flat))), 0
+    while len(ring) > 2 and at < len(ring):
+        before, here, after = (flat[ring[(at + k) % len(ring)]] for k in (-1, 0, 1))
+        back, on = before - here, after - here
+        short, long = sorted((back, on), key=lambda side: float(side @ side))
+        across = abs(float(short[0] * long[1] - short[1] * long[0]))
+        if not short.any() or (back @ on > 0.0 and across <= near * float(np.linalg.norm(long))):
+            ring.pop(at)
+            at = max(at - 2, 0)
+        else:
+            at += 1
+    return flat, np.array(ring, dtype=np.int64)
 
 
 def obj_with_triangles(content: bytes) -> bytes:

@@ -11,7 +11,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.mesh_source import read_source
-from rislam_rt.scene.mesh_polygons import SLIVER
+from rislam_rt.scene.mesh_polygons import SLIVER, PolygonFault, polygon_triangles
 from rislam_rt.scene.meshes import MeshReader
 
 DOORWAY = [(0, 0), (1, 0), (1, 2.1), (2, 2.1), (2, 0), (4, 0), (4, 2.8), (0, 2.8)]
@@ -123,6 +123,66 @@ def test_a_face_that_crosses_itself_is_named() -> None:
         MeshReader().parse(obj(points, range(4)), "a.obj")
     with pytest.raises(Fault, match="face 0 of 4 corners, the first at 0, 0, 0, crosses itself; cut it"):
         MeshReader().parse(ply(points, range(4)), "a.ply")
+
+
+@pytest.mark.parametrize("apart", [1e-3, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_corners_that_nearly_repeat_cross_nothing(apart: float) -> None:
+    """Stars with a corner drawn twice, its edges crossed by as little: covered, in every order and direction."""
+    rng = np.random.default_rng(7)
+    for _ in range(30):
+        count = int(rng.integers(4, 12))
+        angle = 2.0 * np.pi * (np.arange(count) + 0.6 * rng.random(count)) / count
+        star = rng.uniform(0.5, 2.0, count)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        area = 0.5 * abs(float((star[:, 0] * np.roll(star[:, 1], -1) - star[:, 1] * np.roll(star[:, 0], -1)).sum()))
+        for at in sorted(rng.integers(0, count, 3), reverse=True):
+            star = np.insert(star, at + 1, star[at] + apart * rng.uniform(-0.7, 0.7, 2), axis=0)
+        points = np.insert(np.roll(star, rng.integers(0, count), axis=0)[:: rng.choice([-1, 1])], 2, 1.0, axis=1)
+        cut = polygon_triangles(points, [range(len(points))])[0]
+        assert np.linalg.norm(triangle_cross(points[cut]), axis=1).sum() / 2 == pytest.approx(
+            area, abs=10.0 * apart + 1e-5
+        )
+
+
+def test_degenerate_and_warped_faces_are_read() -> None:
+    """A corner drawn twice a millimetre apart, one to and fro, a bridge not quite closed, quads as deep as wide."""
+    face = np.array([(0, 0, 0), (-0.001, 0.001, 0), (4, 0, 0), (4, 3, 0), (0, 3, 0)])
+    assert np.linalg.norm(triangle_cross(face[polygon_triangles(face, [range(5)])[0]]), axis=1).sum() / 2 == (
+        pytest.approx(12.0, abs=0.01)
+    )
+    corner = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    assert polygon_triangles(corner, [(0, 1, 2, 1)])[0].tolist() == [[0, 1, 2], [0, 2, 3]]
+    spike = np.array([(0.0, 0, 0), (4, 0, 0), (4, 3, 0), (6, 3.0005, 0), (4, 2.9995, 0), (0, 3, 0)])
+    assert np.linalg.norm(triangle_cross(spike[polygon_triangles(spike, [range(6)])[0]]), axis=1).sum() / 2 == (
+        pytest.approx(12.0, abs=0.01)
+    )
+    ring = [(0, 0), (4, 0), (4, 3), (0, 3), (0.0005, -0.0005), (1, 1), (1, 2), (2, 2), (2, 1), (0.9995, 1.0005)]
+    window = np.insert(np.array(ring, dtype=float), 2, 0.0, axis=1)
+    assert np.linalg.norm(triangle_cross(window[polygon_triangles(window, [range(10)])[0]]), axis=1).sum() / 2 == (
+        pytest.approx(11.0, abs=0.02)
+    )
+    rng = np.random.default_rng(3)
+    for count in (4, 8):
+        angle = 2.0 * np.pi * np.arange(count) / count
+        for _ in range(100):
+            deep = np.column_stack([np.cos(angle), np.sin(angle), rng.uniform(-1.4, 1.4, count)])
+            assert len(polygon_triangles(deep, [range(count)])[0]) > 0
+
+
+def test_bow_ties_are_refused_down_to_the_margin() -> None:
+    """However turned and a little warped; crossed by less than a thousandth of the size, they are covered."""
+    rng = np.random.default_rng(5)
+    tie = np.array([(0.0, 0, 0), (4, 3, 0), (4, 0, 0), (0, 3, 0)])
+    for _ in range(50):
+        points = Rotation.random(random_state=rng).apply(tie + rng.uniform(-0.05, 0.05, (4, 3)))
+        with pytest.raises(PolygonFault, match="crosses itself"):
+            polygon_triangles(points, [range(4)])
+    for over, refused in ((0.02, True), (0.002, False)):
+        points = np.array([(0, 0, 0), (4, 0, 0), (4, 3, 0), (2, -over, 0), (0, 3, 0)])
+        if refused:
+            with pytest.raises(PolygonFault, match="crosses itself"):
+                polygon_triangles(points, [range(5)])
+        else:
+            assert len(polygon_triangles(points, [range(5)])[0]) > 0
 
 
 @pytest.mark.parametrize(
