@@ -184,20 +184,23 @@ def obj_with_triangles(content: bytes) -> bytes:
     if not _CUT_OR_COUNTED.search(content):
         return content
     lines = content.replace(b"\\\n", b" ").split(b"\n")
+    words_of = [line.partition(b"#")[0].split() for line in lines]
+    total = sum(words[:1] == [b"v"] for words in words_of)
     points: list[list[float]] = []
     polygons: list[list[int]] = []
     places: list[int] = []
-    for number, line in enumerate(lines):
-        key, *words = line.partition(b"#")[0].split() or [b""]
+    for number, (key, *words) in ((n, words) for n, words in enumerate(words_of) if words):
         try:
             if key == b"v":
                 points.append(obj_point(words))
             elif key == b"f":
-                polygons.append(obj_corners(words, len(points)))
-                places.append(number)
+                polygon = obj_corners(words, len(points), total)
+                key = key if polygon else b"#"
+                polygons += [polygon] if polygon else []
+                places += [number] if polygon else []
         except ValueError as error:
             raise unreadable_line(number, error) from None
-        if key in (b"v", b"f"):
+        if key in (b"v", b"f", b"#"):
             lines[number] = b" ".join([key, *words])
     corners = np.array(points, dtype=np.float64).reshape(-1, 3)
     if not np.isfinite(corners).all():
@@ -221,18 +224,18 @@ def obj_point(words: Sequence[bytes | str]) -> list[float]:
     return [float(word) for word in words[:3]]
 
 
-def obj_corners(words: Sequence[bytes | str], count: int) -> list[int]:
-    """Corner numbers of a face in an OBJ file, from 0; negative ones count from the last corner so far.
+def obj_corners(words: Sequence[bytes | str], count: int, total: int) -> list[int]:
+    """Corner numbers of a face in an OBJ file, from 0; negative ones count from the last of the `count` so far.
 
-    A ValueError where one is no number or names none of `count` corners.
+    None of a face of fewer than three. A ValueError where one is no number or names none of the file's `total`.
     """
+    if len(words) < 3:
+        return []
     slash: Any = b"/" if words and isinstance(words[0], bytes) else "/"
     numbers = [int(word.partition(slash)[0]) for word in words]
-    if len(numbers) < 3:
-        raise ValueError(f"a face of {len(numbers)} corners")
     for n in numbers:
-        if n == 0 or n > count or n < -count:
-            raise ValueError(f"a face names corner {n} of {count}")
+        if n == 0 or n > total or n < -count:
+            raise ValueError(f"a face names corner {n} of {total if n > 0 else count}")
     return [n - 1 if n > 0 else count + n for n in numbers]
 
 

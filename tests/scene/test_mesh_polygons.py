@@ -201,3 +201,17 @@ def test_every_way_to_write_an_obj_face_is_read(first: str, second: str) -> None
     mesh = MeshReader().parse(f"vt 0 0\nvn 0 0 1\n{SQUARE}{first}\n{other}{second}\n".encode(), "a.obj")
     assert np.abs(triangle_cross(mesh.triangles)).sum() / 2 == pytest.approx(2.0)
     assert (mesh.vertices.min(), mesh.vertices.max()) == (0.0, 6.0)
+
+
+@pytest.mark.parametrize(
+    "faces", ["f 1 2 3 4\n{}", "{}f 1 2\nf 3\nf\nf 1 2 3 4\n", "f\nf 1\n{}f 1 2 3\nf 1 3 4\nf 2 2\n"]
+)
+def test_obj_faces_may_come_first_and_be_no_faces(faces: str, tmp_path: Path) -> None:
+    """Corners counted from the first are of the whole file; of fewer than three corners a face is passed over."""
+    content = faces.format(SQUARE).encode()
+    (tmp_path / "a.obj").write_bytes(content)
+    for triangles in (MeshReader().parse(content, "a.obj").triangles, read_source(tmp_path / "a.obj")[0][0].triangles):
+        assert np.abs(triangle_cross(triangles)).sum() / 2 == pytest.approx(1.0)
+    for wrong in ("f 1 2 3 5\n", "f -1 -2 -3 -5\n"):
+        with pytest.raises(Fault, match=r"a face names corner -?5 of 4"):
+            MeshReader().parse((SQUARE + wrong).encode(), "a.obj")

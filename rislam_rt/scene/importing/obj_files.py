@@ -31,13 +31,17 @@ def _read_lines(text: str) -> tuple[Floats, Polygons, str]:
     points: list[list[float]] = []
     faces: Polygons = {}
     group = material = library = ""
-    for number, line in enumerate(text.splitlines()):
+    lines = text.splitlines()
+    total = sum(line.lstrip().startswith("v ") for line in lines)
+    for number, line in enumerate(lines):
         key, _, rest = line.strip().partition(" ")
         try:
             if key == "v":
                 points.append(obj_point(rest.split()))
             elif key == "f":
-                faces.setdefault((group, material), []).append(obj_corners(rest.split(), len(points)))
+                polygon = obj_corners(rest.split(), len(points), total)
+                if polygon:
+                    faces.setdefault((group, material), []).append(polygon)
         except ValueError as error:
             raise unreadable_line(number, error) from None
         if key in ("o", "g"):
