@@ -275,7 +275,7 @@ def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
 
 def mixed_ply_faces(content: bytes) -> tuple[Floats, Integers] | None:
     """Vertices (V, 3) and triangles (F, 3) of a binary PLY file whose faces have different numbers of corners, which
-    trimesh does not read; None for any other file, and for one that does not hold what its header says.
+    trimesh does not read, or reads at the wrong places; None for any other file, and where the header says otherwise.
 
     Raises
     ------
@@ -296,18 +296,25 @@ def mixed_ply_faces(content: bytes) -> tuple[Floats, Integers] | None:
                 found[name], at = np.frombuffer(content, row, int(count), at), at + int(count) * row.itemsize
         except (LookupError, ValueError, TypeError):
             return None
-    vertices, polygons = found.get(b"vertex"), [p for p in found.get(b"face", []) if len(p) > 2]
-    if vertices is None or not {"x", "y", "z"} <= set(vertices.dtype.names or ()) or len({*map(len, polygons)}) < 2:
+    vertices, faces = found.get(b"vertex"), found.get(b"face")
+    if not isinstance(vertices, np.ndarray) or not isinstance(faces, list) or len({*map(len, faces)}) < 2:
         return None
+    if not {"x", "y", "z"} <= set(vertices.dtype.names or ()):
+        return None
+    polygons = [face for face in faces if len(face) > 2]
     points = np.column_stack([vertices[axis].astype(np.float64) for axis in "xyz"])
     cuts = _ply_cuts(points, polygons)
-    return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
+    none = np.zeros((0, 3), dtype=np.int64)
+    return points, np.concatenate([none, *(polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True))])
 
 
 def _list_rows(
     content: bytes, at: int, count: int, properties: list[list[bytes]], order: str
 ) -> tuple[list[Integers], int]:
     """Corners of each face of a binary PLY file's element with lists, and where it ends; errors where it is damaged."""
+    table = _equal_rows(content, at, count, properties, order) if count else None
+    if table is not None:
+        return [row for name in _CORNERS if name in table.dtype.names for row in table[name]], at + table.nbytes
     rows: list[Integers] = []
     for _ in range(count):
         for words in properties:
@@ -322,6 +329,33 @@ def _list_rows(
                 rows.append(np.frombuffer(content, kind, size, at).astype(np.int64))
             at += size * kind.itemsize
     return rows, at
+
+
+def _equal_rows(content: bytes, at: int, count: int, properties: list[list[bytes]], order: str) -> Any:
+    """Table of a binary PLY file's element, its lists all as long as those of the first row; None where they are not.
+
+    Exact: where a row is as long as the first the next one starts where it is looked for.
+    """
+    fields = list[Any]()
+    sizes = dict[str, int]()
+    here = at
+    for words in properties:
+        shape: tuple[int, ...] = ()
+        name, kind = words[-1].decode("latin-1"), np.dtype(order + _PLY_TYPES[words[-2]])
+        if words[0] == b"list":
+            counter = np.dtype(order + _PLY_TYPES[words[1]])
+            size = int(np.frombuffer(content, counter, 1, here)[0])
+            if not 0 <= size * count <= len(content):
+                return None
+            sizes[f"{name} "], shape, here = size, (size,), here + counter.itemsize
+            fields.append((f"{name} ", counter))
+        fields.append((name, kind, shape))
+        here += kind.itemsize * int(np.prod(shape))
+    row = np.dtype(fields)
+    if at + count * row.itemsize > len(content):
+        return None
+    table = np.frombuffer(content, row, count, at)
+    return table if all((table[name] == size).all() for name, size in sizes.items()) else None
 
 
 def _ply_cuts(points: Floats, polygons: Sequence[Integers]) -> list[Integers]:

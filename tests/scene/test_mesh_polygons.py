@@ -108,6 +108,46 @@ def test_a_binary_ply_file_may_mix_triangles_quads_and_concave_faces(order: str)
         MeshReader().parse(wrong, "a.ply")
 
 
+PENTAGON = ((0, 0), (4, 0), (4, 3), (2, 4), (0, 3))
+
+
+@pytest.mark.parametrize(
+    ("faces", "area"),
+    [
+        (((0, 1, 2, 4), (0, 1, 2), (0, 1, 2, 3, 4)), 12.0 + 6.0 + 14.0),
+        (((0, 1, 2), (0, 1), (0, 1, 2, 4)), 6.0 + 12.0),
+        (((0, 1, 2, 4), (0, 1, 2, 4), (0, 1)), 24.0),
+        (((0, 1, 2), (0, 1, 2), (3, 4)), 12.0),
+        (((0, 1, 2), (), (0,)), 6.0),
+        (((0, 1, 2, 4), (0, 1, 2, 4)), 24.0),
+    ],
+)
+@pytest.mark.parametrize("normals", [False, True])
+def test_faces_of_a_binary_ply_file_are_read_at_their_places(
+    faces: tuple[tuple[int, ...], ...], area: float, normals: bool
+) -> None:
+    """Corners that add up to as many as if all faces had those of the first; and faces that are points and lines."""
+    points = np.insert(np.array(PENTAGON, dtype=float), 2, 1.0, axis=1)
+    content = ply(points, *faces, binary=True)
+    if normals:
+        rows = np.hstack([points, 0.0 * points]).astype("<f4").tobytes()
+        more = b"".join(b"property float %s\n" % name for name in (b"nx", b"ny", b"nz"))
+        content = content.replace(points.astype("<f4").tobytes(), rows).replace(b"element face", more + b"element face")
+    crosses = triangle_cross(MeshReader().parse(content, "a.ply").triangles)
+    assert crosses[:, 2].sum() / 2 == pytest.approx(area, rel=1e-6)
+    assert crosses[:, 2].min() > 0.0
+
+
+def test_only_a_binary_ply_file_is_to_be_written_as_text() -> None:
+    points = np.insert(np.array(PENTAGON, dtype=float), 2, 1.0, axis=1)
+    for binary in (False, True):
+        content = ply(points, (0, 1, 2), (0, 1, 2, 3), binary=binary).replace(b"float x", b"float q")
+        with pytest.raises(Fault, match="not a readable PLY mesh") as told:
+            MeshReader().parse(content, "a.ply")
+        assert ("as text (ASCII)" in str(told.value)) == binary
+        assert "of triangles alone" in str(told.value)
+
+
 def test_a_face_with_a_window_joined_by_a_bridge_keeps_the_window() -> None:
     outer, window = [(0, 0), (4, 0), (4, 3), (0, 3)], [(1, 1), (1, 2), (2, 2), (2, 1)]
     points = np.insert(np.array(outer + window, dtype=float), 2, 0.0, axis=1)
