@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -80,9 +81,17 @@ class PolygonFault(Fault):
         super().__init__(f"face {number} {self.what}", _MEND)
 
 
+@lru_cache(maxsize=64)
 def fan(size: int) -> Integers:
-    """Fan of triangles from the first corner of a mesh file's polygon: corner numbers (size - 2, 3)."""
-    return np.array([[0, i, i + 1] for i in range(1, size - 1)], dtype=np.int64)
+    """Fan of triangles from the first corner of a mesh file's polygon: corner numbers (size - 2, 3), read only."""
+    found = np.array([[0, i, i + 1] for i in range(1, size - 1)], dtype=np.int64)
+    found.setflags(write=False)
+    return found
+
+
+def _is_fan(cut: Integers, size: int) -> bool:
+    """Whether the triangles of a mesh file's polygon are its fan."""
+    return cut is fan(size) or np.array_equal(cut, fan(size))
 
 
 def _covered_by_fan(corners: Floats) -> Booleans:
@@ -189,19 +198,22 @@ def obj_with_triangles(content: bytes) -> bytes:
     points: list[list[float]] = []
     polygons: list[list[int]] = []
     places: list[int] = []
-    for number, (key, *words) in ((n, words) for n, words in enumerate(words_of) if words):
+    for number, words in enumerate(words_of):
+        key = words[0] if words else b""
         try:
             if key == b"v":
-                points.append(obj_point(words))
+                points.append(obj_point(words[1:]))
             elif key == b"f":
-                polygon = obj_corners(words, len(points), total)
-                key = key if polygon else b"#"
-                polygons += [polygon] if polygon else []
-                places += [number] if polygon else []
+                polygon = obj_corners(words[1:], len(points), total)
+                if polygon:
+                    polygons.append(polygon)
+                    places.append(number)
+                else:
+                    words = []
         except ValueError as error:
             raise unreadable_line(number, error) from None
-        if key in (b"v", b"f", b"#"):
-            lines[number] = b" ".join([key, *words])
+        if key in (b"v", b"f"):
+            lines[number] = b" ".join(words)
     corners = np.array(points, dtype=np.float64).reshape(-1, 3)
     if not np.isfinite(corners).all():
         return content  # what is not finite is told of the mesh
@@ -210,9 +222,12 @@ def obj_with_triangles(content: bytes) -> bytes:
     except PolygonFault as fault:
         raise Fault(f"line {places[fault.number] + 1}: a face {fault.what}", _MEND) from None
     for number, polygon, cut in zip(places, polygons, cuts, strict=True):
+        whole = _is_fan(cut, len(polygon))
+        if whole and b"-" not in lines[number]:
+            continue
         words = [b"%d%s%s" % (corner + 1, *word.partition(b"/")[1:])
                  for corner, word in zip(polygon, lines[number].split()[1:], strict=True)]  # fmt: skip
-        rows = [range(len(words))] if np.array_equal(cut, fan(len(words))) else cut
+        rows = [range(len(words))] if whole else cut
         lines[number] = b"\n".join(b" ".join([b"f", *(words[i] for i in row)]) for row in rows)
     return b"\n".join(lines)
 
@@ -231,8 +246,10 @@ def obj_corners(words: Sequence[bytes | str], count: int, total: int) -> list[in
     """
     if len(words) < 3:
         return []
-    slash: Any = b"/" if words and isinstance(words[0], bytes) else "/"
+    slash: Any = b"/" if isinstance(words[0], bytes) else "/"
     numbers = [int(word.partition(slash)[0]) for word in words]
+    if min(numbers) > 0 and max(numbers) <= total:
+        return [n - 1 for n in numbers]
     for n in numbers:
         if n == 0 or n > total or n < -count:
             raise ValueError(f"a face names corner {n} of {total if n > 0 else count}")
@@ -268,7 +285,7 @@ def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
     polygons = [row for row in (np.asarray(row, dtype=np.int64).reshape(-1) for row in rows) if len(row) > 2]
     points = np.column_stack([np.asarray(at[axis], dtype=np.float64).reshape(-1) for axis in "xyz"])
     cuts = _ply_cuts(points, polygons)
-    if all(np.array_equal(cut, fan(len(polygon))) for cut, polygon in zip(cuts, polygons, strict=True)):
+    if all(_is_fan(cut, len(polygon)) for cut, polygon in zip(cuts, polygons, strict=True)):
         return None
     return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
 
