@@ -1,4 +1,7 @@
-"""Faces of mesh files (OBJ, PLY) with more than three corners, cut into triangles that cover each as it is drawn."""
+"""Faces of mesh files (OBJ, PLY) with more than three corners, cut into triangles that cover each as it is drawn.
+
+Those of OBJ files are found in `obj_polygons`.
+"""
 
 import re
 from collections.abc import Sequence
@@ -9,7 +12,7 @@ import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import triangle_heights
-from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.polygons import signed_area, triangulate
 
 SLIVER = 1e-6
@@ -21,10 +24,6 @@ Less is what rounding and careless snapping leave in a drawing, and what is draw
 """
 FLAT = 0.05
 """Spread of a polygon across its mean plane, as a fraction of its width, up to which crossings seen in it are real."""
-_CUT_OR_COUNTED = re.compile(
-    rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^f[^\n]*[ \t]-\d|^f[^\n]*#|^[ \t]+[fv][ \t]|\\\n", re.MULTILINE
-)
-"""Where an OBJ file has polygons, corners counted backwards, comments behind faces, indented or continued lines."""
 _PLY_HEAD = re.compile(
     rb"ply\r?\nformat binary_(little|big)_endian 1\.0\r?\n((?:(?:element|property)[ \t][^\n]*\n)*)end_header\r?\n"
 )
@@ -36,7 +35,8 @@ _PLY_TYPES = {
 }  # fmt: skip
 _CORNERS = ("vertex_index", "vertex_indices")
 """Names that exporters of PLY files give to the corners of a face."""
-_MEND = "cut it into triangles where the mesh is made"
+MEND = "cut it into triangles where the mesh is made"
+"""What to do about a face of a mesh file that crosses itself."""
 
 
 def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list[Integers]:
@@ -64,7 +64,7 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
         if size > 3:
             rows = np.flatnonzero(sizes == size)
             corners = points[np.array([polygons[int(row)] for row in rows])]
-            for k in np.flatnonzero(~_covered_by_fan(corners)):
+            for k in np.flatnonzero(~covered_by_fan(corners)):
                 cut = _clipped(corners[k])
                 if cut is None:
                     raise PolygonFault(int(rows[k]), size, corners[k, 0])
@@ -78,7 +78,7 @@ class PolygonFault(Fault):
     def __init__(self, number: int, size: int, first: Floats) -> None:
         self.number = number
         self.what = f"of {size} corners, the first at {', '.join(f'{x:g}' for x in first)}, crosses itself"
-        super().__init__(f"face {number} {self.what}", _MEND)
+        super().__init__(f"face {number} {self.what}", MEND)
 
 
 @lru_cache(maxsize=64)
@@ -89,12 +89,12 @@ def fan(size: int) -> Integers:
     return found
 
 
-def _is_fan(cut: Integers, size: int) -> bool:
+def is_fan(cut: Integers, size: int) -> bool:
     """Whether the triangles of a mesh file's polygon are its fan."""
     return cut is fan(size) or np.array_equal(cut, fan(size))
 
 
-def _covered_by_fan(corners: Floats) -> Booleans:
+def covered_by_fan(corners: Floats) -> Booleans:
     """Whether fans from the first corner cover a mesh file's polygons (n, k, 3): all turn one way, none is a line."""
     n, k, _ = corners.shape
     spokes = corners[:, 1:] - corners[:, :1]
@@ -178,89 +178,6 @@ def _thinned(flat: Floats, near: float) -> tuple[Floats, Integers]:
     return flat, np.array(ring, dtype=np.int64)
 
 
-def obj_with_triangles(content: bytes) -> bytes:
-    """Content of an OBJ file, rewritten where a reader that fans its faces would not give the faces drawn in it.
-
-    Faces that a fan does not cover become triangles, corners counted backwards are numbered from the first; lines
-    lose what continues, indents and comments them. A file without such faces keeps its lines.
-
-    Raises
-    ------
-    Fault
-        A corner or a face cannot be read, or a face crosses itself.
-    """
-    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if not _CUT_OR_COUNTED.search(content):
-        return content
-    lines = content.replace(b"\\\n", b" ").split(b"\n")
-    words_of = [line.partition(b"#")[0].split() for line in lines]
-    total = sum(words[:1] == [b"v"] for words in words_of)
-    points: list[list[float]] = []
-    polygons: list[list[int]] = []
-    places: list[int] = []
-    for number, words in enumerate(words_of):
-        key = words[0] if words else b""
-        try:
-            if key == b"v":
-                points.append(obj_point(words[1:]))
-            elif key == b"f":
-                polygon = obj_corners(words[1:], len(points), total)
-                if polygon:
-                    polygons.append(polygon)
-                    places.append(number)
-                else:
-                    words = []
-        except ValueError as error:
-            raise unreadable_line(number, error) from None
-        if key in (b"v", b"f"):
-            lines[number] = b" ".join(words)
-    corners = np.array(points, dtype=np.float64).reshape(-1, 3)
-    if not np.isfinite(corners).all():
-        return content  # what is not finite is told of the mesh
-    try:
-        cuts = polygon_triangles(corners, polygons)
-    except PolygonFault as fault:
-        raise Fault(f"line {places[fault.number] + 1}: a face {fault.what}", _MEND) from None
-    for number, polygon, cut in zip(places, polygons, cuts, strict=True):
-        whole = _is_fan(cut, len(polygon))
-        if whole and b"-" not in lines[number]:
-            continue
-        words = [b"%d%s%s" % (corner + 1, *word.partition(b"/")[1:])
-                 for corner, word in zip(polygon, lines[number].split()[1:], strict=True)]  # fmt: skip
-        rows = [range(len(words))] if whole else cut
-        lines[number] = b"\n".join(b" ".join([b"f", *(words[i] for i in row)]) for row in rows)
-    return b"\n".join(lines)
-
-
-def obj_point(words: Sequence[bytes | str]) -> list[float]:
-    """Position of a corner in an OBJ file; a ValueError where it has no three numbers."""
-    if len(words) < 3:
-        raise ValueError("three numbers wanted")
-    return [float(word) for word in words[:3]]
-
-
-def obj_corners(words: Sequence[bytes | str], count: int, total: int) -> list[int]:
-    """Corner numbers of a face in an OBJ file, from 0; negative ones count from the last of the `count` so far.
-
-    None of a face of fewer than three. A ValueError where one is no number or names none of the file's `total`.
-    """
-    if len(words) < 3:
-        return []
-    slash: Any = b"/" if isinstance(words[0], bytes) else "/"
-    numbers = [int(word.partition(slash)[0]) for word in words]
-    if min(numbers) > 0 and max(numbers) <= total:
-        return [n - 1 for n in numbers]
-    for n in numbers:
-        if n == 0 or n > total or n < -count:
-            raise ValueError(f"a face names corner {n} of {total if n > 0 else count}")
-    return [n - 1 if n > 0 else count + n for n in numbers]
-
-
-def unreadable_line(number: int, error: ValueError) -> Fault:
-    """Fault of a line of an OBJ file, its number from 0."""
-    return Fault(f"line {number + 1} cannot be read ({one_line(str(error))[:60]})", "export it again")
-
-
 def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
     """Vertices (V, 3) and triangles (F, 3) of a PLY file that trimesh has read, where its fans would not cover a face.
 
@@ -285,7 +202,7 @@ def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
     polygons = [row for row in (np.asarray(row, dtype=np.int64).reshape(-1) for row in rows) if len(row) > 2]
     points = np.column_stack([np.asarray(at[axis], dtype=np.float64).reshape(-1) for axis in "xyz"])
     cuts = _ply_cuts(points, polygons)
-    if all(_is_fan(cut, len(polygon)) for cut, polygon in zip(cuts, polygons, strict=True)):
+    if all(is_fan(cut, len(polygon)) for cut, polygon in zip(cuts, polygons, strict=True)):
         return None
     return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.mesh_polygons import mixed_ply_faces, obj_with_triangles, ply_faces
+from rislam_rt.scene.mesh_polygons import mixed_ply_faces, ply_faces
+from rislam_rt.scene.obj_polygons import obj_with_triangles
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""

@@ -3,7 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.mesh_polygons import fan, obj_corners, obj_point, obj_with_triangles, unreadable_line
+from rislam_rt.scene.mesh_polygons import fan
+from rislam_rt.scene.obj_polygons import obj_corners, obj_point, obj_with_triangles, unreadable_line
 
 Polygons = dict[tuple[str, str], list[list[int]]]
 """Corners of the polygons of each (group, material) of an OBJ file."""
