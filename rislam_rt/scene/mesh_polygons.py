@@ -125,7 +125,7 @@ def _clipped(corners: Floats) -> Integers | None:
         if depth <= FLAT * spread[1] and _crosses_itself(flat, MARGIN * size):
             return None
         for level in (SLIVER, MARGIN):
-            ears = _ears(*_thinned(flat, level * size)) if ears is None else ears
+            ears = _ears(*_simplified(flat, level * size)) if ears is None else ears
     if ears is None:
         return fan(len(corners))
     return ears[triangle_heights(corners[ears]) > SLIVER * size]
@@ -156,7 +156,7 @@ def _crosses_itself(flat: Floats, margin: float) -> bool:
     return False
 
 
-def _thinned(flat: Floats, near: float) -> tuple[Floats, Integers]:
+def _simplified(flat: Floats, near: float) -> tuple[Floats, Integers]:
     """Corners (n, 2) of a polygon, those nearer than a length made one point, and its ring without repeats and spikes.
 
     A spike is a corner at which the outline turns back along itself.
