@@ -1,22 +1,29 @@
-"""Faces of mesh files (OBJ, PLY) with more than three corners, cut into triangles that cover each as it is drawn."""
+"""Faces of mesh files (OBJ, PLY) with more than three corners, cut into triangles that cover each as it is drawn.
+
+Those of OBJ files are found in `obj_polygons`.
+"""
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.geometry.triangles import triangle_heights
-from rislam_rt.scene.findings import Fault, one_line
+from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.polygons import signed_area, triangulate
 
 SLIVER = 1e-6
 """Height of a triangle, as a fraction of its polygon's size, up to which it is no more than a line."""
-_CUT_OR_COUNTED = re.compile(
-    rb"^[ \t]*f(?:[ \t]+[^\s#]+){4}|^f[^\n]*[ \t]-\d|^f[^\n]*#|^[ \t]+[fv][ \t]|\\\n", re.MULTILINE
-)
-"""Where an OBJ file has polygons, corners counted backwards, comments behind faces, indented or continued lines."""
+MARGIN = 1e-3
+"""How far edges must cross to be a fault, as a fraction of the polygon's size: millimetres on a wall.
+
+Less is what rounding and careless snapping leave in a drawing, and what is drawn is still plain.
+"""
+FLAT = 0.05
+"""Spread of a polygon across its mean plane, as a fraction of its width, up to which crossings seen in it are real."""
 _PLY_HEAD = re.compile(
     rb"ply\r?\nformat binary_(little|big)_endian 1\.0\r?\n((?:(?:element|property)[ \t][^\n]*\n)*)end_header\r?\n"
 )
@@ -28,14 +35,15 @@ _PLY_TYPES = {
 }  # fmt: skip
 _CORNERS = ("vertex_index", "vertex_indices")
 """Names that exporters of PLY files give to the corners of a face."""
-_MEND = "cut it into triangles where the mesh is made"
+MEND = "cut it into triangles where the mesh is made"
+"""What to do about a face of a mesh file that crosses itself."""
 
 
 def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list[Integers]:
     """Triangulate a mesh file's polygons: corner numbers within each polygon (T, 3), turned like it, in their order.
 
     A fan from the first corner where that covers the polygon, else ears clipped off in its mean plane. A polygon that
-    is no more than a line stays a fan, of faces without area.
+    is no more than a line stays a fan, of faces without area; so does one that no repair lets clip.
 
     Parameters
     ----------
@@ -47,7 +55,7 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
     Raises
     ------
     PolygonFault
-        One crosses itself.
+        One that is nearly flat crosses itself by more than `MARGIN`.
     """
     sizes = np.array([len(polygon) for polygon in polygons])
     fans = {int(size): fan(int(size)) for size in np.unique(sizes)}
@@ -56,7 +64,7 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
         if size > 3:
             rows = np.flatnonzero(sizes == size)
             corners = points[np.array([polygons[int(row)] for row in rows])]
-            for k in np.flatnonzero(~_covered_by_fan(corners)):
+            for k in np.flatnonzero(~covered_by_fan(corners)):
                 cut = _clipped(corners[k])
                 if cut is None:
                     raise PolygonFault(int(rows[k]), size, corners[k, 0])
@@ -70,15 +78,23 @@ class PolygonFault(Fault):
     def __init__(self, number: int, size: int, first: Floats) -> None:
         self.number = number
         self.what = f"of {size} corners, the first at {', '.join(f'{x:g}' for x in first)}, crosses itself"
-        super().__init__(f"face {number} {self.what}", _MEND)
+        super().__init__(f"face {number} {self.what}", MEND)
 
 
+@lru_cache(maxsize=64)
 def fan(size: int) -> Integers:
-    """Fan of triangles from the first corner of a mesh file's polygon: corner numbers (size - 2, 3)."""
-    return np.array([[0, i, i + 1] for i in range(1, size - 1)], dtype=np.int64)
+    """Fan of triangles from the first corner of a mesh file's polygon: corner numbers (size - 2, 3), read only."""
+    found = np.array([[0, i, i + 1] for i in range(1, size - 1)], dtype=np.int64)
+    found.setflags(write=False)
+    return found
 
 
-def _covered_by_fan(corners: Floats) -> Booleans:
+def is_fan(cut: Integers, size: int) -> bool:
+    """Whether the triangles of a mesh file's polygon are its fan."""
+    return cut is fan(size) or np.array_equal(cut, fan(size))
+
+
+def covered_by_fan(corners: Floats) -> Booleans:
     """Whether fans from the first corner cover a mesh file's polygons (n, k, 3): all turn one way, none is a line."""
     n, k, _ = corners.shape
     spokes = corners[:, 1:] - corners[:, :1]
@@ -93,92 +109,73 @@ def _covered_by_fan(corners: Floats) -> Booleans:
 
 
 def _clipped(corners: Floats) -> Integers | None:
-    """Triangulate a mesh file's polygon (k, 3) by clipping ears in its mean plane; None where it crosses itself."""
+    """Triangulate a mesh file's polygon (k, 3) by clipping ears in its mean plane; None where it crosses itself.
+
+    What cannot be clipped and does not cross itself is clipped without repeated corners and spikes, else a fan.
+    """
     centred = corners - corners.mean(axis=0)
     _, spread, axes = np.linalg.svd(centred)
     if spread[1] <= SLIVER * spread[0]:
         return fan(len(corners))
     flat = centred @ axes[:2].T
-    turned = signed_area(flat) < 0.0
-    order = np.arange(len(corners))[::-1] if turned else np.arange(len(corners))
-    ears = triangulate(flat[order], [])
-    if ears is None:
-        return None
-    ears = order[ears[:, ::-1] if turned else ears]
     size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    ears = _ears(flat, np.arange(len(corners)))
+    if ears is None:
+        depth = spread[2] if len(spread) > 2 else 0.0
+        if depth <= FLAT * spread[1] and _crosses_itself(flat, MARGIN * size):
+            return None
+        for level in (SLIVER, MARGIN):
+            ears = _ears(*_simplified(flat, level * size)) if ears is None else ears
+    if ears is None:
+        return fan(len(corners))
     return ears[triangle_heights(corners[ears]) > SLIVER * size]
 
 
-def obj_with_triangles(content: bytes) -> bytes:
-    """Content of an OBJ file, rewritten where a reader that fans its faces would not give the faces drawn in it.
+def _ears(flat: Floats, ring: Integers) -> Integers | None:
+    """Triangles (T, 3) of a polygon's ring of corners (n, 2), turned like it; None where ears cannot be clipped."""
+    turned = len(ring) > 2 and signed_area(flat[ring]) < 0.0
+    order = ring[::-1] if turned else ring
+    ears = triangulate(flat[order], []) if len(ring) > 2 else None
+    if ears is None:
+        return None
+    return np.asarray(order[ears[:, ::-1] if turned else ears])
 
-    Faces that a fan does not cover become triangles, corners counted backwards are numbered from the first; lines
-    lose what continues, indents and comments them. A file without such faces keeps its lines.
 
-    Raises
-    ------
-    Fault
-        A corner or a face cannot be read, or a face crosses itself.
+def _crosses_itself(flat: Floats, margin: float) -> bool:
+    """Whether two edges of a polygon (n, 2) cross, each with both ends further than a margin off the other's line."""
+    ends = np.roll(flat, -1, axis=0)
+    along = ends - flat
+    length = np.linalg.norm(along, axis=1)
+    along /= np.where(length > 0.0, length, 1.0)[:, None]
+    for a, b, way in zip(flat, ends, along, strict=True):
+        one, other = (way[0] * (p - a)[:, 1] - way[1] * (p - a)[:, 0] for p in (flat, ends))
+        start, end = (along[:, 0] * (p - flat)[:, 1] - along[:, 1] * (p - flat)[:, 0] for p in (a, b))
+        parted = (one * other < 0.0) & (start * end < 0.0)
+        if (parted & (np.minimum.reduce(np.abs([one, other, start, end])) > margin)).any():
+            return True
+    return False
+
+
+def _simplified(flat: Floats, near: float) -> tuple[Floats, Integers]:
+    """Corners (n, 2) of a polygon, those nearer than a length made one point, and its ring without repeats and spikes.
+
+    A spike is a corner at which the outline turns back along itself.
     """
-    content = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    if not _CUT_OR_COUNTED.search(content):
-        return content
-    lines = content.replace(b"\\\n", b" ").split(b"\n")
-    points: list[list[float]] = []
-    polygons: list[list[int]] = []
-    places: list[int] = []
-    for number, line in enumerate(lines):
-        key, *words = line.partition(b"#")[0].split() or [b""]
-        try:
-            if key == b"v":
-                points.append(obj_point(words))
-            elif key == b"f":
-                polygons.append(obj_corners(words, len(points)))
-                places.append(number)
-        except ValueError as error:
-            raise unreadable_line(number, error) from None
-        if key in (b"v", b"f"):
-            lines[number] = b" ".join([key, *words])
-    corners = np.array(points, dtype=np.float64).reshape(-1, 3)
-    if not np.isfinite(corners).all():
-        return content  # what is not finite is told of the mesh
-    try:
-        cuts = polygon_triangles(corners, polygons)
-    except PolygonFault as fault:
-        raise Fault(f"line {places[fault.number] + 1}: a face {fault.what}", _MEND) from None
-    for number, polygon, cut in zip(places, polygons, cuts, strict=True):
-        words = [b"%d%s%s" % (corner + 1, *word.partition(b"/")[1:])
-                 for corner, word in zip(polygon, lines[number].split()[1:], strict=True)]  # fmt: skip
-        rows = [range(len(words))] if np.array_equal(cut, fan(len(words))) else cut
-        lines[number] = b"\n".join(b" ".join([b"f", *(words[i] for i in row)]) for row in rows)
-    return b"\n".join(lines)
-
-
-def obj_point(words: Sequence[bytes | str]) -> list[float]:
-    """Position of a corner in an OBJ file; a ValueError where it has no three numbers."""
-    if len(words) < 3:
-        raise ValueError("three numbers wanted")
-    return [float(word) for word in words[:3]]
-
-
-def obj_corners(words: Sequence[bytes | str], count: int) -> list[int]:
-    """Corner numbers of a face in an OBJ file, from 0; negative ones count from the last corner so far.
-
-    A ValueError where one is no number or names none of `count` corners.
-    """
-    slash: Any = b"/" if words and isinstance(words[0], bytes) else "/"
-    numbers = [int(word.partition(slash)[0]) for word in words]
-    if len(numbers) < 3:
-        raise ValueError(f"a face of {len(numbers)} corners")
-    for n in numbers:
-        if n == 0 or n > count or n < -count:
-            raise ValueError(f"a face names corner {n} of {count}")
-    return [n - 1 if n > 0 else count + n for n in numbers]
-
-
-def unreadable_line(number: int, error: ValueError) -> Fault:
-    """Fault of a line of an OBJ file, its number from 0."""
-    return Fault(f"line {number + 1} cannot be read ({one_line(str(error))[:60]})", "export it again")
+    flat = flat.copy()
+    for k in range(1, len(flat)):
+        flat[k] = flat[np.flatnonzero(np.linalg.norm(flat[: k + 1] - flat[k], axis=1) <= near)[0]]
+    ring, at = list(range(len(flat))), 0
+    while len(ring) > 2 and at < len(ring):
+        before, here, after = (flat[ring[(at + k) % len(ring)]] for k in (-1, 0, 1))
+        back, on = before - here, after - here
+        short, long = sorted((back, on), key=lambda side: float(side @ side))
+        across = abs(float(short[0] * long[1] - short[1] * long[0]))
+        if not short.any() or (back @ on > 0.0 and across <= near * float(np.linalg.norm(long))):
+            ring.pop(at)
+            at = max(at - 2, 0)
+        else:
+            at += 1
+    return flat, np.array(ring, dtype=np.int64)
 
 
 def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
@@ -205,14 +202,14 @@ def ply_faces(loaded: Any) -> tuple[Floats, Integers] | None:
     polygons = [row for row in (np.asarray(row, dtype=np.int64).reshape(-1) for row in rows) if len(row) > 2]
     points = np.column_stack([np.asarray(at[axis], dtype=np.float64).reshape(-1) for axis in "xyz"])
     cuts = _ply_cuts(points, polygons)
-    if all(np.array_equal(cut, fan(len(polygon))) for cut, polygon in zip(cuts, polygons, strict=True)):
+    if all(is_fan(cut, len(polygon)) for cut, polygon in zip(cuts, polygons, strict=True)):
         return None
     return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
 
 
 def mixed_ply_faces(content: bytes) -> tuple[Floats, Integers] | None:
     """Vertices (V, 3) and triangles (F, 3) of a binary PLY file whose faces have different numbers of corners, which
-    trimesh does not read; None for any other file, and for one that does not hold what its header says.
+    trimesh does not read, or reads at the wrong places; None for any other file, and where the header says otherwise.
 
     Raises
     ------
@@ -233,18 +230,25 @@ def mixed_ply_faces(content: bytes) -> tuple[Floats, Integers] | None:
                 found[name], at = np.frombuffer(content, row, int(count), at), at + int(count) * row.itemsize
         except (LookupError, ValueError, TypeError):
             return None
-    vertices, polygons = found.get(b"vertex"), [p for p in found.get(b"face", []) if len(p) > 2]
-    if vertices is None or not {"x", "y", "z"} <= set(vertices.dtype.names or ()) or len({*map(len, polygons)}) < 2:
+    vertices, faces = found.get(b"vertex"), found.get(b"face")
+    if not isinstance(vertices, np.ndarray) or not isinstance(faces, list) or len({*map(len, faces)}) < 2:
         return None
+    if not {"x", "y", "z"} <= set(vertices.dtype.names or ()):
+        return None
+    polygons = [face for face in faces if len(face) > 2]
     points = np.column_stack([vertices[axis].astype(np.float64) for axis in "xyz"])
     cuts = _ply_cuts(points, polygons)
-    return points, np.concatenate([polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True)])
+    none = np.zeros((0, 3), dtype=np.int64)
+    return points, np.concatenate([none, *(polygon[cut] for polygon, cut in zip(polygons, cuts, strict=True))])
 
 
 def _list_rows(
     content: bytes, at: int, count: int, properties: list[list[bytes]], order: str
 ) -> tuple[list[Integers], int]:
     """Corners of each face of a binary PLY file's element with lists, and where it ends; errors where it is damaged."""
+    table = _equal_rows(content, at, count, properties, order) if count else None
+    if table is not None:
+        return [row for name in _CORNERS if name in table.dtype.names for row in table[name]], at + table.nbytes
     rows: list[Integers] = []
     for _ in range(count):
         for words in properties:
@@ -259,6 +263,33 @@ def _list_rows(
                 rows.append(np.frombuffer(content, kind, size, at).astype(np.int64))
             at += size * kind.itemsize
     return rows, at
+
+
+def _equal_rows(content: bytes, at: int, count: int, properties: list[list[bytes]], order: str) -> Any:
+    """Table of a binary PLY file's element, its lists all as long as those of the first row; None where they are not.
+
+    Exact: where a row is as long as the first the next one starts where it is looked for.
+    """
+    fields = list[Any]()
+    sizes = dict[str, int]()
+    here = at
+    for words in properties:
+        shape: tuple[int, ...] = ()
+        name, kind = words[-1].decode("latin-1"), np.dtype(order + _PLY_TYPES[words[-2]])
+        if words[0] == b"list":
+            counter = np.dtype(order + _PLY_TYPES[words[1]])
+            size = int(np.frombuffer(content, counter, 1, here)[0])
+            if not 0 <= size * count <= len(content):
+                return None
+            sizes[f"{name} "], shape, here = size, (size,), here + counter.itemsize
+            fields.append((f"{name} ", counter))
+        fields.append((name, kind, shape))
+        here += kind.itemsize * int(np.prod(shape))
+    row = np.dtype(fields)
+    if at + count * row.itemsize > len(content):
+        return None
+    table = np.frombuffer(content, row, count, at)
+    return table if all((table[name] == size).all() for name, size in sizes.items()) else None
 
 
 def _ply_cuts(points: Floats, polygons: Sequence[Integers]) -> list[Integers]:

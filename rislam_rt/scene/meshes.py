@@ -17,7 +17,8 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.scene.findings import Fault, one_line
-from rislam_rt.scene.mesh_polygons import mixed_ply_faces, obj_with_triangles, ply_faces
+from rislam_rt.scene.mesh_polygons import mixed_ply_faces, ply_faces
+from rislam_rt.scene.obj_polygons import obj_with_triangles
 
 FORMATS = (".ply", ".obj", ".stl", ".glb")
 """Endings of the mesh files that can be read."""
@@ -105,16 +106,13 @@ class MeshReader:
         elif suffix == ".glb":
             check_glb(content, max_faces, max_nodes)
         mesh = _own_ply(content) if suffix == ".ply" else None
+        if mesh is None and suffix == ".ply":
+            mixed = mixed_ply_faces(content)  # first: trimesh may read these at the wrong places without an error
+            mesh = Mesh(*mixed) if mixed else None
         if mesh is None:
             if self._key != (suffix, content):
-                try:
-                    self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
-                except Fault:
-                    mixed = mixed_ply_faces(content) if suffix == ".ply" else None
-                    if mixed is None:
-                        raise
-                    return sound_mesh(Mesh(*mixed), max_faces, reach)
-            with _errors_as_faults(suffix[1:]):
+                self._loaded, self._key = unfold(content, suffix[1:]), (suffix, content)
+            with _errors_as_faults(suffix[1:], _mend(content, suffix[1:])):
                 cut = ply_faces(self._loaded) if suffix == ".ply" else None
                 mesh = Mesh(*cut) if cut else _flatten(self._loaded, node)
         return sound_mesh(mesh, max_faces, reach)
@@ -130,7 +128,7 @@ def unfold(content: bytes, file_type: str) -> Any:
     """
     import trimesh
 
-    with _errors_as_faults(file_type):
+    with _errors_as_faults(file_type, _mend(content, file_type)):
         return trimesh.load_scene(io.BytesIO(content), file_type=file_type, process=False)
 
 
@@ -155,8 +153,8 @@ def _own_ply(content: bytes) -> Mesh | None:
     num_vertices, num_faces = int(header[1]), int(header[3])
     real = np.dtype("<f8" if header[2] == b"double" else "<f4")
     body = header.end() + num_vertices * 3 * real.itemsize
-    least = body + num_faces * _PLY_FACE.itemsize  # a triangle's; other faces are longer
-    if len(content) < least:
+    least = body + num_faces * _PLY_FACE.itemsize  # a triangle's; few other faces are shorter
+    if len(content) < least and mixed_ply_faces(content) is None:
         what = f"it ends after {len(content)} of at least {least} bytes"
         raise Fault(f"not a readable PLY mesh ({what})", "copy or export the mesh again")
     if len(content) != body + num_faces * _PLY_FACE.itemsize:
@@ -168,8 +166,16 @@ def _own_ply(content: bytes) -> Mesh | None:
     return Mesh(vertices.astype(np.float64), rows["corner"].astype(np.int64))
 
 
+def _mend(content: bytes, file_type: str) -> str:
+    """What to do with a mesh file that cannot be read: PLY files are read best as text, which this one may be."""
+    if file_type != "ply":
+        return "export the mesh again"
+    as_text = "" if content[:20].split()[1:3] == [b"format", b"ascii"] else "as text (ASCII) or "
+    return f"export the mesh again, {as_text}of triangles alone"
+
+
 @contextmanager
-def _errors_as_faults(file_type: str) -> Iterator[None]:
+def _errors_as_faults(file_type: str, mend: str) -> Iterator[None]:
     """Turn whatever trimesh raises at a damaged mesh file into one kind of error, and keep warnings and logs back."""
     logged = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
@@ -181,7 +187,6 @@ def _errors_as_faults(file_type: str) -> Iterator[None]:
         raise
     except Exception as error:
         cause = f"{type(error).__name__} {one_line(str(error))[:80]}".strip()
-        mend = "export the mesh again" + (", as text (ASCII) or of triangles alone" if file_type == "ply" else "")
         raise Fault(f"not a readable {file_type.upper()} mesh ({cause})", mend) from None
     finally:
         logging.disable(logged)

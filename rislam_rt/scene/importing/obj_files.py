@@ -3,7 +3,8 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.scene.mesh_polygons import fan, obj_corners, obj_point, obj_with_triangles, unreadable_line
+from rislam_rt.scene.mesh_polygons import fan
+from rislam_rt.scene.obj_polygons import obj_corners, obj_point, obj_with_triangles, unreadable_line
 
 Polygons = dict[tuple[str, str], list[list[int]]]
 """Corners of the polygons of each (group, material) of an OBJ file."""
@@ -31,13 +32,17 @@ def _read_lines(text: str) -> tuple[Floats, Polygons, str]:
     points: list[list[float]] = []
     faces: Polygons = {}
     group = material = library = ""
-    for number, line in enumerate(text.splitlines()):
+    lines = text.splitlines()
+    total = sum(line.lstrip().startswith("v ") for line in lines)
+    for number, line in enumerate(lines):
         key, _, rest = line.strip().partition(" ")
         try:
             if key == "v":
                 points.append(obj_point(rest.split()))
             elif key == "f":
-                faces.setdefault((group, material), []).append(obj_corners(rest.split(), len(points)))
+                polygon = obj_corners(rest.split(), len(points), total)
+                if polygon:
+                    faces.setdefault((group, material), []).append(polygon)
         except ValueError as error:
             raise unreadable_line(number, error) from None
         if key in ("o", "g"):
