@@ -179,24 +179,28 @@ def _ratio(name: str, errors: Floats, bound: Floats) -> dict[str, float | None]:
     return {f"{name}rmse_m": rmse, f"{name}bound_m": least, f"{name}ratio": rmse / least if least else None}
 
 
-def _expected_ratio(relative: Floats, truth: Truth) -> float:
-    """Score card: position RMSE over the posterior bound as expected over all draws of the start prior's error.
+def _expected_ratio(relative: Floats, truth: Truth) -> float | None:
+    """Score card: position RMSE over the posterior bound as expected over all draws of the start prior's error; None
+    without a bound.
 
     Who is told nothing of the room moves with the start, to the last digit: the error is that of the start and the
     `relative` one (K,) [m], which does not hang on it. What the start's draw adds in the mean square is what it adds to
     the bound.
     """
-    drawn = truth.bound**2 - truth.relative_bound**2
-    return float(np.sqrt(np.mean(relative**2 + drawn) / np.mean(truth.bound**2)))
+    drawn, least = truth.bound**2 - truth.relative_bound**2, np.mean(truth.bound**2)
+    return float(np.sqrt(np.mean(relative**2 + drawn) / least)) if least else None
 
 
 def _expected_nees(relative: Floats, covariance: Floats, std: float) -> float | None:
     """Score card: NEES of x and y per degree of freedom as expected over all draws of the start prior's error of
-    deviation `std` [m] along each axis, from the `relative` error (K, 2) [m] and covariances (K, 2, 2)."""
-    if not (np.linalg.det(covariance) > 0.0).all():
+    deviation `std` [m] along each axis, from the `relative` error (K, 2) [m] and covariances (K, 2, 2); None where one
+    is not positive definite."""
+    least, most = np.linalg.eigvalsh(covariance).T
+    if not (least > 0.0).all():
         return None
-    drawn = std**2 * np.trace(np.linalg.inv(covariance), axis1=1, axis2=2)
-    return float(np.mean(evaluate.normalised_squares(relative, covariance) + drawn)) / 2.0
+    drawn = std**2 * (1.0 / least + 1.0 / most)
+    found = float(np.mean(evaluate.normalised_squares(relative, covariance) + drawn)) / 2.0
+    return found if np.isfinite(found) else None
 
 
 def _nees(offset: Floats, covariance: Floats, count: int) -> float | None:

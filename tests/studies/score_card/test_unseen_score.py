@@ -131,6 +131,18 @@ def test_what_is_expected_over_the_starts_error_is_the_mean_over_its_draws() -> 
     assert found["horizontal_nees"] != pytest.approx(found["expected_nees"], rel=0.05)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("across", [(0.0, 0.0), (1e-4, 0.0), (1e-300, 1e300), (1e200, 1e200)])
+def test_what_cannot_be_expected_is_none(across: tuple[float, float]) -> None:
+    """Without a bound, and by covariances that are none or beyond numbers."""
+    given, sure = answers(), np.diag([*across, 1.0, 1.0, 1.0, 1.0])
+    claimed = tuple(replace(each, covariance=sure) for each in given.estimates)
+    nothing = truth()._replace(bound=np.zeros(K), relative_bound=np.zeros(K))
+    scores = score_run(nothing, inputs(), given._replace(estimates=claimed))
+    assert scores["expected_ratio"] is None
+    assert scores["expected_nees"] is None or np.isfinite(scores["expected_nees"])
+
+
 def test_relative_errors_and_what_is_late() -> None:
     error = TOLD + np.outer(np.where(TIME >= 10.0, 0.003, 0.0), [1.0, 0.0, 0.0])
     scores = score_run(truth(), inputs(), answers(error))
