@@ -219,7 +219,7 @@ def curved_wall_warnings(looked: Survey, file: str) -> Iterator[Finding]:
         for one in np.unique(part[wall]):
             facets, alike = np.flatnonzero(part[wall] == one), facing[part[wall] == one] @ facing[part[wall] == one].T
             closes = np.sum(part[pairs[:, 0]] == one) >= np.sum(part == one) and alike.min() < -np.cos(ROUND_BEND)
-            if len(facets) >= FACETS and alike.min() < np.cos(bend) and closes >= is_round:
+            if len(facets) >= FACETS and alike.min() < np.cos(bend) and (closes or not is_round):
                 heard = np.isin(pairs, wall[facets]).any(axis=1)
                 yield _curved_wall(walls.names[wall[facets[0]]], len(facets), turns[heard], bend, file)
                 return

@@ -22,6 +22,8 @@ MARGIN = 1e-3
 
 Less is what rounding and careless snapping leave in a drawing, and what is drawn is still plain.
 """
+MOST_CORNERS = 4000
+"""Corners of a polygon up to which its ears are clipped: a second and 0.3 GB, which grow with their square."""
 FLAT = 0.05
 """Spread of a polygon across its mean plane, as a fraction of its width, up to which crossings seen in it are real."""
 _PLY_HEAD = re.compile(
@@ -54,8 +56,9 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
 
     Raises
     ------
-    PolygonFault
-        One that is nearly flat crosses itself by more than `MARGIN`.
+    Fault
+        One that is nearly flat crosses itself by more than `MARGIN` (`PolygonFault`), or has more than `MOST_CORNERS`
+        which no fan covers.
     """
     sizes = np.array([len(polygon) for polygon in polygons])
     fans = {int(size): fan(int(size)) for size in np.unique(sizes)}
@@ -64,7 +67,10 @@ def polygon_triangles(points: Floats, polygons: Sequence[Sequence[int]]) -> list
         if size > 3:
             rows = np.flatnonzero(sizes == size)
             corners = points[np.array([polygons[int(row)] for row in rows])]
-            for k in np.flatnonzero(~covered_by_fan(corners)):
+            uncovered = np.flatnonzero(~covered_by_fan(corners))
+            if size > MOST_CORNERS and len(uncovered):
+                raise Fault(f"a face of {size} corners; {MOST_CORNERS} are allowed where a fan does not cover it", MEND)
+            for k in uncovered:
                 cut = _clipped(corners[k])
                 if cut is None:
                     raise PolygonFault(int(rows[k]), size, corners[k, 0])

@@ -12,7 +12,7 @@ from rislam_rt.geometry.triangles import triangle_cross
 from rislam_rt.scene import obj_polygons
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.mesh_source import read_source
-from rislam_rt.scene.mesh_polygons import SLIVER, PolygonFault, polygon_triangles
+from rislam_rt.scene.mesh_polygons import MOST_CORNERS, SLIVER, PolygonFault, polygon_triangles
 from rislam_rt.scene.meshes import MeshReader
 
 DOORWAY = [(0, 0), (1, 0), (1, 2.1), (2, 2.1), (2, 0), (4, 0), (4, 2.8), (0, 2.8)]
@@ -295,3 +295,16 @@ def test_quads_are_not_read_line_by_line(monkeypatch: pytest.MonkeyPatch) -> Non
     """An OBJ file of many quads was read at a sixth of the speed."""
     monkeypatch.setattr(obj_polygons, "obj_corners", None)
     assert len(MeshReader().parse(f"{SQUARE}f 1 2 3 4\nf 1//1 2//1 3//1\n".encode(), "a.obj").faces) == 3
+
+
+def test_a_face_of_too_many_corners_is_refused_unless_a_fan_covers_it() -> None:
+    """Clipping grows with their square: a drawing's outline of 100 000 corners would take all memory."""
+    turn = 2.0 * np.pi * np.arange(MOST_CORNERS + 2) / (MOST_CORNERS + 2)
+    star = (
+        np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+        * np.where(np.arange(len(turn)) % 2, 1.0, 0.9)[:, None]
+    )
+    with pytest.raises(Fault, match="4000 are allowed"):
+        polygon_triangles(star, [list(range(len(star)))])
+    fewer = star[:: len(star) // 200]
+    assert len(polygon_triangles(fewer, [list(range(len(fewer)))])[0]) == len(fewer) - 2
