@@ -80,11 +80,12 @@ def beside_of(folder: Path, value: Any, key: str) -> Any:
     return value if room_beside(folder, value) == built_in else str(built_in)
 
 
-def short_names(scenes: Iterable[str]) -> dict[str, str]:
-    """Short name of each scene's path, for tables of shipped and other scenes: its last part, and as many before it as
-    tell it from the others."""
-    paths = list(dict.fromkeys(scenes))
-    tails = {path: [os.sep.join(Path(path).parts[-n:]) for n in range(1, len(Path(path).parts) + 1)] for path in paths}
+def short_names(names: Iterable[str], between: str = os.sep) -> dict[str, str]:
+    """Short name of each path of a scene, shipped or not, or of each setting (parts stand with a dot `between` them):
+    its last part, and as many before it as tell it from the others."""
+    paths = list(dict.fromkeys(names))
+    parts = {path: Path(path).parts if between == os.sep else tuple(path.split(between)) for path in paths}
+    tails = {path: [between.join(own[-n:]) for n in range(1, len(own) + 1)] for path, own in parts.items()}
     every = Counter(tail for found in tails.values() for tail in found)
     return {path: next((tail for tail in tails[path] if every[tail] == 1), path) for path in paths}
 

@@ -246,8 +246,7 @@ def print_sweep(scores: Sequence["SchemeScore"]) -> None:
         name: all_ for name, all_ in counts.items() if any(all_)
     }
     rooms = short_names(str(score.point["scene"]) for score in scores if "scene" in score.point)
-    last = {key: key.rpartition(".")[2] for key in keys}
-    names = {key: key if [*last.values(), "scheme"].count(word) > 1 else word for key, word in last.items()}
+    names = short_names([*keys, "scheme"], ".")
     columns = {
         **{names[key]: [rooms.get(str(s.point[key]), str(s.point[key])) for s in scores] for key in keys},
         "scheme": [score.scheme for score in scores],

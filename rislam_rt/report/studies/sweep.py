@@ -44,7 +44,8 @@ def scores_figure(scores: Sequence[SchemeScore]) -> Figure:
             axes[1].set_ylabel("RMSE relative to its start [m]")
         runs = sorted({len(score.rmse) for score in scores})
         count = " to ".join(map(str, runs[:: max(len(runs) - 1, 1)]))
-        axes[0].set_title(f"{count} runs a point, 95 % bootstrap intervals")
+        several = ", 95 % bootstrap intervals" if runs[-1] > 1 else ""
+        axes[0].set_title(f"{count} {'run' if runs == [1] else 'runs'} a point{several}")
         legend_below(figure, axes[0].get_legend_handles_labels()[0], columns=3 * len(axes))
     return figure
 
@@ -88,8 +89,8 @@ def main_axis(scores: Sequence[SchemeScore]) -> str:
 
 def _others(point: Mapping[str, Any], along: str) -> str:
     """Values of a point along the other axes, as text."""
-    kept = {key: value for key, value in point.items() if key not in (along, "schemes")}
-    return ", ".join(f"{key.rpartition('.')[2]} = {value}" for key, value in kept.items())
+    names = short_names((key for key in point if key != "schemes"), ".")
+    return ", ".join(f"{name} = {point[key]}" for key, name in names.items() if key != along)
 
 
 def _is_number(value: Any) -> bool:
