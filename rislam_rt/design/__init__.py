@@ -1,5 +1,6 @@
 """Floor 5: design of the RIS panel's phase code. Designers, bounds, and the design problem on the agent's belief."""
 
+from rislam_rt.design.beam_sweep import BeamSweep
 from rislam_rt.design.design_problem import DesignProblem, problem_from_arrays
 from rislam_rt.design.design_result import Design, DesignConfig
 from rislam_rt.design.designers import DESIGNERS, designer
@@ -10,7 +11,7 @@ from rislam_rt.design.problem_from_belief import design_code, problem_from_belie
 from rislam_rt.design.single_path import continuous_phases, exact_code, nearest_code
 
 __all__ = [
-    "DESIGNERS", "Design", "DesignConfig", "DesignProblem", "GainCurves", "Objective", "build_objective",
+    "DESIGNERS", "BeamSweep", "Design", "DesignConfig", "DesignProblem", "GainCurves", "Objective", "build_objective",
     "continuous_phases", "design_code", "designer", "direct_only", "exact_code", "focus_codes", "gain_curves",
     "nearest_code", "panel_columns", "problem_from_arrays", "problem_from_belief", "problem_from_paths",
 ]  # fmt: skip

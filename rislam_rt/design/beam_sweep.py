@@ -3,54 +3,85 @@
 The paper designs for a panel whose place is known to the filter. Until then an agent that detects nothing of it can
 only search: Tx and Rx being one place as the panel sees it, a linear phase over the panel sends what comes from a
 direction back into it. Its two-way phase repeats after `lambda / (2 d)` in a direction cosine, so that N x M beams
-cover all.
+cover all. Noise passes for a panel that a beam has lit in every other cycle. So a panel candidate is followed only as
+far as that is likelier to succeed than to go on searching is (search theory: Koopman 1980, Search and Screening).
 """
 
+from collections import Counter
 from functools import lru_cache
 
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.design.single_path import exact_code
-from rislam_rt.model import RadioConfig, RisCode, RisSpec, SlamEstimate
+from rislam_rt.model import PanelCandidate, RadioConfig, RisCode, RisSpec, SlamEstimate
 from rislam_rt.ris import leg_response
 
 MAX_BEAMS = 6
 """Largest number of beams along either axis of the panel: those of larger panels are widened, or the sweep would take
 longer than the agent stays."""
-HOLD = 3
-"""Measurements of a panel candidate up to which the beam that showed it is held: its position is too coarse to aim
-at."""
-LOOK_ROUND = 4
-"""One code in so many goes on with the sweep while a panel candidate is aimed at: if it is the panel, it is silent
-then."""
-SETTLED = 8
-"""Measurements of a panel candidate from which on the sweep goes on beside it."""
+DIRECT = 0.5
+"""Prior probability that what a code lit is the direct path over the panel, the only one that an aimed code lights."""
+
+
+class BeamSweep:
+    """A sweep over all directions that goes on from code to code, for each of several panels."""
+
+    def __init__(self) -> None:
+        self.sent: Counter[int] = Counter()
+        """Number of the beams sent so far for each panel."""
+        self.held: dict[int, bool] = {}
+        """Whether the last code for each panel's candidate was held."""
+
+    def beam(self, ris: RisSpec, radio: RadioConfig, panel: int = 0) -> RisCode:
+        """The sweep's next beam for a panel."""
+        beams = sweep_codes(ris, radio.wavelength)
+        self.sent[panel] += 1
+        return RisCode(beams[(self.sent[panel] - 1) % len(beams)], ris.levels)
 
 
 def search_code(
-    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, number: int, last: RisCode | None, panel: int = 0
+    belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, sweep: BeamSweep, panel: int = 0, lit: RisCode | None = None
 ) -> RisCode:
-    """Panel code for a panel that the map lacks: aimed at the belief's panel candidate, or the sweep's next beam.
+    """Panel code for a panel that the map lacks: the one under which it is likeliest to be heard.
 
-    While the candidate has few measurements the code is `last`, under which it was seen.
+    That is the sweep's next beam, or the code that last lit the belief's panel candidate, or one that is aimed at it.
+    If the candidate is not the panel, one beam of all lights that. If it is, the code that lit it may do so again, and
+    an aimed one lights the places at which it gives half of the power or more, if the path is the direct one.
 
-    `number` counts codes; `last` is the one before, None at first; `panel` is which of several panels is sought.
+    `panel` is which of several panels is sought, and `lit` the candidate's code for this panel.
     """
-    suspect = next((one for one in belief.suspects if one.panel == panel), None)
-    if suspect is not None and suspect.hits <= HOLD and last is not None:
-        return last
-    beams = sweep_codes(ris, radio.wavelength)
-    if suspect is None:
-        return RisCode(beams[number % len(beams)], ris.levels)
-    if suspect.hits >= SETTLED and number % LOOK_ROUND == 0:
-        return RisCode(beams[number // LOOK_ROUND % len(beams)], ris.levels)
-    legs = [
-        leg_response(ris, suspect.position, end, np.ones((), dtype=np.complex128), radio.wavelength)
-        for end in belief.body.ends(belief.position, np.array(belief.heading))
-    ]
-    index, _ = exact_code((legs[0] * legs[1]).ravel(), ris.levels)
-    return RisCode(index.reshape(ris.rows, ris.cols), ris.levels)
+    found = next((one for one in belief.suspects if one.panel == panel), None)
+    if found is None:
+        return sweep.beam(ris, radio, panel)
+    code, share = _aimed(found, belief, ris, radio)
+    aimed = found.probability * DIRECT * share
+    again = found.probability * found.again if lit is not None else 0.0
+    new = (1.0 - found.probability) / len(sweep_codes(ris, radio.wavelength))
+    if lit is None or again < max(new, aimed):
+        hold = False
+    else:  # once asked in vain what it is, both by turns: it may go over a wall, and the panel be elsewhere
+        hold = not (found.examined and aimed > new and sweep.held.get(panel, False))
+    sweep.held[panel] = hold
+    if hold and lit is not None:
+        return lit
+    return code if aimed > new else sweep.beam(ris, radio, panel)
+
+
+def _aimed(found: PanelCandidate, belief: SlamEstimate, ris: RisSpec, radio: RadioConfig) -> tuple[RisCode, float]:
+    """Code aimed at a panel candidate, and the share of the places at which it may be that get half of the power."""
+    places = np.concatenate([found.position[None], found.samples])
+    one = np.ones(len(places), dtype=np.complex128)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a candidate may lie on the agent
+        tx, rx = (
+            leg_response(ris, places, end, one, radio.wavelength)
+            for end in belief.body.ends(belief.position, np.array(belief.heading))
+        )
+        response = np.nan_to_num((tx * rx).reshape(len(places), -1))
+    index, best = exact_code(response[0], ris.levels)
+    gain = np.abs(response[1:] @ np.exp(-2j * np.pi / ris.levels * index))
+    share = float(np.mean(gain**2 >= 0.5 * best**2)) if best > 0.0 else 0.0
+    return RisCode(index.reshape(ris.rows, ris.cols), ris.levels), share
 
 
 @lru_cache(maxsize=16)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Complexes, Floats, Integers, join_rows
-from rislam_rt.design.beam_sweep import search_code
+from rislam_rt.design.beam_sweep import BeamSweep, search_code
 from rislam_rt.design.design_problem import DesignProblem
 from rislam_rt.design.design_result import Design, DesignConfig
 from rislam_rt.design.designers import blind_design, designer
@@ -15,7 +15,7 @@ from rislam_rt.geometry.angles import unit
 from rislam_rt.geometry.bistatic import path_gradient
 from rislam_rt.geometry.planes import mirror, mirror_direction, plane_between
 from rislam_rt.information import GradientMode, prior_from_covariance, range_information
-from rislam_rt.model import DataSheet, MapEstimate, RadioConfig, RisCode, RisSpec, SlamEstimate, join_codes, join_sheets
+from rislam_rt.model import DataSheet, MapEstimate, RadioConfig, RisSpec, SlamEstimate, join_codes, join_sheets
 from rislam_rt.ris import leg_response
 from rislam_rt.ris.path_gain import point_amplitude
 
@@ -25,7 +25,7 @@ _DEFAULT = DesignConfig()
 def design_code(
     belief: SlamEstimate, ris: DataSheet, radio: RadioConfig, *, method: str, rng: np.random.Generator,
     samples: int = 4, config: DesignConfig = _DEFAULT, landmark_uncertainty: bool = False, least_snr: float = 0.0,
-    gradient: GradientMode = "exact", number: int = 0, last: RisCode | None = None,
+    gradient: GradientMode = "exact", sweep: BeamSweep | None = None,
 ) -> Design:  # fmt: skip
     """Design the panel's phase code for the next cycle from the belief predicted to it, without the truth.
 
@@ -42,10 +42,8 @@ def design_code(
         counts the information of paths that will be missed.
     gradient
         Gradient of path lengths by the agent's position: `exact`, or as the paper has it (see `vertex_gradient`).
-    number
-        Number of codes asked for before: which beam of the sweep comes next.
-    last
-        The code before this one.
+    sweep
+        The sweep for panels that are not known, to go on with; without it, it begins.
 
     If no landmark is held for the panel yet, the outcome is `NO_PATHS` and the code one that searches for it. Of
     several panels those that are known are designed for together, and the others are searched for.
@@ -55,8 +53,9 @@ def design_code(
         belief, ris, radio, samples=samples, landmark_uncertainty=landmark_uncertainty, least_snr=least_snr,
         gradient=gradient,
     )  # fmt: skip
+    lit = {one.panel: ris.parts(one.code)[one.panel] for one in belief.suspects if one.code is not None}
     codes = {
-        panel: search_code(belief, ris.panels[panel], radio, number, ris.parts(last)[panel] if last else None, panel)
+        panel: search_code(belief, ris.panels[panel], radio, sweep or BeamSweep(), panel, lit.get(panel))
         for panel in range(len(ris.panels))
         if belief.map.panel_row(panel) < 0
     }

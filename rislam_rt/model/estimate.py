@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, freeze, show_point
+from rislam_rt.model.ris import RisCode
 from rislam_rt.model.trajectory import Body
 
 
@@ -72,8 +73,16 @@ class PanelCandidate(NamedTuple):
 
     position: Floats
     """(3,) [m]."""
-    hits: int
-    """Number of measurements that support it."""
+    samples: Floats
+    """(S, 3) [m] equally likely samples of its place."""
+    probability: float
+    """Probability that it is a path that a code lit, and the panel's."""
+    again: float = 0.0
+    """Probability that, if so, the code under which it was last heard lights it again; 0 where that is not known."""
+    code: RisCode | None = None
+    """That code, of all panels; None where it is not known."""
+    examined: bool = False
+    """Whether what it is was asked already, and left open."""
     panel: int = 0
     """Number of the RIS panel that it may be."""
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rislam_rt.design import design_code, designer, problem_from_paths
+from rislam_rt.design import BeamSweep, design_code, designer, problem_from_paths
 from rislam_rt.errors import ConfigError
 from rislam_rt.information import prior_from_covariance
 from rislam_rt.model import DataSheet, RisCode, SlamEstimate
@@ -30,24 +30,21 @@ def _on_belief(method: str, spec: PipelineSpec, told: AssumedModel) -> CodePolic
     """Code policy that designs each phase code on the agent's predicted belief alone."""
     section, panel, settings = spec.design, told.panel, told.settings
     assert panel is not None
-    last: RisCode | None = None
+    sweep = BeamSweep()
     own = fresh_own(method) if is_own(method) else None
 
     def choose(
         belief: Callable[[], SlamEstimate], cycle: int, room: GroundTruth, *, rng: np.random.Generator
     ) -> RisCode:
-        nonlocal last
         if method == "random":  # looks at no belief
             return RisCode(rng.integers(panel.levels, size=(panel.rows, panel.cols)), panel.levels)
         if own is not None:
             return own_code(method, belief(), panel, settings.radio, rng=rng, designer=own)
-        design = design_code(
+        return design_code(
             belief(), panel, settings.radio, method=method, rng=rng, samples=section.samples, config=settings.design,
             landmark_uncertainty=section.landmark_uncertainty, least_snr=section.least_snr,
-            gradient=section.gradient, number=cycle, last=last,
-        )  # fmt: skip
-        last = design.code
-        return last
+            gradient=section.gradient, sweep=sweep,
+        ).code  # fmt: skip
 
     return choose
 

@@ -1,14 +1,15 @@
-"""Codes that look for a panel: the sweep covers all directions, a suspect is held, then aimed at, then doubted."""
+"""Codes that look for a panel: the sweep covers all directions, and goes on unless a candidate is worth more."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rislam_rt.arrays import Complexes
 from rislam_rt.design import exact_code
-from rislam_rt.design.beam_sweep import HOLD, LOOK_ROUND, SETTLED, search_code, sweep_codes
-from rislam_rt.model import PanelCandidate, RisCode, RisSpec, empty_map
+from rislam_rt.design.beam_sweep import BeamSweep, search_code, sweep_codes
+from rislam_rt.model import PanelCandidate, RadioConfig, RisCode, RisSpec, SlamEstimate, empty_map
 from rislam_rt.ris import leg_response
 
 PLACES = 300
@@ -49,28 +50,79 @@ def test_large_panels_are_swept_in_as_many_codes_by_wider_beams(make_spec, radio
     assert (gains(codes, large.levels, response).max(axis=1) > 2.0 * rms).all()
 
 
-def test_without_a_suspect_the_sweep_goes_through_all_beams(make_belief, make_spec, radio, rng):
-    belief = replace(make_belief(np.array([1.0, 1.0, 0.5]), rng), map=empty_map())
-    beams = sweep_codes(make_spec(), radio.wavelength)
-    sent = [search_code(belief, make_spec(), radio, number, None).index for number in range(len(beams))]
-    np.testing.assert_array_equal(sent, beams)
+@pytest.fixture
+def blind(make_belief, rng) -> SlamEstimate:
+    return replace(make_belief(np.array([1.0, 1.0, 0.5]), rng), map=empty_map())
 
 
-def test_a_suspect_is_held_then_aimed_at_and_then_doubted(make_belief, make_spec, radio, rng):
-    spec, place = make_spec(), np.array([3.0, 3.0, 3.0])
-    blind = replace(make_belief(np.array([1.0, 1.0, 0.5]), rng), map=empty_map())
-    last = RisCode(rng.integers(4, size=(6, 6)), 4)
+PLACE = np.array([3.0, 3.0, 3.0])
 
-    def sent(hits: int, number: int) -> np.ndarray:
-        belief = replace(blind, suspects=(PanelCandidate(place, hits),))
-        return search_code(belief, spec, radio, number, last).index
 
-    for number in range(LOOK_ROUND):
-        assert sent(1, number) is last.index
-        tx, rx = (
-            leg_response(spec, place, end, np.ones(()), radio.wavelength)
-            for end in blind.body.ends(blind.position, np.array(blind.heading))
-        )
-        aimed, _ = exact_code((tx * rx).ravel(), 4)
-        np.testing.assert_array_equal(sent(HOLD + 1, number).ravel(), aimed)
-        assert (sent(SETTLED, number).ravel() == aimed).all() == (number % LOOK_ROUND != 0)
+def with_candidate(blind: SlamEstimate, probability: float, **other: Any) -> SlamEstimate:
+    """Belief with a panel candidate of a probability at `PLACE`, sharply known unless `samples` are given."""
+    other.setdefault("samples", PLACE + np.zeros((12, 3)))
+    return replace(blind, suspects=(PanelCandidate(PLACE, probability=probability, **other),))
+
+
+def aimed_at(belief: SlamEstimate, spec: RisSpec, radio: RadioConfig) -> np.ndarray:
+    """Levels of the best code for the direct path over a panel at `PLACE`."""
+    tx, rx = (
+        leg_response(spec, PLACE, end, np.ones(()), radio.wavelength)
+        for end in belief.body.ends(belief.position, np.array(belief.heading))
+    )
+    return exact_code((tx * rx).ravel(), spec.levels)[0].reshape(spec.rows, spec.cols)
+
+
+def test_without_a_candidate_the_sweep_goes_through_all_beams_round_and_round(blind, make_spec, radio):
+    beams, sweep = sweep_codes(make_spec(), radio.wavelength), BeamSweep()
+    sent = [search_code(blind, make_spec(), radio, sweep).index for _ in range(len(beams) + 3)]
+    np.testing.assert_array_equal(sent, np.concatenate([beams, beams[:3]]))
+
+
+@pytest.mark.parametrize(("over", "held"), [(1.2, True), (0.8, False)])
+def test_a_code_is_held_only_while_that_is_likelier_to_light_the_panel_than_the_next_beam(
+    over, held, blind, make_spec, radio, rng
+):
+    """By hand: `p again = (1 - p) / beams` at the limit; no beam is skipped for what is held."""
+    spec, again, lit = make_spec(), 0.6, RisCode(rng.integers(4, size=(6, 6)), 4)
+    beams = sweep_codes(spec, radio.wavelength)
+    limit = 1.0 / (1.0 + again * len(beams))
+    vague = PLACE + np.array([0.0, 0.0, -9.0]) * np.ones((12, 1))  # no place that an aimed code would light
+    sweep = BeamSweep()
+    search_code(blind, spec, radio, sweep)
+    belief = with_candidate(blind, over * limit, samples=vague, again=again, code=lit)
+    assert (search_code(belief, spec, radio, sweep, lit=lit) is lit) == held
+    np.testing.assert_array_equal(search_code(blind, spec, radio, sweep).index, beams[1 if held else 2])
+
+
+def test_what_is_not_lit_again_is_aimed_at_if_its_place_is_known(blind, make_spec, radio, rng):
+    spec, lit = make_spec(), RisCode(rng.integers(4, size=(6, 6)), 4)
+    found = search_code(with_candidate(blind, 0.9, again=0.1, code=lit), spec, radio, BeamSweep(), lit=lit)
+    np.testing.assert_array_equal(found.index, aimed_at(blind, spec, radio))
+    some = PLACE + np.array([0.0, 0.0, -9.0]) * (np.arange(12) < 11)[:, None]
+    belief = with_candidate(blind, 0.9, samples=some, again=0.1, code=lit)  # one place in twelve: 0.04 for 0.09
+    assert search_code(belief, spec, radio, BeamSweep(), lit=lit) is lit
+    unlikely = with_candidate(blind, 0.01)  # half of a hundredth, for one in 72
+    np.testing.assert_array_equal(
+        search_code(unlikely, spec, radio, BeamSweep()).index, sweep_codes(spec, radio.wavelength)[0]
+    )
+
+
+def test_what_was_examined_in_vain_is_held_and_aimed_at_by_turns(blind, make_spec, radio, rng):
+    spec, sweep, lit = make_spec(), BeamSweep(), RisCode(rng.integers(4, size=(6, 6)), 4)
+    belief = with_candidate(blind, 0.999, again=0.9, code=lit, examined=True)
+    sent = [search_code(belief, spec, radio, sweep, lit=lit).index for _ in range(4)]
+    aimed = aimed_at(blind, spec, radio)
+    np.testing.assert_array_equal(sent, [lit.index, aimed, lit.index, aimed])
+    fresh = with_candidate(blind, 0.999, again=0.9, code=lit)
+    assert all(search_code(fresh, spec, radio, sweep, lit=lit) is lit for _ in range(3))
+
+
+def test_a_candidate_on_the_agent_or_behind_the_panel_is_not_aimed_at(blind, make_spec, radio):
+    spec, beams = make_spec(), sweep_codes(make_spec(), radio.wavelength)
+    for place in (blind.position, PLACE * np.array([1.0, 1.0, -1.0])):
+        belief = replace(blind, suspects=(PanelCandidate(place, place + np.zeros((12, 3)), 1.0),))
+        code = search_code(belief, spec, radio, BeamSweep()).index
+        assert code.min() >= 0
+        if place is not blind.position:
+            np.testing.assert_array_equal(code, beams[0])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rislam_rt.design import DESIGNERS, build_objective, design_code, exact_code, problem_from_belief
+from rislam_rt.design import DESIGNERS, BeamSweep, build_objective, design_code, exact_code, problem_from_belief
 from rislam_rt.information import Outcome, vertex_gradient
 from rislam_rt.model import empty_map
 
@@ -67,7 +67,8 @@ def test_without_a_panel_in_the_map_the_code_looks_for_it(make_belief, make_spec
     belief = make_belief(POSITION, rng)
     unsure = replace(belief, map=replace(belief.map, ris_probability=np.full(12, 0.2)))
     for blind in (unsure, replace(belief, map=empty_map())):
-        designs = [design_code(blind, make_spec(), radio, method="exact", rng=rng, number=n) for n in range(2)]
+        sweep = BeamSweep()
+        designs = [design_code(blind, make_spec(), radio, method="exact", rng=rng, sweep=sweep) for _ in range(2)]
         assert all(d.outcome is Outcome.NO_PATHS for d in designs)
         assert (designs[0].code.index != designs[1].code.index).any()
         assert not any(np.isnan([d.crlb, d.bound, d.gap_db]).any() for d in designs)

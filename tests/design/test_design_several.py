@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rislam_rt.design import design_code, designer, exact_code, problem_from_belief
-from rislam_rt.design.beam_sweep import search_code
+from rislam_rt.design.beam_sweep import BeamSweep, search_code
 from rislam_rt.design.design_problem import problem_from_arrays
 from rislam_rt.design.objective import build_objective
 from rislam_rt.model import PanelCandidate, RisCode, RisSpecs
@@ -91,17 +91,16 @@ def test_a_panel_not_yet_found_looks_for_itself(both, radio, rng):
     belief, sheets = both
     half = belief.map.ris_probability.copy()
     half[0] = 0.4
-    suspect = PanelCandidate(np.array([2.0, 1.0, 1.0]), 5, panel=1)
+    place = np.array([2.0, 1.0, 1.0])
+    suspect = PanelCandidate(place, place + np.zeros((12, 3)), 0.9, panel=1)
     partly = replace(belief, map=replace(belief.map, ris_probability=half), suspects=(suspect,))
-    found = design_code(
-        partly, sheets, radio, method="exact", rng=rng, number=3, last=RisCode(np.zeros((1, 48), int), 4)
-    )
+    found = design_code(partly, sheets, radio, method="exact", rng=rng)
     first, second = sheets.parts(found.code)
     alone = design_code(partly, sheets.panels[0], radio, method="exact", rng=rng)
     np.testing.assert_array_equal(first.index, alone.code.index)
-    aimed = search_code(partly, sheets.panels[1], radio, 3, None, 1)
+    aimed = search_code(partly, sheets.panels[1], radio, BeamSweep(), 1)
     np.testing.assert_array_equal(second.index, aimed.index)
-    assert not np.array_equal(second.index, search_code(partly, sheets.panels[1], radio, 3, None, 0).index)
+    assert not np.array_equal(second.index, search_code(partly, sheets.panels[1], radio, BeamSweep(), 0).index)
     assert found.code.index.shape == (1, 48)
 
 

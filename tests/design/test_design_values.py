@@ -15,11 +15,10 @@ from rislam_rt.design import (
     problem_from_arrays,
     problem_from_belief,
 )
-from rislam_rt.design.beam_sweep import LOOK_ROUND, SETTLED, beam_phases, search_code, sweep_codes
+from rislam_rt.design.beam_sweep import beam_phases
 from rislam_rt.design.coordinate_descent import _first_changes, _rank_by_slope, _rank_by_value
 from rislam_rt.errors import ConfigError, GeometryError
 from rislam_rt.geometry.angles import unit
-from rislam_rt.model import PanelCandidate, RisCode, empty_map
 
 POSITION = np.array([1.2, 2.1, 0.5])
 
@@ -153,15 +152,3 @@ def test_changes_are_tried_in_powers_of_two():
     trials = _first_changes(index, np.array([4, 0, 2, 1, 3]), change, 4)
     expected = [[0, 1, 2, 3, 2], [1, 1, 2, 3, 2], [1, 3, 1, 3, 2], [1, 3, 1, 0, 2]]
     np.testing.assert_array_equal(trials, expected)
-
-
-def test_a_settled_suspect_is_doubted_beam_by_beam(make_belief, make_spec, radio, rng):
-    """Every `LOOK_ROUND` codes the next beam of the sweep, round and round."""
-    spec, beams = make_spec(), sweep_codes(make_spec(), radio.wavelength)
-    belief = replace(
-        make_belief(POSITION, rng), map=empty_map(), suspects=(PanelCandidate(np.array([3.0, 3.0, 3.0]), SETTLED),)
-    )
-    last = RisCode(np.zeros((6, 6), dtype=np.int64), 4)
-    for turn in (1, 5, len(beams) + 3):
-        found = search_code(belief, spec, radio, turn * LOOK_ROUND, last)
-        np.testing.assert_array_equal(found.index, beams[turn % len(beams)])

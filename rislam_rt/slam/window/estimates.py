@@ -31,7 +31,10 @@ def predict(state: WindowState, dt: float, config: SlamConfig) -> SlamEstimate:
         return ahead
     mean, _, landmarks = _present(state, *window_gaussian.now(state.window))
     poses = poses_of(mean[:3], np.asarray(state.heading[-1] + mean[6]), state.scene.body)
-    found = [find_candidate(state.tracks, landmarks, mean, state.cycle - 1, poses, panel) for panel in unknown]
+    found = [
+        find_candidate(state.tracks, landmarks, mean, state.cycle - 1, poses, state.codes, state.scene.sensor, panel)
+        for panel in unknown
+    ]
     return replace(ahead, suspects=tuple(suspect for suspect in found if suspect is not None))
 
 

@@ -2,9 +2,11 @@
 aims."""
 
 import numpy as np
+import scipy
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import PanelCandidate, RisCode
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import PanelCandidate, RisCode, SensorModel
 from rislam_rt.slam.arrival_rays import scatterer_positions
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import OTHER
@@ -14,24 +16,25 @@ from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
-from rislam_rt.slam.window.solver_limits import DRAWS
+from rislam_rt.slam.window.solver_limits import CERTAIN, DRAWS
 from rislam_rt.slam.window.tracks import WindowTracks
 
-DISMISSAL = -2.0
-"""Log odds of panel against scatterer below which a point or track is no RIS candidate: under one code they tell
-little."""
 DEEP = 0.5
 """Distance [m] behind a wall beyond which a track counts as a mirror image; the panel itself hangs on a wall."""
-PATIENCE = 2
-"""Cycles for which an undetected track remains a RIS candidate, if it was detected more often than that."""
+
+
+def lit_density(sensor: SensorModel) -> float:
+    """Density of RIS candidates that a code lights for the first time, per metre, unit of each cosine and e-fold of
+    amplitude: one in a sweep of all beams, which is as rare as anything (`rare`), wherever components are reported."""
+    return CONSTANTS.rare / (np.pi * SPEED_OF_LIGHT * (sensor.window[1] - sensor.window[0]))
 
 
 def weigh_tracks(
-    tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, code: RisCode | None
+    tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, codes: tuple[RisCode | None, ...]
 ) -> WindowTracks:
-    """Update of RIS candidates: each track's odds of being a panel, were it a point heard over no wall, by this cycle's
-    amplitude or missed detection under the phase code."""
-    rows = (tracks.side != OTHER).nonzero()[0]
+    """Update of RIS candidates by this cycle's amplitude or missed detection under the phase codes (K,) up to now: each
+    track's odds of being a panel, were it a point heard over no wall, and of being real."""
+    code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks
     spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
@@ -44,43 +47,75 @@ def weigh_tracks(
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
     fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
-    return tracks._replace(**tracks.identity.put(rows, fresh)._asdict())
+    # what a code lit it lights again
+    real, again, since = tracks.log_real.copy(), _again(tracks, scene.sensor), cycle - tracks.last
+    for row in rows[since[rows] > 0]:
+        if _is_same(code, _code_then(codes, int(since[row]))):
+            real[row] += np.log1p(-again[row])
+    return tracks._replace(log_real=real, **tracks.identity.put(rows, fresh)._asdict())
+
+
+def _code_then(codes: tuple[RisCode | None, ...], since: int) -> RisCode | None:
+    """Code of the cycle so long ago that a RIS candidate was last heard in; None before the window."""
+    return codes[-1 - since] if since < len(codes) else None
+
+
+def _is_same(one: RisCode | None, other: RisCode | None) -> bool:
+    """Whether two codes under which a RIS candidate may be heard are the same."""
+    return one is not None and other is not None and np.array_equal(one.index, other.index)
+
+
+def _again(tracks: WindowTracks, sensor: SensorModel) -> Floats:
+    """Probability (T,) that RIS candidates are heard again under the code under which they last were."""
+    snr = sensor.radio.integrated_snr(np.exp(tracks.log_amplitude))
+    return CONSTANTS.shown * sensor.detection_probability(snr)
 
 
 def find_candidate(
-    tracks: WindowTracks, landmarks: WindowTable, mean: Floats, cycle: int, poses: Poses, panel: int = 0
-) -> PanelCandidate | None:
-    """Point or track that is the likeliest to be RIS panel number `panel`, or None if none is likely enough
-    (`DISMISSAL`).
+    tracks: WindowTracks, landmarks: WindowTable, mean: Floats, cycle: int, poses: Poses,
+    codes: tuple[RisCode | None, ...], sensor: SensorModel, panel: int = 0,
+) -> PanelCandidate | None:  # fmt: skip
+    """Point or track that is the likeliest to be RIS panel number `panel`, or None if there is none.
 
-    A track that seems to come from behind a wall may be the panel over that wall, or the wall ends before: the panel
-    is there as rarely as any new feature behind a wall that is heard (`hypothesis_evidence.log_opacity`).
+    A track has to be real and the panel. One that seems to come from behind a wall may be the panel over that wall, or
+    the wall ends before: the panel is there as rarely as any new feature behind a wall that is heard
+    (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
-    patience = np.where(tracks.hits > 3, np.inf, np.minimum(tracks.hits - 1, PATIENCE))
-    least = np.where(tracks.hits > 1, DISMISSAL, 0.0)
-    few = np.log(CONSTANTS.panels)  # the design asks what was measured, not how many panels there are
-    told = tracks.log_ris[:, panel] - few
-    rows = ((tracks.side != OTHER) & (cycle - tracks.last <= patience) & (told > least)).nonzero()[0]
+    rows = (tracks.side != OTHER).nonzero()[0]
+    spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
+    looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
+    samples, _ = scatterer_positions(looks, poses)
     places, _ = scatterer_positions(tracks.mean[rows, :, 0], poses)
     out = features[walls] - mean[:3]
     image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])
     gap = np.linalg.norm(places[:, None] - image, axis=-1) - np.linalg.norm(places - mean[:3], axis=1)[:, None]
     behind = (gap < -DEEP).sum(axis=1)
     places = np.concatenate([features[points], places])
-    hits = np.append(landmarks.hits[points], tracks.hits[rows])
-    odds = np.append(landmarks.log_ris[points, panel] - few, told[rows] + CONSTANTS.log_rare * behind)
-    # one measurement may be a false alarm: it has no images, and is none
-    odds += log_images(np.linalg.norm(places - mean[:3], axis=1), np.where(hits > 1, odds, -np.inf))
-    if not len(odds) or odds.max() <= DISMISSAL:
+    is_panel = np.append(landmarks.log_ris[points, panel], tracks.log_ris[rows, panel] + CONSTANTS.log_rare * behind)
+    real = np.append(np.full(len(points), CERTAIN), tracks.log_real[rows])
+    if not len(real):
         return None
-    best = int(np.argmax(odds))
-    return PanelCandidate(places[best], int(hits[best]), panel)
+    is_panel += log_images(np.linalg.norm(places - mean[:3], axis=1), _log_both(is_panel, real))
+    odds = _log_both(is_panel, real)
+    best, again, code, asked = int(np.argmax(odds)), 0.0, None, False
+    samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
+    if best >= len(points):
+        row = rows[best - len(points)]
+        asked = bool(tracks.looked[row])
+        again, code = float(_again(tracks, sensor)[row]), _code_then(codes, int(cycle - tracks.last[row]))
+    probability = float(scipy.special.expit(odds[best]))
+    return PanelCandidate(places[best], samples[best], probability, again, code, asked, panel)
+
+
+def _log_both(one: Floats, other: Floats) -> Floats:
+    """Log odds (N,) that a RIS candidate is both of two things, from the log odds (N,) of each."""
+    return one + other - np.logaddexp(0.0, np.logaddexp(one, other))
 
 
 def log_images(reach: Floats, log_odds: Floats) -> Floats:
     """Gain (N,) in the log odds of N panel candidates at distances `reach` (N,) [m] with `log_odds` (N,): those farther
     off may be images of it in walls, as paths over a panel and a wall are longer than that over the panel."""
     image = np.logaddexp(0.0, 2.0 * CONSTANTS.wall_ratio + log_odds)
-    return np.where(np.isfinite(log_odds), (image * (reach > reach[:, None])).sum(axis=1), 0.0)
+    return np.asarray((image * (reach > reach[:, None])).sum(axis=1))

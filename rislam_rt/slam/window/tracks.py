@@ -13,7 +13,7 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window.landmarks.horizon_detection import Elevations, elevations, nothing_heard
 from rislam_rt.slam.window.landmarks.measurement_prediction import PANEL_STD
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity, unknown
-from rislam_rt.slam.window.solver_limits import GATE
+from rislam_rt.slam.window.solver_limits import CERTAIN, GATE
 
 WANDER = np.sqrt(2.0) * PANEL_STD
 """Standard deviation of an unexplained path's log amplitude from cycle to cycle: of the difference of a panel's under
@@ -44,6 +44,8 @@ class WindowTracks(NamedTuple):
     """(T,) number of measurements."""
     looked: Integers
     """(T,) number of measurements at the last examination for a birth."""
+    log_real: Floats
+    """(T,) log odds of being a path that a code of the panel has lit, and not false components one after the other."""
     log_grid: Floats
     """(T, G) log posterior of its strength (root of a cross-section), were it a scatterer heard over no wall
     (see `panel_evidence`)."""
@@ -70,7 +72,7 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     """Empty set of tracks, for a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
-        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none,
+        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, np.zeros(0),
         *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
 
@@ -153,13 +155,38 @@ class Continuations(NamedTuple):
 def continuations(tracks: WindowTracks, observed: Observations, sway: Floats, cycle: int) -> Continuations:
     """Where tracks, predicted to the cycle of some components, are expected to go on; `sway` (M, 3) is the variance
     that the body's attitude gives to length and cosines."""
-    variance = tracks.covariance[:, None, :, 0, 0] + observed.std**2 + sway
-    square = ((observed.seen - tracks.mean[:, None, :, 0]) ** 2 / variance).sum(axis=-1)
-    wander = WANDER**2 + observed.log_amplitude_std**2
-    square += (observed.log_amplitude - tracks.log_amplitude[:, None]) ** 2 / wander
-    log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
     heard = share(tracks, cycle) / (1.0 + np.exp(tracks.log_ris).sum(axis=1))
-    return Continuations(heard @ np.exp(-0.5 * square - log_norm), tracks.mean[..., 0], tracks.log_amplitude, heard)
+    density = np.exp(
+        _log_density(tracks.mean[:, None], tracks.covariance[:, None], tracks.log_amplitude[:, None], observed, sway)
+    )
+    return Continuations(heard @ density, tracks.mean[..., 0], tracks.log_amplitude, heard)
+
+
+def _log_density(
+    mean: Floats, covariance: Floats, log_amplitude: Floats, observed: Observations, sway: Floats | float = 0.0
+) -> Floats:
+    """Log densities (..., M) of components as continuations of tracks (..., M or 1), per metre, unit of each cosine and
+    e-fold of amplitude; `sway` (M, 3) is what the body's attitude adds to the variance."""
+    variance = covariance[..., 0, 0] + observed.std**2 + sway
+    square = ((observed.seen - mean[..., 0]) ** 2 / variance).sum(axis=-1)
+    wander = WANDER**2 + observed.log_amplitude_std**2
+    square += (observed.log_amplitude - log_amplitude) ** 2 / wander
+    log_norm = 0.5 * (np.log(variance).sum(axis=-1) + np.log(wander)) + 2.0 * np.log(2.0 * np.pi)
+    return np.asarray(-0.5 * square - log_norm)
+
+
+def with_evidence(
+    tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int, false: Floats
+) -> WindowTracks:
+    """Tracks whose odds of being real have the evidence that tracks `rows` (A,), as predicted, go on with components
+    `picks` (A,) of a cycle; `false` (M,) is the density of false ones where its M components are."""
+    real = tracks.log_real.copy()
+    log_density = _log_density(
+        tracks.mean[rows], tracks.covariance[rows], tracks.log_amplitude[rows], observed.take(picks)
+    )
+    log_ratio = np.log(share(tracks, cycle)[rows]) + log_density - np.log(false[picks])
+    real[rows] += np.clip(log_ratio, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
+    return tracks._replace(log_real=np.clip(real, -CERTAIN, CERTAIN))
 
 
 def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: Integers, cycle: int) -> WindowTracks:
@@ -176,10 +203,11 @@ def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: 
 
 
 def start(
-    tracks: WindowTracks, observed: Observations, picks: Integers, rate: Floats, cycle: int
-) -> tuple[WindowTracks, Integers]:
-    """Begin a track for each of the components `picks` (A,) of a cycle, with rates of standard deviation `rate` (A, 3);
-    also returns the new idents (A,)."""
+    tracks: WindowTracks, observed: Observations, picks: Integers, rate: Floats, cycle: int,
+    log_real: Floats | float = 0.0,
+) -> tuple[WindowTracks, Integers]:  # fmt: skip
+    """Begin a track for each of the components `picks` (A,) of a cycle, with rates of standard deviation `rate` (A, 3)
+    and log odds `log_real` (A,) of being real; also returns the new idents (A,)."""
     count = len(picks)
     ident = tracks.next_ident + np.arange(count)
     if not count:
@@ -190,7 +218,8 @@ def start(
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
         observed.log_amplitude[picks],
         observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
+        np.zeros(count, dtype=np.int64), np.zeros(count) + log_real,
+        *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident

@@ -3,25 +3,29 @@
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import PanelCandidate
+from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.model import PanelCandidate, RadioConfig, RisCode, RisSpec, SensorModel
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, enter
+from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.ris_candidate import find_candidate, log_images
+from rislam_rt.slam.window.ris_candidate import find_candidate, lit_density, log_images, weigh_tracks
 from rislam_rt.slam.window.tracks import WindowTracks, no_tracks
 
 HERE = np.array([2.0, 2.0, 1.0])
 CYCLE = 40
+SENSOR = SensorModel(RadioConfig(), false_alarms=2.0)
+CODES = tuple(RisCode(np.full((2, 2), level), 4) for level in (0, 1, 2, 2, 2))
 
 
 def poses() -> Poses:
     return Poses(HERE, HERE, np.array(0.0))
 
 
-def tracks_at(places: Floats, log_odds: list[float], hits: int = 3) -> WindowTracks:
-    """Tracks of the last cycle that come from places (T, 3), with log odds of being a panel, at the odds of none."""
+def tracks_at(places: Floats, log_odds: list[float], hits: int = 3, log_real: float = 30.0) -> WindowTracks:
+    """Tracks of the last cycle that come from places (T, 3), with log odds of being a panel and of being real."""
     count, empty, span = len(places), no_tracks(1), places - HERE
     length = 2.0 * np.linalg.norm(span, axis=1)
     mean = np.zeros((count, 3, 2))
@@ -31,7 +35,7 @@ def tracks_at(places: Floats, log_odds: list[float], hits: int = 3) -> WindowTra
     return empty._replace(
         ident=np.arange(count), mean=mean, covariance=np.zeros((count, 3, 2, 2)), log_amplitude=np.zeros(count),
         side=whole * 0 + PANEL, born=whole - hits, last=whole, hits=whole * 0 + hits, looked=whole * 0,
-        log_ris=np.log(CONSTANTS.panels) + np.array(log_odds)[:, None], next_ident=count, **fields,
+        log_ris=np.array(log_odds)[:, None], log_real=np.full(count, log_real), next_ident=count, **fields,
     )  # fmt: skip
 
 
@@ -41,18 +45,52 @@ def best(tracks: WindowTracks, walls: list[Floats] | None = None) -> PanelCandid
     for _ in walls or []:
         landmarks = enter(landmarks, True, HERE, 9, 5.0, unknown(1, 1))
     mean = np.concatenate([HERE, np.zeros(4), *(walls or [])])
-    return find_candidate(tracks, landmarks, mean, CYCLE, poses())
+    return find_candidate(tracks, landmarks, mean, CYCLE, poses(), CODES, SENSOR)
 
 
 def test_a_wall_in_front_makes_a_candidate_unlikely_but_may_end_before_it():
     panel, front = np.array([4.0, 4.0, 2.5]), np.array([4.0, 2.0, 1.0])  # a wall at x = 3
-    told = -CONSTANTS.log_rare
-    sure, unsure = tracks_at(panel[None], [told]), tracks_at(panel[None], [-0.5])
-    found = best(sure, [front])
+    found = best(tracks_at(panel[None], [2.0]))
     assert found is not None
     np.testing.assert_allclose(found.position, panel, atol=1e-9)
-    assert best(unsure) is not None  # likely enough in the open ...
-    assert best(unsure, [front]) is None  # ... and not where a rare event is asked for besides
+    np.testing.assert_allclose(found.probability, 1.0 / (1.0 + np.exp(-2.0)))
+    behind = best(tracks_at(panel[None], [2.0]), [front])
+    assert behind is not None
+    np.testing.assert_allclose(behind.probability, 1.0 / (1.0 + np.exp(-2.0) / CONSTANTS.rare))
+
+
+def test_a_candidate_has_to_be_real_and_the_panel():
+    panel = np.array([[4.0, 4.0, 2.5]])
+    found = best(tracks_at(panel, [1.0], log_real=0.5))
+    assert found is not None
+    np.testing.assert_allclose(found.probability, np.prod(1.0 / (1.0 + np.exp([-1.0, -0.5]))))
+    assert best(tracks_at(np.zeros((0, 3)), [])) is None
+
+
+def test_candidates_carry_the_code_that_lit_them():
+    now = tracks_at(np.array([[4.0, 4.0, 2.5]]), [1.0])
+    for ago, code in ((0, CODES[-1]), (3, CODES[-4]), (7, None)):
+        found = best(now._replace(last=now.last - ago))
+        assert found is not None
+        assert found.code is code
+
+
+def test_silence_under_the_code_that_lit_it_tells_against_a_candidate_and_under_another_one_does_not():
+    spec = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
+    scene = KnownEnvironment(None, SENSOR.radio, SENSOR, spec, 2, True)
+    before = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)
+    snr = 12.0
+    loud = np.log(np.sqrt(snr / SENSOR.radio.integrated_snr(np.ones(()))))
+    before = before._replace(log_amplitude=np.array([loud]), log_grid=unknown(1).log_grid)
+    missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
+    for ago, change in ((0, 0.0), (2, missed), (3, 0.0)):
+        after = weigh_tracks(before._replace(last=before.last - ago), CYCLE, poses(), scene, CODES)
+        np.testing.assert_allclose(after.log_real, 3.0 + change)
+
+
+def test_what_a_code_may_light_is_as_rare_as_anything_in_a_cycle():
+    span = SPEED_OF_LIGHT * (SENSOR.window[1] - SENSOR.window[0])
+    np.testing.assert_allclose(lit_density(SENSOR) * np.pi * span, CONSTANTS.rare)
 
 
 def test_of_the_panel_and_its_image_in_a_wall_the_nearer_is_aimed_at():
@@ -65,8 +103,14 @@ def test_of_the_panel_and_its_image_in_a_wall_the_nearer_is_aimed_at():
     found = best(tracks_at(np.stack([image, panel]), [12.0, -6.0]))
     assert found is not None
     np.testing.assert_allclose(found.position, image, atol=1e-9)
+    # nor is noise that happens to be nearer
+    noise, real = tracks_at(panel[None], [8.0], log_real=-9.0), tracks_at(image[None], [12.0])
+    joined = WindowTracks._make([*(np.concatenate(pair) for pair in zip(noise[:-1], real[:-1], strict=True)), 2])
+    found = best(joined)
+    assert found is not None
+    np.testing.assert_allclose(found.position, image, atol=1e-9)
 
 
 def test_images_count_by_the_power_that_a_wall_takes():
-    gain = log_images(np.array([1.0, 2.0, 3.0]), np.array([2.0, 3.0, -np.inf]))
-    np.testing.assert_allclose(gain, [np.log1p(np.exp(2.0 * CONSTANTS.wall_ratio + 3.0)), 0.0, 0.0])
+    gain = log_images(np.array([1.0, 2.0, 3.0]), np.array([2.0, 3.0, -700.0]))
+    np.testing.assert_allclose(gain, [np.log1p(np.exp(2.0 * CONSTANTS.wall_ratio + 3.0)), 0.0, 0.0], atol=1e-300)

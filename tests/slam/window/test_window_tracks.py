@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 from rislam_rt import slam
 from rislam_rt.model import Measurement, RadioConfig, SensorModel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.landmarks.horizon_detection import level_above, prior_tilts
@@ -49,6 +51,21 @@ def test_tracks_go_on_as_in_a_manoeuvre_if_that_is_likelier_for_all_of_them():
         assert both is (lively if followed else calm)
         np.testing.assert_array_equal(rows, picks)
         assert len(rows) == (4 if followed else 4 - moved)
+
+
+def test_a_track_is_real_by_the_density_of_its_continuation_against_that_of_false_components():
+    """By the normal density of scipy; a far one tells against it, and neither by more than a rare event may."""
+    seen, std = np.array([[5.0, 0.1, 0.2]]), np.array([[0.3, 0.2, 0.2]])
+    heard = Observations(seen, std, np.zeros(1), np.full(1, 0.1), np.ones(1))
+    begun, _ = tracks.start(tracks.no_tracks(), heard, np.array([0]), np.full((1, 3), 0.02), 0, -2.0)
+    for gap, false in ((0.1, 0.5), (0.5, 0.5), (0.0, 1e-6), (30.0, 0.5)):
+        now = heard._replace(seen=seen + np.array([gap, 0.0, 0.0]), log_amplitude=np.array([0.3]))
+        after = tracks.with_evidence(begun, np.array([0]), now, np.array([0]), 1, np.array([false]))
+        density = scipy.stats.norm.logpdf([gap, 0.0, 0.0], scale=np.sqrt(2.0) * std[0]).sum()
+        density += scipy.stats.norm.logpdf(0.3, scale=np.hypot(tracks.WANDER, 0.1))
+        told = density + np.log(2.0 / 3.0) - np.log(false)
+        told = np.clip(told, -CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
+        np.testing.assert_allclose(after.log_real, -2.0 + told)
 
 
 @pytest.mark.parametrize("told", ["told", "learnt"])

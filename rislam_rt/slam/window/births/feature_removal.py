@@ -13,7 +13,7 @@ from rislam_rt.slam.window.measurement_log import Log, Residuals
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_features, window_gaussian
-from rislam_rt.slam.window.solver_limits import FEWEST
+from rislam_rt.slam.window.solver_limits import CERTAIN, FEWEST
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import WindowTracks
 
@@ -64,7 +64,7 @@ def resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Flo
         track[rows] = ident
         fresh.append((
             ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
-            log.cycle[late[-1]], len(rows), 0, *(field[0] for field in unknown(1, tracks.log_ris.shape[1])),
+            log.cycle[late[-1]], len(rows), 0, CERTAIN, *(field[0] for field in unknown(1, tracks.log_ris.shape[1])),
             nothing_heard(1)[0],
         ))  # fmt: skip
         ident += 1
