@@ -30,8 +30,8 @@ class BeamSweep:
     def __init__(self) -> None:
         self.sent: Counter[int] = Counter()
         """Number of the beams sent so far for each panel."""
-        self.held: dict[int, bool] = {}
-        """Whether the last code for each panel's candidate was held."""
+        self.turns: Counter[int] = Counter()
+        """Number of turns taken so far with each panel's candidate."""
 
     def beam(self, ris: RisSpec, radio: RadioConfig, panel: int = 0) -> RisCode:
         """The sweep's next beam for a panel."""
@@ -43,11 +43,13 @@ class BeamSweep:
 def search_code(
     belief: SlamEstimate, ris: RisSpec, radio: RadioConfig, sweep: BeamSweep, panel: int = 0, lit: RisCode | None = None
 ) -> RisCode:
-    """Panel code for a panel that the map lacks: the one under which it is likeliest to be heard.
+    """Panel code for a panel that the map lacks: the one under which it is likeliest to be heard, and known for it.
 
     That is the sweep's next beam, or the code that last lit the belief's panel candidate, or one that is aimed at it.
     If the candidate is not the panel, one beam of all lights that. If it is, the code that lit it may do so again, and
-    an aimed one lights the places at which it gives half of the power or more, if the path is the direct one.
+    an aimed one lights the places at which it gives half of the power or more, if the path is the direct one. Codes
+    take turns where one alone leaves open what the candidate is: between paths over walls and the direct one, once that
+    was asked in vain; and where the receiver does not tell it from a scatterer, which any code lights, beams as well.
 
     `panel` is which of several panels is sought, and `lit` the candidate's code for this panel.
     """
@@ -55,17 +57,18 @@ def search_code(
     if found is None:
         return sweep.beam(ris, radio, panel)
     code, share = _aimed(found, belief, ris, radio)
-    aimed = found.probability * DIRECT * share
-    again = found.probability * found.again if lit is not None else 0.0
-    new = (1.0 - found.probability) / len(sweep_codes(ris, radio.wavelength))
-    if lit is None or again < max(new, aimed):
-        hold = False
-    else:  # once asked in vain what it is, both by turns: it may go over a wall, and the panel be elsewhere
-        hold = not (found.examined and aimed > new and sweep.held.get(panel, False))
-    sweep.held[panel] = hold
-    if hold and lit is not None:
-        return lit
-    return code if aimed > new else sweep.beam(ris, radio, panel)
+    panel_there = found.real * found.is_panel
+    known = panel_there * (1.0 if found.told else found.is_panel)
+    new = (1.0 - panel_there) / len(sweep_codes(ris, radio.wavelength))
+    values = [(known * found.again, lit), (known * DIRECT * share, code)]
+    worth = [(value, each) for value, each in values if each is not None and value > new]
+    if not worth:
+        return sweep.beam(ris, radio, panel)
+    if found.told and not found.examined:
+        return max(worth, key=lambda each: each[0])[1]
+    turn = sweep.turns[panel] % (len(worth) + (not found.told))
+    sweep.turns[panel] += 1
+    return worth[turn][1] if turn < len(worth) else sweep.beam(ris, radio, panel)
 
 
 def _aimed(found: PanelCandidate, belief: SlamEstimate, ris: RisSpec, radio: RadioConfig) -> tuple[RisCode, float]:

@@ -75,12 +75,16 @@ class PanelCandidate(NamedTuple):
     """(3,) [m]."""
     samples: Floats
     """(S, 3) [m] equally likely samples of its place."""
-    probability: float
-    """Probability that it is a path that a code lit, and the panel's."""
+    real: float
+    """Probability that it is a path, and not false components one after the other."""
+    is_panel: float
+    """Probability that, if so, it is the panel's, and not a scatterer's."""
     again: float = 0.0
     """Probability that, if so, the code under which it was last heard lights it again; 0 where that is not known."""
     code: RisCode | None = None
     """That code, of all panels; None where it is not known."""
+    told: bool = False
+    """Whether the receiver tells, by alternated codes, that it is over the panel."""
     examined: bool = False
     """Whether what it is was asked already, and left open."""
     panel: int = 0

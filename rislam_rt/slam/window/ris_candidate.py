@@ -9,7 +9,7 @@ from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import PanelCandidate, RisCode, SensorModel
 from rislam_rt.slam.arrival_rays import scatterer_positions
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import OTHER
+from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.predicted_returns import Poses, reflect
 from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -99,14 +99,14 @@ def find_candidate(
         return None
     is_panel += log_images(np.linalg.norm(places - mean[:3], axis=1), _log_both(is_panel, real))
     odds = _log_both(is_panel, real)
-    best, again, code, asked = int(np.argmax(odds)), 0.0, None, False
+    best, again, code, told, asked = int(np.argmax(odds)), 0.0, None, False, True
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
-        asked = bool(tracks.looked[row])
+        told, asked = bool(tracks.side[row] == PANEL + panel), bool(tracks.looked[row])
         again, code = float(_again(tracks, sensor)[row]), _code_then(codes, int(cycle - tracks.last[row]))
-    probability = float(scipy.special.expit(odds[best]))
-    return PanelCandidate(places[best], samples[best], probability, again, code, asked, panel)
+    one, other = scipy.special.expit([real[best], is_panel[best]])
+    return PanelCandidate(places[best], samples[best], float(one), float(other), again, code, told, asked, panel)
 
 
 def _log_both(one: Floats, other: Floats) -> Floats:
