@@ -58,10 +58,11 @@ def blind(make_belief, rng) -> SlamEstimate:
 PLACE = np.array([3.0, 3.0, 3.0])
 
 
-def with_candidate(blind: SlamEstimate, probability: float, **other: Any) -> SlamEstimate:
-    """Belief with a panel candidate of a probability at `PLACE`, sharply known unless `samples` are given."""
-    other.setdefault("samples", PLACE + np.zeros((12, 3)))
-    return replace(blind, suspects=(PanelCandidate(PLACE, probability=probability, **other),))
+def with_candidate(blind: SlamEstimate, real: float, **other: Any) -> SlamEstimate:
+    """Belief with a panel candidate that is real with a probability, and told by the receiver to be the panel's, at
+    `PLACE`, sharply known, unless `other` says something else."""
+    usual = {"samples": PLACE + np.zeros((12, 3)), "is_panel": 1.0, "told": True}
+    return replace(blind, suspects=(PanelCandidate(PLACE, real=real, **{**usual, **other}),))
 
 
 def aimed_at(belief: SlamEstimate, spec: RisSpec, radio: RadioConfig) -> np.ndarray:
@@ -118,10 +119,23 @@ def test_what_was_examined_in_vain_is_held_and_aimed_at_by_turns(blind, make_spe
     assert all(search_code(fresh, spec, radio, sweep, lit=lit) is lit for _ in range(3))
 
 
+def test_what_may_be_a_scatterer_is_doubted_beam_by_beam(blind, make_spec, radio, rng):
+    """A scatterer is heard under any code. One that is unlikely to be the panel is not asked for: 0.1 of 0.1."""
+    spec, sweep, lit = make_spec(), BeamSweep(), RisCode(rng.integers(4, size=(6, 6)), 4)
+    beams, aimed = sweep_codes(spec, radio.wavelength), aimed_at(blind, spec, radio)
+    belief = with_candidate(blind, 1.0, is_panel=0.5, told=False, again=0.9, code=lit)
+    sent = [search_code(belief, spec, radio, sweep, lit=lit).index for _ in range(6)]
+    np.testing.assert_array_equal(sent, [lit.index, aimed, beams[0], lit.index, aimed, beams[1]])
+    belief = with_candidate(blind, 1.0, is_panel=0.1, told=False, again=0.9, code=lit)
+    np.testing.assert_array_equal(search_code(belief, spec, radio, sweep, lit=lit).index, beams[2])
+    told = with_candidate(blind, 1.0, is_panel=0.1, again=0.9, code=lit)
+    assert search_code(told, spec, radio, sweep, lit=lit) is lit
+
+
 def test_a_candidate_on_the_agent_or_behind_the_panel_is_not_aimed_at(blind, make_spec, radio):
     spec, beams = make_spec(), sweep_codes(make_spec(), radio.wavelength)
     for place in (blind.position, PLACE * np.array([1.0, 1.0, -1.0])):
-        belief = replace(blind, suspects=(PanelCandidate(place, place + np.zeros((12, 3)), 1.0),))
+        belief = replace(blind, suspects=(PanelCandidate(place, place + np.zeros((12, 3)), 1.0, 1.0),))
         code = search_code(belief, spec, radio, BeamSweep()).index
         assert code.min() >= 0
         if place is not blind.position:

@@ -92,7 +92,7 @@ def test_a_panel_not_yet_found_looks_for_itself(both, radio, rng):
     half = belief.map.ris_probability.copy()
     half[0] = 0.4
     place = np.array([2.0, 1.0, 1.0])
-    suspect = PanelCandidate(place, place + np.zeros((12, 3)), 0.9, panel=1)
+    suspect = PanelCandidate(place, place + np.zeros((12, 3)), 0.9, 1.0, told=True, panel=1)
     partly = replace(belief, map=replace(belief.map, ris_probability=half), suspects=(suspect,))
     found = design_code(partly, sheets, radio, method="exact", rng=rng)
     first, second = sheets.parts(found.code)

@@ -53,17 +53,25 @@ def test_a_wall_in_front_makes_a_candidate_unlikely_but_may_end_before_it():
     found = best(tracks_at(panel[None], [2.0]))
     assert found is not None
     np.testing.assert_allclose(found.position, panel, atol=1e-9)
-    np.testing.assert_allclose(found.probability, 1.0 / (1.0 + np.exp(-2.0)))
+    np.testing.assert_allclose(found.is_panel, 1.0 / (1.0 + np.exp(-2.0)))
     behind = best(tracks_at(panel[None], [2.0]), [front])
     assert behind is not None
-    np.testing.assert_allclose(behind.probability, 1.0 / (1.0 + np.exp(-2.0) / CONSTANTS.rare))
+    np.testing.assert_allclose(behind.is_panel, 1.0 / (1.0 + np.exp(-2.0) / CONSTANTS.rare))
 
 
 def test_a_candidate_has_to_be_real_and_the_panel():
     panel = np.array([[4.0, 4.0, 2.5]])
     found = best(tracks_at(panel, [1.0], log_real=0.5))
     assert found is not None
-    np.testing.assert_allclose(found.probability, np.prod(1.0 / (1.0 + np.exp([-1.0, -0.5]))))
+    np.testing.assert_allclose([found.real, found.is_panel], 1.0 / (1.0 + np.exp([-0.5, -1.0])))
+    assert found.told
+    assert not found.examined
+    elsewhere = tracks_at(np.array([[4.0, 4.0, 2.5], [1.0, 3.0, 2.5]]), [3.0, 1.0])
+    elsewhere = elsewhere._replace(log_real=np.array([-3.0, 2.0]), looked=np.array([0, 6]))
+    found = best(elsewhere)  # 0.05 of 0.95, and 0.88 of 0.73
+    assert found is not None
+    np.testing.assert_allclose(found.position, [1.0, 3.0, 2.5])
+    assert found.examined
     assert best(tracks_at(np.zeros((0, 3)), [])) is None
 
 
