@@ -3,7 +3,7 @@
 The paper designs for a panel whose place is known to the filter. Until then an agent that detects nothing of it can
 only search: Tx and Rx being one place as the panel sees it, a linear phase over the panel sends what comes from a
 direction back into it. Its two-way phase repeats after `lambda / (2 d)` in a direction cosine, so that N x M beams
-cover all. Noise passes for a panel that a beam has lit in every other cycle. So a panel candidate is followed only as
+cover all. Noise passes for a panel that a beam has lit in every cycle or so. So a panel candidate is followed only as
 far as that is likelier to succeed than to go on searching is (search theory: Koopman 1980, Search and Screening).
 """
 
@@ -30,8 +30,8 @@ class BeamSweep:
     def __init__(self) -> None:
         self.sent: Counter[int] = Counter()
         """Number of the beams sent so far for each panel."""
-        self.turns: Counter[int] = Counter()
-        """Number of turns taken so far with each panel's candidate."""
+        self.turn: dict[int, int] = {}
+        """Which of holding, aiming and going on was the last turn with each panel's candidate."""
 
     def beam(self, ris: RisSpec, radio: RadioConfig, panel: int = 0) -> RisCode:
         """The sweep's next beam for a panel."""
@@ -60,15 +60,20 @@ def search_code(
     panel_there = found.real * found.is_panel
     known = panel_there * (1.0 if found.told else found.is_panel)
     new = (1.0 - panel_there) / len(sweep_codes(ris, radio.wavelength))
-    values = [(known * found.again, lit), (known * DIRECT * share, code)]
-    worth = [(value, each) for value, each in values if each is not None and value > new]
-    if not worth:
+    again = known * found.again if lit is not None else 0.0
+    aimed = known * DIRECT * share
+    if max(again, aimed) <= new:
         return sweep.beam(ris, radio, panel)
     if found.told and not found.examined:
-        return max(worth, key=lambda each: each[0])[1]
-    turn = sweep.turns[panel] % (len(worth) + (not found.told))
-    sweep.turns[panel] += 1
-    return worth[turn][1] if turn < len(worth) else sweep.beam(ris, radio, panel)
+        turn = int(aimed > again)
+    else:
+        may = (again > new, aimed > new, not found.told)
+        last = sweep.turn.get(panel, 2)
+        turn = next(each % 3 for each in range(last + 1, last + 4) if may[each % 3])
+    sweep.turn[panel] = turn
+    if turn == 0 and lit is not None:
+        return lit
+    return code if turn == 1 else sweep.beam(ris, radio, panel)
 
 
 def _aimed(found: PanelCandidate, belief: SlamEstimate, ris: RisSpec, radio: RadioConfig) -> tuple[RisCode, float]:

@@ -79,16 +79,11 @@ def stranger_density(observations: Observations, sensor: SensorModel, new_densit
 
     False ones are as strong as noise that passes the threshold, hence rare where a component is strong.
     """
-    return new_density + false_density(observations, sensor)
-
-
-def false_density(observations: Observations, sensor: SensorModel) -> Floats:
-    """Expected density (M,) of false components per metre, unit of each cosine and e-fold, at each observation."""
     snr = sensor.radio.integrated_snr(np.exp(observations.log_amplitude))
     false = (
         sensor.false_alarm_density(observations.seen[:, 0] / SPEED_OF_LIGHT, observations.seen[:, 1:]) / SPEED_OF_LIGHT
     )
-    return false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
+    return new_density + false * 2.0 * snr * sensor.false_alarm_snr_density(snr)
 
 
 def side_of(probability: Floats | None, panel: Integers | None = None) -> tuple[Integers | None, Floats | None]:

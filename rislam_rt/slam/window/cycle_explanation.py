@@ -9,7 +9,7 @@ from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import Measurement, RisCode
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import Observations, false_density, is_los, observations_of
+from rislam_rt.slam.observations import Observations, is_los, observations_of
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import REMOVED, UNUSED, StepOutcome
 from rislam_rt.slam.window import tracks
@@ -30,7 +30,7 @@ from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.unresolved_clusters import conditioned_share
 from rislam_rt.slam.window.measurement_log import Log, Residuals, append, scatter_variance
 from rislam_rt.slam.window.motion.motion_learning import log_manoeuvre
-from rislam_rt.slam.window.ris_candidate import lit_density, weigh_tracks
+from rislam_rt.slam.window.ris_candidate import false_density, weigh_tracks
 from rislam_rt.slam.window.smoother import attitude, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Tilts
 from rislam_rt.slam.window.smoother.motion_basis import rotation
@@ -235,8 +235,7 @@ def _follow(
     silent[rows] = False
     due = tracks.share(found, state.cycle)[silent] * horizon.above[silent]
     found = found._replace(rises=horizon.log_like)
-    lit = lit_density(state.scene.sensor)
-    false = lit + false_density(observed, state.scene.sensor)
+    false, log_real = false_density(observed, state.scene)
     found = tracks.with_evidence(found, rows, observed, picks, state.cycle, false)
     found = tracks.extend(found, rows, observed, picks, state.cycle)
     left = np.zeros(len(observed.seen), dtype=np.bool_)
@@ -248,7 +247,7 @@ def _follow(
     rate = np.stack([np.full(len(spare), 2.0), 2.0 / reach, 2.0 / reach], axis=1) * np.hypot(speed, doubt)
     if len(state.level) > 2:  # what turns without a compass turns all that it sees
         rate[:, 1:] += np.sqrt(motion.expected_variance(state.level[2]))
-    found, fresh = tracks.start(found, observed, spare, rate, state.cycle, np.log(lit / false[spare]))
+    found, fresh = tracks.start(found, observed, spare, rate, state.cycle, log_real[spare])
     base = len(state.log.cycle) - len(observed.seen)
     track = state.log.track.copy()
     track[base + picks], track[base + spare] = found.ident[rows], fresh

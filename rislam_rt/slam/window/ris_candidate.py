@@ -6,10 +6,10 @@ import scipy
 
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.model import PanelCandidate, RisCode, SensorModel
+from rislam_rt.model import DataSheet, PanelCandidate, RisCode, SensorModel
 from rislam_rt.slam.arrival_rays import scatterer_positions
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import OTHER, PANEL
+from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import Poses, reflect
 from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
@@ -23,10 +23,18 @@ DEEP = 0.5
 """Distance [m] behind a wall beyond which a track counts as a mirror image; the panel itself hangs on a wall."""
 
 
-def lit_density(sensor: SensorModel) -> float:
-    """Density of RIS candidates that a code lights for the first time, per metre, unit of each cosine and e-fold of
-    amplitude: one in a sweep of all beams, which is as rare as anything (`rare`), wherever components are reported."""
-    return CONSTANTS.rare / (np.pi * SPEED_OF_LIGHT * (sensor.window[1] - sensor.window[0]))
+def false_density(observed: Observations, scene: KnownEnvironment) -> tuple[Floats, Floats]:
+    """Density (M,) of components as loud as each of those observed that are no RIS candidate, per metre, unit of each
+    cosine and e-fold of amplitude, and the log odds (M,) that each is one, seen for the first time.
+
+    That a code lights the panel is as rare as anything (`rare`, once in a sweep), and so is what else a receiver may
+    report; noise is as frequent as it is told, and where panels are told apart there is as much for each of them.
+    """
+    sensor, sides = scene.sensor, np.where(observed.sides == UNTOLD, 1, scene.num_panels + 1)
+    snr = np.maximum(sensor.radio.integrated_snr(np.exp(observed.log_amplitude)), sensor.threshold)
+    noise = sensor.false_alarms / sides * 2.0 * snr * sensor.false_alarm_snr_density(snr)
+    other, room = CONSTANTS.rare + noise, np.pi * SPEED_OF_LIGHT * (sensor.window[1] - sensor.window[0])
+    return np.maximum(other / room, 1e-300), np.log(CONSTANTS.rare / other)
 
 
 def weigh_tracks(
@@ -50,7 +58,7 @@ def weigh_tracks(
     # what a code lit it lights again
     real, again, since = tracks.log_real.copy(), _again(tracks, scene.sensor), cycle - tracks.last
     for row in rows[since[rows] > 0]:
-        if _is_same(code, _code_then(codes, int(since[row]))):
+        if _is_same(code, _code_then(codes, int(since[row])), scene.ris, int(tracks.side[row])):
             real[row] += np.log1p(-again[row])
     return tracks._replace(log_real=real, **tracks.identity.put(rows, fresh)._asdict())
 
@@ -60,9 +68,12 @@ def _code_then(codes: tuple[RisCode | None, ...], since: int) -> RisCode | None:
     return codes[-1 - since] if since < len(codes) else None
 
 
-def _is_same(one: RisCode | None, other: RisCode | None) -> bool:
-    """Whether two codes under which a RIS candidate may be heard are the same."""
-    return one is not None and other is not None and np.array_equal(one.index, other.index)
+def _is_same(one: RisCode | None, other: RisCode | None, ris: DataSheet, side: int) -> bool:
+    """Whether a RIS candidate is lit alike by two codes: the parts of the panel that it is told for, else of all."""
+    if one is None or other is None:
+        return False
+    mine = range(len(ris.panels)) if side == UNTOLD else [side - PANEL]
+    return all(np.array_equal(ris.parts(one)[panel].index, ris.parts(other)[panel].index) for panel in mine)
 
 
 def _again(tracks: WindowTracks, sensor: SensorModel) -> Floats:
@@ -83,7 +94,7 @@ def find_candidate(
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
-    rows = (tracks.side != OTHER).nonzero()[0]
+    rows = np.isin(tracks.side, (UNTOLD, PANEL + panel)).nonzero()[0]
     spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
     looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
     samples, _ = scatterer_positions(looks, poses)
@@ -93,7 +104,8 @@ def find_candidate(
     gap = np.linalg.norm(places[:, None] - image, axis=-1) - np.linalg.norm(places - mean[:3], axis=1)[:, None]
     behind = (gap < -DEEP).sum(axis=1)
     places = np.concatenate([features[points], places])
-    is_panel = np.append(landmarks.log_ris[points, panel], tracks.log_ris[rows, panel] + CONSTANTS.log_rare * behind)
+    is_panel = _against_all(np.concatenate([landmarks.log_ris[points], tracks.log_ris[rows]]), panel)
+    is_panel[len(points) :] += CONSTANTS.log_rare * behind
     real = np.append(np.full(len(points), CERTAIN), tracks.log_real[rows])
     if not len(real):
         return None
@@ -103,10 +115,17 @@ def find_candidate(
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
-        told, asked = bool(tracks.side[row] == PANEL + panel), bool(tracks.looked[row])
+        told, asked = bool(tracks.side[row] == PANEL + panel), bool(0 < tracks.looked[row] <= tracks.hits[row])
         again, code = float(_again(tracks, sensor)[row]), _code_then(codes, int(cycle - tracks.last[row]))
     one, other = scipy.special.expit([real[best], is_panel[best]])
     return PanelCandidate(places[best], samples[best], float(one), float(other), again, code, told, asked, panel)
+
+
+def _against_all(log_ris: Floats, panel: int) -> Floats:
+    """Log odds (N,) that RIS candidates are one panel, against all else, from those (N, Q) of each panel against
+    scatterer."""
+    others = np.delete(log_ris, panel, axis=1)
+    return np.asarray(log_ris[:, panel] - np.logaddexp.reduce(others, axis=1, initial=0.0))
 
 
 def _log_both(one: Floats, other: Floats) -> Floats:
