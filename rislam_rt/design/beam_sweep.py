@@ -7,7 +7,7 @@ cover all. Noise passes for a panel that a beam has lit in every cycle or so. So
 far as that is likelier to succeed than to go on searching is (search theory: Koopman 1980, Search and Screening).
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from functools import lru_cache
 
 import numpy as np
@@ -20,6 +20,8 @@ from rislam_rt.ris import leg_response
 MAX_BEAMS = 6
 """Largest number of beams along either axis of the panel: those of larger panels are widened, or the sweep would take
 longer than the agent stays."""
+HOLD, AIM, GO_ON = 0, 1, 2
+"""What a search may do about a candidate: hold the code that lit it, aim at it, go on with the sweep."""
 DIRECT = 0.5
 """Prior probability that what a code lit is the direct path over the panel, the only one that an aimed code lights."""
 
@@ -30,8 +32,8 @@ class BeamSweep:
     def __init__(self) -> None:
         self.sent: Counter[int] = Counter()
         """Number of the beams sent so far for each panel."""
-        self.turn: dict[int, int] = {}
-        """Which of holding, aiming and going on was the last turn with each panel's candidate."""
+        self.turns: defaultdict[int, list[int]] = defaultdict(lambda: [HOLD, AIM, GO_ON])
+        """What is done with each panel's candidate by turns, what was done last at the end."""
 
     def beam(self, ris: RisSpec, radio: RadioConfig, panel: int = 0) -> RisCode:
         """The sweep's next beam for a panel."""
@@ -64,16 +66,14 @@ def search_code(
     aimed = known * DIRECT * share
     if max(again, aimed) <= new:
         return sweep.beam(ris, radio, panel)
+    turns, may = sweep.turns[panel], {HOLD: again > new, AIM: aimed > new, GO_ON: not found.told}
     if found.told and not found.examined:
-        turn = int(aimed > again)
-    else:
-        may = (again > new, aimed > new, not found.told)
-        last = sweep.turn.get(panel, 2)
-        turn = next(each % 3 for each in range(last + 1, last + 4) if may[each % 3])
-    sweep.turn[panel] = turn
-    if turn == 0 and lit is not None:
+        may = {HOLD: again >= aimed, AIM: again < aimed, GO_ON: False}
+    turn = next(each for each in turns if may[each])
+    turns.append(turns.pop(turns.index(turn)))
+    if turn == HOLD and lit is not None:
         return lit
-    return code if turn == 1 else sweep.beam(ris, radio, panel)
+    return code if turn == AIM else sweep.beam(ris, radio, panel)
 
 
 def _aimed(found: PanelCandidate, belief: SlamEstimate, ris: RisSpec, radio: RadioConfig) -> tuple[RisCode, float]:

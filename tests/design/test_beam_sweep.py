@@ -109,6 +109,57 @@ def test_what_is_not_lit_again_is_aimed_at_if_its_place_is_known(blind, make_spe
     )
 
 
+@pytest.mark.parametrize(("over", "share"), [(1.2, 1.0), (0.8, 1.0), (1.2, 0.5), (0.8, 0.5)])
+def test_a_code_is_aimed_only_while_that_is_likelier_to_light_the_panel_than_the_next_beam(
+    over, share, blind, make_spec, radio
+):
+    """By hand: `p share / 2 = (1 - p) / beams` at the limit; places of a third of the power do not count."""
+    spec = make_spec()
+    beams, aimed = sweep_codes(spec, radio.wavelength), aimed_at(blind, spec, radio)
+
+    def power(place: np.ndarray) -> float:
+        tx, rx = (
+            leg_response(spec, place, end, np.ones(()), radio.wavelength)
+            for end in blind.body.ends(blind.position, np.array(blind.heading))
+        )
+        return float(np.abs(np.sum(tx * rx * np.exp(-0.5j * np.pi * aimed))) ** 2)
+
+    aside = next(
+        place
+        for place in PLACE + np.linspace(0.0, 1.0, 400)[:, None] * [1.0, 0.0, 0.0]
+        if power(place) < power(PLACE) / 3.0
+    )
+    samples = np.where((np.arange(12) < 12 * share)[:, None], PLACE, aside)
+    limit = 1.0 / (1.0 + 0.5 * share * len(beams))
+    belief = with_candidate(blind, over * limit, samples=samples)
+    found = search_code(belief, spec, radio, BeamSweep()).index
+    np.testing.assert_array_equal(found, aimed if over > 1.0 else beams[0])
+
+
+def test_every_panel_has_a_sweep_and_turns_of_its_own(blind, make_spec, radio, rng):
+    spec, sweep, lit = make_spec(), BeamSweep(), RisCode(rng.integers(4, size=(6, 6)), 4)
+    beams = sweep_codes(spec, radio.wavelength)
+    for panel in (0, 1):
+        np.testing.assert_array_equal(search_code(blind, spec, radio, sweep, panel).index, beams[0])
+    both = [
+        with_candidate(blind, 0.999, again=0.9, code=lit, examined=True, panel=panel).suspects[0] for panel in (0, 1)
+    ]
+    belief = replace(blind, suspects=tuple(both))
+    assert all(search_code(belief, spec, radio, sweep, panel, lit) is lit for panel in (0, 1))
+
+
+def test_turns_go_round_however_many_codes_are_worth_it(blind, make_spec, radio, rng):
+    """Held, aimed at and doubted alike often, where aiming is worth it in every other cycle alone."""
+    spec, sweep, lit = make_spec(), BeamSweep(), RisCode(rng.integers(4, size=(6, 6)), 4)
+    vague, kinds = PLACE + np.array([0.0, 0.0, -9.0]) * np.ones((12, 1)), []
+    for cycle in range(24):
+        other = {"samples": vague} if cycle % 2 else {}
+        belief = with_candidate(blind, 1.0, is_panel=0.5, told=False, again=0.9, code=lit, **other)
+        code = search_code(belief, spec, radio, sweep, lit=lit)
+        kinds.append("held" if code is lit else "aimed" if (code.index == aimed_at(blind, spec, radio)).all() else "")
+    assert min(kinds.count(kind) for kind in ("held", "aimed", "")) >= 5
+
+
 def test_what_was_examined_in_vain_is_held_and_aimed_at_by_turns(blind, make_spec, radio, rng):
     spec, sweep, lit = make_spec(), BeamSweep(), RisCode(rng.integers(4, size=(6, 6)), 4)
     belief = with_candidate(blind, 0.999, again=0.9, code=lit, examined=True)

@@ -102,6 +102,11 @@ def test_a_panel_not_yet_found_looks_for_itself(both, radio, rng):
     np.testing.assert_array_equal(second.index, aimed.index)
     assert not np.array_equal(second.index, search_code(partly, sheets.panels[1], radio, BeamSweep(), 0).index)
     assert found.code.index.shape == (1, 48)
+    # held is the part of the joint code that is this panel's
+    joint = RisCode(rng.integers(4, size=(1, 48)), 4)
+    again = replace(partly, suspects=(suspect._replace(code=joint, again=0.9),))
+    held = sheets.parts(design_code(again, sheets, radio, method="exact", rng=rng).code)[1]
+    np.testing.assert_array_equal(held.index, sheets.parts(joint)[1].index)
 
 
 def test_no_element_of_either_panel_could_be_set_better(both, radio, rng):

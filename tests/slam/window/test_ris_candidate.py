@@ -2,16 +2,28 @@
 
 import numpy as np
 
+from rislam_rt import slam
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.model import PanelCandidate, RadioConfig, RisCode, RisSpec, SensorModel
+from rislam_rt.model import (
+    Body,
+    Measurement,
+    PanelCandidate,
+    RadioConfig,
+    RisCode,
+    RisSpec,
+    RisSpecs,
+    SensorModel,
+    join_codes,
+)  # fmt: skip
+from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import PANEL
+from rislam_rt.slam.observations import PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.ris_candidate import find_candidate, lit_density, log_images, weigh_tracks
+from rislam_rt.slam.window.ris_candidate import false_density, find_candidate, log_images, weigh_tracks
 from rislam_rt.slam.window.tracks import WindowTracks, no_tracks
 
 HERE = np.array([2.0, 2.0, 1.0])
@@ -67,11 +79,14 @@ def test_a_candidate_has_to_be_real_and_the_panel():
     assert found.told
     assert not found.examined
     elsewhere = tracks_at(np.array([[4.0, 4.0, 2.5], [1.0, 3.0, 2.5]]), [3.0, 1.0])
-    elsewhere = elsewhere._replace(log_real=np.array([-3.0, 2.0]), looked=np.array([0, 6]))
+    elsewhere = elsewhere._replace(log_real=np.array([-3.0, 2.0]), looked=np.array([0, 6]), hits=np.array([6, 6]))
     found = best(elsewhere)  # 0.05 of 0.95, and 0.88 of 0.73
     assert found is not None
     np.testing.assert_allclose(found.position, [1.0, 3.0, 2.5])
     assert found.examined
+    found = best(elsewhere._replace(hits=np.array([6, 5])))  # no more measurements were looked at than there are
+    assert found is not None
+    assert not found.examined
     assert best(tracks_at(np.zeros((0, 3)), [])) is None
 
 
@@ -96,9 +111,100 @@ def test_silence_under_the_code_that_lit_it_tells_against_a_candidate_and_under_
         np.testing.assert_allclose(after.log_real, 3.0 + change)
 
 
-def test_what_a_code_may_light_is_as_rare_as_anything_in_a_cycle():
-    span = SPEED_OF_LIGHT * (SENSOR.window[1] - SENSOR.window[0])
-    np.testing.assert_allclose(lit_density(SENSOR) * np.pi * span, CONSTANTS.rare)
+def test_of_several_panels_the_part_that_lit_it_counts():
+    """A track that is told for the second panel; of both, one that is not told."""
+    normal, up, spacing = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), np.array([0.015, 0.015])
+    sheets = RisSpecs((RisSpec(2, 2, spacing, normal, up), RisSpec(1, 3, spacing, normal, up)))
+    scene = KnownEnvironment(None, SENSOR.radio, SENSOR, sheets, 2, True)
+    first = [RisCode(np.full((2, 2), level), 4) for level in (0, 1, 2)]
+    codes = tuple(join_codes((one, RisCode(np.ones((1, 3), dtype=np.int64), 4))) for one in first)
+    track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)
+    track = track._replace(
+        last=track.last - 2, log_grid=unknown(1).log_grid, log_ris=np.zeros((1, 2)), hidden=np.zeros((1, 3))
+    )
+    for side, falls in ((PANEL + 1, True), (PANEL, False), (UNTOLD, False)):
+        after = weigh_tracks(track._replace(side=np.array([side])), CYCLE, poses(), scene, codes)
+        assert (after.log_real[0] < 3.0) == falls
+
+
+def test_one_track_is_not_two_panels_at_a_time():
+    track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0])._replace(log_ris=np.array([[5.0, 5.0]]))
+    mean = np.concatenate([HERE, np.zeros(4)])
+    for side, panels in ((UNTOLD, (0, 1)), (PANEL + 1, (1,))):
+        for panel in (0, 1):
+            one = track._replace(side=np.array([side]))
+            found = find_candidate(one, empty_table(2), mean, CYCLE, poses(), CODES, SENSOR, panel)
+            assert (found is not None) == (panel in panels)
+            if found is not None:
+                np.testing.assert_allclose(found.is_panel, np.exp(5.0) / (1.0 + 2.0 * np.exp(5.0)))
+                assert found.told == (side == PANEL + panel)
+                assert np.ptp(found.samples, axis=0).max() == 0.0
+
+
+def test_a_candidate_may_be_where_its_measurements_leave_it_open():
+    track = tracks_at(np.array([[4.0, 4.0, 2.5], [1.0, 3.0, 2.5]]), [1.0, 3.0])
+    spread = np.zeros((2, 3, 2, 2))
+    spread[1, :, 0, 0] = 0.05**2
+    found = best(track._replace(covariance=spread))
+    assert found is not None
+    # a path of twice the distance; across, by the distance over the cosine of the elevation
+    off, away = found.samples - found.position, np.linalg.norm(found.position - HERE)
+    ray = (found.position - HERE) / away
+    assert 0.01 < np.std(off @ ray) < 0.05 * away
+    assert 0.02 * away < np.sqrt(np.mean(np.sum((off - (off @ ray)[:, None] * ray) ** 2, axis=1))) < 0.2 * away
+
+
+def components(snr: Floats, side: int, seen: Floats) -> Observations:
+    """Components of SNRs (M,) on a side."""
+    count = len(snr)
+    level = 0.5 * np.log(snr / SENSOR.radio.integrated_snr(np.ones(())))
+    return Observations(
+        np.tile(seen, (count, 1)), np.full((count, 3), 1e-2), level, np.full(count, 0.1), np.ones(count),
+        np.full(count, side),
+    )  # fmt: skip
+
+
+def test_a_first_component_counts_against_noise_as_loud_as_it():
+    """By hand: exp(-(snr - threshold)) of the false ones, 2 snr an e-fold; wherever they are reported, and for each of
+    two sides alike; and one of another kind is as rare as one that a code lit."""
+    spec = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
+    snr, span = np.array([10.0, 13.0, 20.0, 1e4]), SPEED_OF_LIGHT * (SENSOR.window[1] - SENSOR.window[0])
+    for side, share in ((PANEL, 0.5), (UNTOLD, 1.0)):
+        noise = share * SENSOR.false_alarms * 2.0 * snr * np.exp(-(snr - SENSOR.threshold))
+        for seen in (np.array([5.0, 0.1, 0.2]), np.array([5.0, 0.9, 0.9])):  # noise is reported beyond the disc, too
+            scene = KnownEnvironment(None, SENSOR.radio, SENSOR, spec, 2, True)
+            density, log_odds = false_density(components(snr, side, seen), scene)
+            np.testing.assert_allclose(log_odds, np.log(CONSTANTS.rare / (CONSTANTS.rare + noise)))
+            np.testing.assert_allclose(density * np.pi * span, CONSTANTS.rare + noise)
+    endless = SensorModel(SENSOR.radio, false_alarms=0.0, window=(0.0, np.inf))
+    scene = KnownEnvironment(None, endless.radio, endless, spec, 2, True)
+    density, log_odds = false_density(components(snr, PANEL, seen), scene)
+    assert np.isfinite(np.log(density)).all()
+    np.testing.assert_allclose(log_odds, 0.0)
+
+
+def test_the_filter_follows_how_likely_its_tracks_are_real():
+    """Three cycles: a first component, a second one in its place, and silence under the code that lit it."""
+    rng, body = np.random.default_rng(1), Body()
+    spec = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
+    config, code = SlamConfig(filter="window"), CODES[-1]
+    state = slam.init(StartPrior(HERE, np.zeros(3), 0.0), body, spec, SENSOR, config, rng=rng)
+    gain, one = np.sqrt(11.0 / SENSOR.radio.integrated_snr(np.ones(()))), np.ones(1)
+    heard = Measurement(
+        12.0 / SPEED_OF_LIGHT * one, np.array([[0.3, 0.2]]), gain * one, 1e-10 * one, np.full((1, 2), 0.02),
+        0.2 * gain * one, 0.999 * one,
+    )  # fmt: skip
+    nothing = Measurement(np.zeros(0), np.zeros((0, 2)), *np.zeros((2, 0)), np.zeros((0, 2)), np.zeros(0), np.zeros(0))
+    noise = 0.5 * SENSOR.false_alarms * 2.0 * 11.0 * np.exp(-1.0)
+    first = np.log(CONSTANTS.rare / (CONSTANTS.rare + noise))
+    missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(11.0))
+    expected = np.cumsum([first, CONSTANTS.max_log_ratio, missed])
+    for cycle, told in enumerate((heard, heard, nothing)):
+        state, _ = slam.step(state, told, code, 0.1 * (cycle > 0), 0.0, config, rng=rng)
+        np.testing.assert_allclose(state.tracks.log_real, expected[cycle])
+        suspect = slam.predict(state, 0.1, config).suspects[0]
+        np.testing.assert_allclose(suspect.real, 1.0 / (1.0 + np.exp(-expected[cycle])))
+        assert suspect.code is code
 
 
 def test_of_the_panel_and_its_image_in_a_wall_the_nearer_is_aimed_at():
