@@ -116,7 +116,7 @@ class Recorder:
 
     @property
     def inputs(self) -> Inputs:
-        """All inputs that the wrapped estimator got so far."""
+        """All inputs that the estimator got so far, for its replay."""
         measurements, codes, dt, heading = zip(*self.steps, strict=True)
         return Inputs(*self.begin, np.cumsum(dt), np.array(heading, dtype=np.float64), measurements, codes)
 

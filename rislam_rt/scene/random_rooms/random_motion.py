@@ -116,8 +116,8 @@ def draw_motion(
 
 
 def _carried(pace: Floats, ahead: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Draw what a walker's gait adds to positions (K, 3) [m] and velocities (K, 3) [m/s] of a random motion, at speeds
-    (K,) [m/s] towards unit vectors (K, 2): sines in proportion to the speed up to `STROLL`."""
+    """Draw what a walker's gait adds to positions (K, 3) [m] and velocities (K, 3) [m/s] of a random motion in a random
+    room, at speeds (K,) [m/s] towards unit vectors (K, 2): sines in proportion to the speed up to `STROLL`."""
     rate, bob, sway = rng.uniform(*STEP_RATE), rng.uniform(*BOB), rng.uniform(*SWAY)
     phase = np.pi * rate * TIME + rng.uniform(0.0, 2.0 * np.pi)
     twice = 2.0 * phase + rng.uniform(0.0, 2.0 * np.pi)

@@ -84,5 +84,6 @@ def _log_density(left: Floats, slope: Floats, covariance: Floats, extra: Floats)
 
 
 def _log_normal(left: Floats, variance: Floats) -> Floats:
-    """Log densities (A,) of residuals (A,) of so much variance (A,), but for a constant."""
+    """Log densities (A,), with or without an unresolved partner, of residuals (A,) of so much variance (A,), but for a
+    constant."""
     return np.asarray(-0.5 * (left**2 / variance + np.log(variance)))

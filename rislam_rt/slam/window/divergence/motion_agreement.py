@@ -137,7 +137,7 @@ def _rates(state: WindowState, rows: slice, step: float) -> length_rates.Rates:
 
 
 def _lengths(state: WindowState, rows: slice, step: float) -> length_rates.Lengths:
-    """Lengths that are heard at the window's poses `rows`, `step` [s] apart."""
+    """Lengths, for the agreement of motions, that are heard at the window's poses `rows`, `step` [s] apart."""
     body, pose = state.scene.body, window_gaussian.poses(state.window)[rows]
     return length_rates.lengths(length_rates.Heard(
         state.log, state.heading[rows] + pose[:, 3], pose[:, :3], step,
