@@ -132,7 +132,7 @@ def _predicted_paths(landmarks: MapEstimate, held: list[int]) -> tuple[_Predicte
 
 
 def _gradient(points: Floats, paths: _PredictedPaths, tx: Floats, rx: Floats, mode: GradientMode) -> Floats:
-    """Gradients (B, Q, 3), for a design problem on a belief, of the predicted paths' lengths by the agent's position."""
+    """Gradients (B, Q, 3), for a design on a belief, of the predicted paths' lengths by the agent's position."""
     # The segment between landmark and wall is that between wall and device, mirrored in the wall between landmark and
     # image: so the paper's sum over all segments needs no bounce points. A point that is its own image has no wall.
     if mode == "exact":

@@ -95,7 +95,7 @@ def _rows(found: FoundSequences, groups: list[Integers]) -> Iterator[tuple[Integ
 
 
 def wall_sequences(facets: WallFacets, device: Floats, far: Floats, depth: int, host: int = -1) -> Iterator[Integers]:
-    """Yield candidate sequences of walls for image-source legs, in blocks (S, d) from device to far end, d = 1 .. depth.
+    """Yield candidate wall sequences of image-source legs, in blocks (S, d) from device to far end, d = 1 .. depth.
 
     No wall comes twice in a row. At every bounce what comes before and what comes after (a wall, or the ends) must
     have a part on the same side of the wall in between; no possible path is lost by this.

@@ -88,8 +88,8 @@ def material_errors(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Fin
 
 
 def faint_slabs(scene: Scene, file: str, radio: RadioConfig) -> Iterator[Finding]:
-    """Scene check of meshes' materials: warnings of those as thick as half waves of the carrier in them, at normal incidence: the two
-    faces' reflections cancel, and the radio hardly hears the wall (ITU-R P.2040, single-layer slab)."""
+    """Scene check of meshes' materials: warnings of those as thick as half waves of the carrier in them, at normal
+    incidence: both faces' reflections cancel, and the radio hardly hears the wall (ITU-R P.2040, single-layer slab)."""
     ghz, warned = radio.carrier / 1e9, set()
     for number, reflector in enumerate(scene.reflectors):
         material, found = reflector.material, normal_reflection(reflector.material, radio.carrier)
