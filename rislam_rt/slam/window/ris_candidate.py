@@ -4,7 +4,7 @@ aims."""
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.constants import SPEED_OF_LIGHT
 from rislam_rt.model import DataSheet, PanelCandidate, RisCode, SensorModel
 from rislam_rt.slam.arrival_rays import scatterer_positions
@@ -45,13 +45,10 @@ def weigh_tracks(
     code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks
-    spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
-    looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
-    place, _ = scatterer_positions(looks, poses)
     count = len(rows)
     sight = PanelObservation(
-        place, poses.tx[None].repeat(count, axis=0), poses.rx[None].repeat(count, axis=0), np.ones(count),
-        np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
+        _places(tracks, rows, poses), poses.tx[None].repeat(count, axis=0), poses.rx[None].repeat(count, axis=0),
+        np.ones(count), np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
     gain = gains(sight, scene.ris, code, scene.radio)
     fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
@@ -61,6 +58,12 @@ def weigh_tracks(
         if _is_same(code, _code_then(codes, int(since[row])), scene.ris, int(tracks.side[row])):
             real[row] += np.log1p(-again[row])
     return tracks._replace(log_real=real, **tracks.identity.put(rows, fresh)._asdict())
+
+
+def _places(tracks: WindowTracks, rows: Integers, poses: Poses) -> Floats:
+    """Equally likely samples (R, S, 3) of the places of RIS candidates in `rows` (R,) of the tracks."""
+    spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
+    return scatterer_positions(tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None], poses)[0]
 
 
 def _code_then(codes: tuple[RisCode | None, ...], since: int) -> RisCode | None:
@@ -95,9 +98,7 @@ def find_candidate(
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
     rows = np.isin(tracks.side, (UNTOLD, PANEL + panel)).nonzero()[0]
-    spread = np.sqrt(tracks.covariance[rows][..., 0, 0])
-    looks = tracks.mean[rows, None, :, 0] + even_draws(DRAWS, 3) * spread[:, None]
-    samples, _ = scatterer_positions(looks, poses)
+    samples = _places(tracks, rows, poses)
     places, _ = scatterer_positions(tracks.mean[rows, :, 0], poses)
     out = features[walls] - mean[:3]
     image = reflect(np.broadcast_to(mean[:3], out.shape), features[walls], landmarks.anchor[walls])
