@@ -22,8 +22,6 @@ MAX_BEAMS = 6
 longer than the agent stays."""
 HOLD, AIM, GO_ON = 0, 1, 2
 """What a search may do about a candidate: hold the code that lit it, aim at it, go on with the sweep."""
-DIRECT = 0.5
-"""Prior probability that what a code lit is the direct path over the panel, the only one that an aimed code lights."""
 
 
 class BeamSweep:
@@ -48,10 +46,10 @@ def search_code(
     """Panel code for a panel that the map lacks: the one under which it is likeliest to be heard, and known for it.
 
     That is the sweep's next beam, or the code that last lit the belief's panel candidate, or one that is aimed at it.
-    If the candidate is not the panel, one beam of all lights that. If it is, the code that lit it may do so again, and
-    an aimed one lights the places at which it gives half of the power or more, if the path is the direct one. Codes
-    take turns where one alone leaves open what the candidate is: between paths over walls and the direct one, once that
-    was asked in vain; and where the receiver does not tell it from a scatterer, which any code lights, beams as well.
+    If the candidate does not come from the panel, one beam of all lights that. If it does, the code that lit it may do
+    so again, and an aimed one lights the places at which it gives half of the power or more. Codes take turns where one
+    alone leaves open what the candidate is: held and aimed ones, once that was asked in vain; and where the receiver
+    does not tell it from a scatterer, which any code lights, beams as well.
 
     `panel` is which of several panels is sought, and `lit` the candidate's code for this panel.
     """
@@ -63,7 +61,7 @@ def search_code(
     known = panel_there * (1.0 if found.told else found.is_panel)
     new = (1.0 - panel_there) / len(sweep_codes(ris, radio.wavelength))
     again = known * found.again if lit is not None else 0.0
-    aimed = known * DIRECT * share
+    aimed = known * share
     if max(again, aimed) <= new:
         return sweep.beam(ris, radio, panel)
     turns, may = sweep.turns[panel], {HOLD: again > new, AIM: aimed > new, GO_ON: not found.told}

@@ -78,7 +78,7 @@ class PanelCandidate(NamedTuple):
     real: float
     """Probability that it is a path, and not false components one after the other."""
     is_panel: float
-    """Probability that, if so, it is the panel's, and not a scatterer's."""
+    """Probability that, if so, it comes straight from the panel, and neither from a scatterer nor over a wall."""
     again: float = 0.0
     """Probability that, if so, the code under which it was last heard lights it again; 0 where that is not known."""
     code: RisCode | None = None

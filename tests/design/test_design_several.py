@@ -104,7 +104,7 @@ def test_a_panel_not_yet_found_looks_for_itself(both, radio, rng):
     assert found.code.index.shape == (1, 48)
     # held is the part of the joint code that is this panel's
     joint = RisCode(rng.integers(4, size=(1, 48)), 4)
-    again = replace(partly, suspects=(suspect._replace(code=joint, again=0.9),))
+    again = replace(partly, suspects=(suspect._replace(code=joint, again=1.0),))
     held = sheets.parts(design_code(again, sheets, radio, method="exact", rng=rng).code)[1]
     np.testing.assert_array_equal(held.index, sheets.parts(joint)[1].index)
 

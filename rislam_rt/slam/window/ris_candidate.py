@@ -14,7 +14,7 @@ from rislam_rt.slam.predicted_returns import Poses, reflect
 from rislam_rt.slam.sampling import even_draws
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, weigh
+from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, log_silence, weigh
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import CERTAIN, DRAWS
 from rislam_rt.slam.window.tracks import WindowTracks
@@ -41,7 +41,13 @@ def weigh_tracks(
     tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, codes: tuple[RisCode | None, ...]
 ) -> WindowTracks:
     """Update of RIS candidates by this cycle's amplitude or missed detection under the phase codes (K,) up to now: each
-    track's odds of being a panel, were it a point heard over no wall, and of being real."""
+    track's odds of being a panel, were it a point heard over no wall, of being real, and of coming straight from a
+    panel.
+
+    What comes straight from a panel, over no wall but on the leg from the Tx, comes from where the panel is: a code
+    aimed along it lights the panel's own path. What comes over a wall is known to be lit by the code that lit it alone,
+    and by others as far as they are like that.
+    """
     code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
         return tracks
@@ -50,14 +56,21 @@ def weigh_tracks(
         _places(tracks, rows, poses), poses.tx[None].repeat(count, axis=0), poses.rx[None].repeat(count, axis=0),
         np.ones(count), np.exp(tracks.log_amplitude[rows]), tracks.side[rows], tracks.last[rows] == cycle,
     )  # fmt: skip
-    gain = gains(sight, scene.ris, code, scene.radio)
-    fresh = weigh(tracks.identity.take(rows), sight, gain, scene.sensor).clipped()
-    # what a code lit it lights again
-    real, again, since = tracks.log_real.copy(), _again(tracks, scene.sensor), cycle - tracks.last
-    for row in rows[since[rows] > 0]:
-        if _is_same(code, _code_then(codes, int(since[row])), scene.ris, int(tracks.side[row])):
-            real[row] += np.log1p(-again[row])
-    return tracks._replace(log_real=real, **tracks.identity.put(rows, fresh)._asdict())
+    gain, before = gains(sight, scene.ris, code, scene.radio), tracks.identity.take(rows)
+    fresh = weigh(before, sight, gain, scene.sensor)
+    after = tracks._replace(**tracks.identity.put(rows, fresh.clipped())._asdict())
+    if gain is None or code is None:
+        return after
+    real, direct = tracks.log_real.copy(), tracks.log_direct.copy()
+    may_be = (sight.side[:, None] == PANEL + np.arange(scene.num_panels)) | (sight.side[:, None] == UNTOLD)
+    ago, inverse = np.unique(cycle - np.where(sight.seen, tracks.earlier[rows], tracks.last[rows]), return_inverse=True)
+    likeness = np.stack([_likeness(code, _code_then(codes, int(each)), scene.ris) for each in ago])[inverse]
+    again = np.maximum(_again(tracks, rows, scene.sensor, likeness), CONSTANTS.rare)
+    lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)
+    tells = np.where(sight.seen[:, None], np.log(lit / again), np.log1p(-lit) - np.log1p(-again))
+    direct[rows] += tells.clip(-CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
+    real[rows] += np.where(sight.seen, 0.0, np.log1p(-np.where(may_be, again, 1.0).min(axis=1)))
+    return after._replace(log_real=real, log_direct=np.clip(direct, -CERTAIN, CERTAIN))
 
 
 def _places(tracks: WindowTracks, rows: Integers, poses: Poses) -> Floats:
@@ -71,18 +84,20 @@ def _code_then(codes: tuple[RisCode | None, ...], since: int) -> RisCode | None:
     return codes[-1 - since] if since < len(codes) else None
 
 
-def _is_same(one: RisCode | None, other: RisCode | None, ris: DataSheet, side: int) -> bool:
-    """Whether a RIS candidate is lit alike by two codes: the parts of the panel that it is told for, else of all."""
-    if one is None or other is None:
-        return False
-    mine = range(len(ris.panels)) if side == UNTOLD else [side - PANEL]
-    return all(np.array_equal(ris.parts(one)[panel].index, ris.parts(other)[panel].index) for panel in mine)
+def _likeness(one: RisCode, other: RisCode | None, ris: DataSheet) -> Floats:
+    """How much of the amplitude (Q,) of a path over each panel that a code sends one way another one does; 0 where that
+    is not known."""
+    if other is None:
+        return np.zeros(len(ris.panels))
+    pairs = zip(ris.parts(one), ris.parts(other), strict=True)
+    return np.abs([np.exp(2j * np.pi / one.levels * (a.index - b.index)).mean() for a, b in pairs])
 
 
-def _again(tracks: WindowTracks, sensor: SensorModel) -> Floats:
-    """Probability (T,) that RIS candidates are heard again under the code under which they last were."""
-    snr = sensor.radio.integrated_snr(np.exp(tracks.log_amplitude))
-    return CONSTANTS.shown * sensor.detection_probability(snr)
+def _again(tracks: WindowTracks, rows: Integers, sensor: SensorModel, likeness: Floats | None = None) -> Floats:
+    """Probability (R,) that RIS candidates `rows` are heard again as loud as they were; or (R, Q) under codes that send
+    `likeness` (R, Q) of their amplitude their way."""
+    snr = sensor.radio.integrated_snr(np.exp(tracks.log_amplitude[rows]))
+    return CONSTANTS.shown * sensor.detection_probability(snr if likeness is None else snr[:, None] * likeness**2)
 
 
 def find_candidate(
@@ -91,9 +106,9 @@ def find_candidate(
 ) -> PanelCandidate | None:  # fmt: skip
     """Point or track that is the likeliest to be RIS panel number `panel`, or None if there is none.
 
-    A track has to be real and the panel. One that seems to come from behind a wall may be the panel over that wall, or
-    the wall ends before: the panel is there as rarely as any new feature behind a wall that is heard
-    (`hypothesis_evidence.log_opacity`).
+    A track has to be real, over the panel, and straight from it. One that is not told to be over the panel and seems to
+    come from behind a wall may be a scatterer's mirror image, or the wall ends before: the panel is there as rarely as
+    any new feature behind a wall that is heard (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
@@ -105,19 +120,21 @@ def find_candidate(
     gap = np.linalg.norm(places[:, None] - image, axis=-1) - np.linalg.norm(places - mean[:3], axis=1)[:, None]
     behind = (gap < -DEEP).sum(axis=1)
     places = np.concatenate([features[points], places])
-    is_panel = _against_all(np.concatenate([landmarks.log_ris[points], tracks.log_ris[rows]]), panel)
-    is_panel[len(points) :] += CONSTANTS.log_rare * behind
+    over_panel = _against_all(np.concatenate([landmarks.log_ris[points], tracks.log_ris[rows]]), panel)
+    direct = np.append(np.full(len(points), CERTAIN), tracks.log_direct[rows, panel])
+    is_panel = -np.logaddexp(-over_panel, -direct)
+    is_panel[len(points) :] += CONSTANTS.log_rare * behind * (tracks.side[rows] == UNTOLD)
     real = np.append(np.full(len(points), CERTAIN), tracks.log_real[rows])
     if not len(real):
         return None
-    is_panel += log_images(np.linalg.norm(places - mean[:3], axis=1), _log_both(is_panel, real))
     odds = _log_both(is_panel, real)
     best, again, code, told, asked = int(np.argmax(odds)), 0.0, None, False, True
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
         told, asked = bool(tracks.side[row] == PANEL + panel), bool(0 < tracks.looked[row] <= tracks.hits[row])
-        again, code = float(_again(tracks, sensor)[row]), _code_then(codes, int(cycle - tracks.last[row]))
+        code = _code_then(codes, int(cycle - tracks.last[row]))
+        again = float(_again(tracks, rows[[best - len(points)]], sensor)[0])
     one, other = scipy.special.expit([real[best], is_panel[best]])
     return PanelCandidate(places[best], samples[best], float(one), float(other), again, code, told, asked, panel)
 
@@ -132,10 +149,3 @@ def _against_all(log_ris: Floats, panel: int) -> Floats:
 def _log_both(one: Floats, other: Floats) -> Floats:
     """Log odds (N,) that a RIS candidate is both of two things, from the log odds (N,) of each."""
     return one + other - np.logaddexp(0.0, np.logaddexp(one, other))
-
-
-def log_images(reach: Floats, log_odds: Floats) -> Floats:
-    """Gain (N,) in the log odds of N panel candidates at distances `reach` (N,) [m] with `log_odds` (N,): those farther
-    off may be images of it in walls, as paths over a panel and a wall are longer than that over the panel."""
-    image = np.logaddexp(0.0, 2.0 * CONSTANTS.wall_ratio + log_odds)
-    return np.asarray((image * (reach > reach[:, None])).sum(axis=1))

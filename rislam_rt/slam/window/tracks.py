@@ -40,12 +40,16 @@ class WindowTracks(NamedTuple):
     """(T,) cycle of the first measurement."""
     last: Integers
     """(T,) cycle of the last one."""
+    earlier: Integers
+    """(T,) cycle of the one before it; of the last where it is the first."""
     hits: Integers
     """(T,) number of measurements."""
     looked: Integers
     """(T,) number of measurements at the last examination for a birth."""
     log_real: Floats
     """(T,) log odds of being a path that a code of the panel has lit, and not false components one after the other."""
+    log_direct: Floats
+    """(T, Q) log odds, were it over each of Q panels, that it comes straight from that, over no wall before the Rx."""
     log_grid: Floats
     """(T, G) log posterior of its strength (root of a cross-section), were it a scatterer heard over no wall
     (see `panel_evidence`)."""
@@ -72,8 +76,8 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     """Empty set of tracks, for a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
-        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, np.zeros(0),
-        *unknown(0, panels), nothing_heard(0), 0,
+        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, none, np.zeros(0),
+        np.zeros((0, panels)), *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
 
 
@@ -196,10 +200,11 @@ def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: 
     gain = spread[..., 0] / (spread[..., 0, 0] + observed.std[picks] ** 2)[..., None]
     mean[rows] = prior + gain * (observed.seen[picks] - prior[..., 0])[..., None]
     covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
-    level, last, hits = tracks.log_amplitude.copy(), tracks.last.copy(), tracks.hits.copy()
-    level[rows], last[rows] = observed.log_amplitude[picks], cycle
+    level, hits = tracks.log_amplitude.copy(), tracks.hits.copy()
+    last, earlier = tracks.last.copy(), tracks.earlier.copy()
+    level[rows], earlier[rows], last[rows] = observed.log_amplitude[picks], last[rows], cycle
     hits[rows] += 1
-    return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, hits=hits)
+    return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, earlier=earlier, hits=hits)
 
 
 def start(
@@ -217,9 +222,9 @@ def start(
     fresh = (
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
         observed.log_amplitude[picks],
-        observed.sides[picks], np.full(count, cycle), np.full(count, cycle), np.ones(count, dtype=np.int64),
+        observed.sides[picks], *np.full((3, count), cycle), np.ones(count, dtype=np.int64),
         np.zeros(count, dtype=np.int64), np.zeros(count) + log_real,
-        *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
+        np.zeros((count, tracks.log_ris.shape[1])), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident

@@ -1,10 +1,13 @@
 """RIS candidates: which track or point the phase design aims at while no panel is known."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rislam_rt import slam
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
+from rislam_rt.design import exact_code
 from rislam_rt.model import (
     Body,
     Measurement,
@@ -16,6 +19,8 @@ from rislam_rt.model import (
     SensorModel,
     join_codes,
 )  # fmt: skip
+from rislam_rt.ris import leg_response
+from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, UNTOLD, Observations
@@ -23,13 +28,16 @@ from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.ris_candidate import false_density, find_candidate, log_images, weigh_tracks
+from rislam_rt.slam.window.ris_candidate import false_density, find_candidate, weigh_tracks
 from rislam_rt.slam.window.tracks import WindowTracks, no_tracks
 
 HERE = np.array([2.0, 2.0, 1.0])
 CYCLE = 40
 SENSOR = SensorModel(RadioConfig(), false_alarms=2.0)
-CODES = tuple(RisCode(np.full((2, 2), level), 4) for level in (0, 1, 2, 2, 2))
+SHEET = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
+ACROSS = [np.array([[0, 0], [0, 0]]), np.array([[0, 2], [0, 2]]), np.array([[0, 0], [2, 2]])]
+CODES = tuple(RisCode(ACROSS[index], 4) for index in (0, 1, 2, 2, 2))
+"""Three codes of which none lights what another one does, the last for three cycles."""
 
 
 def poses() -> Poses:
@@ -46,8 +54,9 @@ def tracks_at(places: Floats, log_odds: list[float], hits: int = 3, log_real: fl
     fields = {name: np.zeros((count, *getattr(empty, name).shape[1:])) for name in ("log_grid", "hidden", "rises")}
     return empty._replace(
         ident=np.arange(count), mean=mean, covariance=np.zeros((count, 3, 2, 2)), log_amplitude=np.zeros(count),
-        side=whole * 0 + PANEL, born=whole - hits, last=whole, hits=whole * 0 + hits, looked=whole * 0,
-        log_ris=np.array(log_odds)[:, None], log_real=np.full(count, log_real), next_ident=count, **fields,
+        side=whole * 0 + PANEL, born=whole - hits, last=whole, earlier=whole, hits=whole * 0 + hits, looked=whole * 0,
+        log_ris=np.array(log_odds)[:, None], log_real=np.full(count, log_real),
+        log_direct=np.full((count, 1), 30.0), next_ident=count, **fields,
     )  # fmt: skip
 
 
@@ -62,13 +71,16 @@ def best(tracks: WindowTracks, walls: list[Floats] | None = None) -> PanelCandid
 
 def test_a_wall_in_front_makes_a_candidate_unlikely_but_may_end_before_it():
     panel, front = np.array([4.0, 4.0, 2.5]), np.array([4.0, 2.0, 1.0])  # a wall at x = 3
-    found = best(tracks_at(panel[None], [2.0]))
-    assert found is not None
-    np.testing.assert_allclose(found.position, panel, atol=1e-9)
-    np.testing.assert_allclose(found.is_panel, 1.0 / (1.0 + np.exp(-2.0)))
-    behind = best(tracks_at(panel[None], [2.0]), [front])
-    assert behind is not None
-    np.testing.assert_allclose(behind.is_panel, 1.0 / (1.0 + np.exp(-2.0) / CONSTANTS.rare))
+    told = tracks_at(panel[None], [2.0])
+    untold = told._replace(side=np.array([UNTOLD]))
+    for track, by in ((told, 1.0), (untold, CONSTANTS.rare)):
+        found = best(track)
+        assert found is not None
+        np.testing.assert_allclose(found.position, panel, atol=1e-9)
+        np.testing.assert_allclose(found.is_panel, 1.0 / (1.0 + np.exp(-2.0)))
+        behind = best(track, [front])
+        assert behind is not None
+        np.testing.assert_allclose(behind.is_panel, 1.0 / (1.0 + np.exp(-2.0) / by))
 
 
 def test_a_candidate_has_to_be_real_and_the_panel():
@@ -99,14 +111,13 @@ def test_candidates_carry_the_code_that_lit_them():
 
 
 def test_silence_under_the_code_that_lit_it_tells_against_a_candidate_and_under_another_one_does_not():
-    spec = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
-    scene = KnownEnvironment(None, SENSOR.radio, SENSOR, spec, 2, True)
+    scene = KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True)
     before = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)
     snr = 12.0
     loud = np.log(np.sqrt(snr / SENSOR.radio.integrated_snr(np.ones(()))))
     before = before._replace(log_amplitude=np.array([loud]), log_grid=unknown(1).log_grid)
     missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
-    for ago, change in ((0, 0.0), (2, missed), (3, 0.0)):
+    for ago, change in ((0, 0.0), (2, missed), (3, np.log1p(-CONSTANTS.rare))):
         after = weigh_tracks(before._replace(last=before.last - ago), CYCLE, poses(), scene, CODES)
         np.testing.assert_allclose(after.log_real, 3.0 + change)
 
@@ -116,19 +127,21 @@ def test_of_several_panels_the_part_that_lit_it_counts():
     normal, up, spacing = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), np.array([0.015, 0.015])
     sheets = RisSpecs((RisSpec(2, 2, spacing, normal, up), RisSpec(1, 3, spacing, normal, up)))
     scene = KnownEnvironment(None, SENSOR.radio, SENSOR, sheets, 2, True)
-    first = [RisCode(np.full((2, 2), level), 4) for level in (0, 1, 2)]
-    codes = tuple(join_codes((one, RisCode(np.ones((1, 3), dtype=np.int64), 4))) for one in first)
+    codes = tuple(join_codes((RisCode(one, 4), RisCode(np.ones((1, 3), dtype=np.int64), 4))) for one in ACROSS)
     track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)
     track = track._replace(
-        last=track.last - 2, log_grid=unknown(1).log_grid, log_ris=np.zeros((1, 2)), hidden=np.zeros((1, 3))
-    )
+        last=track.last - 2, log_grid=unknown(1).log_grid, log_ris=np.zeros((1, 2)), hidden=np.zeros((1, 3)),
+        log_direct=np.zeros((1, 2)),
+    )  # fmt: skip
     for side, falls in ((PANEL + 1, True), (PANEL, False), (UNTOLD, False)):
         after = weigh_tracks(track._replace(side=np.array([side])), CYCLE, poses(), scene, codes)
-        assert (after.log_real[0] < 3.0) == falls
+        assert (after.log_real[0] < 2.9) == falls
 
 
 def test_one_track_is_not_two_panels_at_a_time():
-    track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0])._replace(log_ris=np.array([[5.0, 5.0]]))
+    track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0])._replace(
+        log_ris=np.array([[5.0, 5.0]]), log_direct=np.full((1, 2), 30.0)
+    )
     mean = np.concatenate([HERE, np.zeros(4)])
     for side, panels in ((UNTOLD, (0, 1)), (PANEL + 1, (1,))):
         for panel in (0, 1):
@@ -167,17 +180,16 @@ def components(snr: Floats, side: int, seen: Floats) -> Observations:
 def test_a_first_component_counts_against_noise_as_loud_as_it():
     """By hand: exp(-(snr - threshold)) of the false ones, 2 snr an e-fold; wherever they are reported, and for each of
     two sides alike; and one of another kind is as rare as one that a code lit."""
-    spec = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
     snr, span = np.array([10.0, 13.0, 20.0, 1e4]), SPEED_OF_LIGHT * (SENSOR.window[1] - SENSOR.window[0])
     for side, share in ((PANEL, 0.5), (UNTOLD, 1.0)):
         noise = share * SENSOR.false_alarms * 2.0 * snr * np.exp(-(snr - SENSOR.threshold))
         for seen in (np.array([5.0, 0.1, 0.2]), np.array([5.0, 0.9, 0.9])):  # noise is reported beyond the disc, too
-            scene = KnownEnvironment(None, SENSOR.radio, SENSOR, spec, 2, True)
+            scene = KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True)
             density, log_odds = false_density(components(snr, side, seen), scene)
             np.testing.assert_allclose(log_odds, np.log(CONSTANTS.rare / (CONSTANTS.rare + noise)))
             np.testing.assert_allclose(density * np.pi * span, CONSTANTS.rare + noise)
     endless = SensorModel(SENSOR.radio, false_alarms=0.0, window=(0.0, np.inf))
-    scene = KnownEnvironment(None, endless.radio, endless, spec, 2, True)
+    scene = KnownEnvironment(None, endless.radio, endless, SHEET, 2, True)
     density, log_odds = false_density(components(snr, PANEL, seen), scene)
     assert np.isfinite(np.log(density)).all()
     np.testing.assert_allclose(log_odds, 0.0)
@@ -186,9 +198,8 @@ def test_a_first_component_counts_against_noise_as_loud_as_it():
 def test_the_filter_follows_how_likely_its_tracks_are_real():
     """Three cycles: a first component, a second one in its place, and silence under the code that lit it."""
     rng, body = np.random.default_rng(1), Body()
-    spec = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
     config, code = SlamConfig(filter="window"), CODES[-1]
-    state = slam.init(StartPrior(HERE, np.zeros(3), 0.0), body, spec, SENSOR, config, rng=rng)
+    state = slam.init(StartPrior(HERE, np.zeros(3), 0.0), body, SHEET, SENSOR, config, rng=rng)
     gain, one = np.sqrt(11.0 / SENSOR.radio.integrated_snr(np.ones(()))), np.ones(1)
     heard = Measurement(
         12.0 / SPEED_OF_LIGHT * one, np.array([[0.3, 0.2]]), gain * one, 1e-10 * one, np.full((1, 2), 0.02),
@@ -207,24 +218,41 @@ def test_the_filter_follows_how_likely_its_tracks_are_real():
         assert suspect.code is code
 
 
-def test_of_the_panel_and_its_image_in_a_wall_the_nearer_is_aimed_at():
-    panel, image = np.array([4.0, 4.0, 2.5]), np.array([5.0, 6.0, 2.5])
-    both = tracks_at(np.stack([image, panel]), [12.0, 8.0])
-    found = best(both)
-    assert found is not None
-    np.testing.assert_allclose(found.position, panel, atol=1e-9)
-    # a nearer track that nothing speaks for is not the panel whose image the farther one would be
-    found = best(tracks_at(np.stack([image, panel]), [12.0, -6.0]))
-    assert found is not None
-    np.testing.assert_allclose(found.position, image, atol=1e-9)
-    # nor is noise that happens to be nearer
-    noise, real = tracks_at(panel[None], [8.0], log_real=-9.0), tracks_at(image[None], [12.0])
-    joined = WindowTracks._make([*(np.concatenate(pair) for pair in zip(noise[:-1], real[:-1], strict=True)), 2])
-    found = best(joined)
-    assert found is not None
-    np.testing.assert_allclose(found.position, image, atol=1e-9)
+def lit_by_turns(straight: bool, rng: np.random.Generator) -> Floats:
+    """Log odds of a track of coming straight from the panel, after a beam that lit it, that beam again, three codes
+    aimed at it and three others; a path over a wall besides is lit by its own beam alone. SNR of 40 if aimed at."""
+    sheet = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
+    place = HERE + np.array([1.0, 0.7, 2.0])
+    leg = leg_response(sheet, place[None], HERE, np.ones(1, dtype=np.complex128), SENSOR.radio.wavelength)
+    index, _ = exact_code((leg**2).reshape(1, -1), sheet.levels)
+    aimed = RisCode(index.reshape(6, 6), sheet.levels)
+    gain = np.abs(panel_path_gain(sheet, aimed, place[None], HERE, HERE, np.ones(1), SENSOR.radio))[0]
+    radio = replace(SENSOR.radio, energy=SENSOR.radio.energy * 40.0 / float(SENSOR.radio.integrated_snr(gain)))
+    scene = KnownEnvironment(None, radio, SensorModel(radio, false_alarms=2.0), sheet, 2, True)
+    beam = aimed if straight else RisCode((aimed.index + 2 * np.arange(6)) % 4, 4)
+    codes = [beam, beam, *[aimed] * 3, *[RisCode(rng.integers(4, size=(6, 6)), 4) for _ in range(3)]]
+    track = tracks_at(place[None], [0.0])._replace(
+        log_amplitude=np.log([gain]), log_grid=unknown(1).log_grid, log_direct=np.zeros((1, 1)),
+        hidden=np.zeros((1, 2)), last=np.zeros(1, dtype=np.int64), earlier=np.zeros(1, dtype=np.int64),
+    )  # fmt: skip
+    odds = []
+    for cycle, code in enumerate(codes):
+        if code is beam:
+            track = track._replace(earlier=track.last, last=np.array([cycle]))
+        track = weigh_tracks(track, cycle, poses(), scene, tuple(codes[: cycle + 1]))
+        odds.append(track.log_direct[0, 0])
+    return np.array(odds)
 
 
-def test_images_count_by_the_power_that_a_wall_takes():
-    gain = log_images(np.array([1.0, 2.0, 3.0]), np.array([2.0, 3.0, -700.0]))
-    np.testing.assert_allclose(gain, [np.log1p(np.exp(2.0 * CONSTANTS.wall_ratio + 3.0)), 0.0, 0.0], atol=1e-300)
+def test_an_aimed_code_tells_whether_a_track_comes_straight_from_the_panel():
+    """By hand: what lit it and what is lit again say nothing; silence under an aimed code says all that occlusion and
+    a detection that fails leave of it."""
+    straight, over_a_wall = (lit_by_turns(kind, np.random.default_rng(5)) for kind in (True, False))
+    np.testing.assert_allclose(straight[:5], 0.0, atol=1e-9)
+    assert straight[-1] > -1.0  # other codes light neither
+    np.testing.assert_allclose(over_a_wall[:2], 0.0, atol=1e-9)
+    hidden = CONSTANTS.rare
+    silence = hidden + (1.0 - hidden) * (1.0 - CONSTANTS.shown)
+    again = CONSTANTS.rare  # the beam and the code that is aimed have nothing in common
+    np.testing.assert_allclose(over_a_wall[2], np.log(silence / (1.0 - again)), atol=1e-2)
+    assert over_a_wall[4] < over_a_wall[2] - 0.3  # less each time: what hides it may stay

@@ -139,6 +139,16 @@ def weigh(before: PanelIdentity, sight: PanelObservation, gain: Complexes | None
     return PanelIdentity(log_grid, log_ris, hidden)
 
 
+def log_silence(gain: Complexes, hidden: Floats, sensor: SensorModel) -> Floats:
+    """Log probabilities (N, Q) that N points are not detected, were they each of Q panels of path gains (Q, N, S), by
+    the probability (N, Q + 1) that something was in the way; for RIS identification."""
+    noise = np.full(gain.shape[1], amplitude_std(sensor.radio))
+    threshold = float(np.sqrt(2.0 * sensor.threshold) * noise[0])
+    missed = np.exp(np.stack([log_panel_missed(noise, of_panel, threshold) for of_panel in gain], axis=1))
+    before = hidden[:, :-1] + CONSTANTS.rare * (1.0 - hidden[:, :-1])
+    return np.asarray(np.log(before + (1.0 - before) * missed))
+
+
 def _log_likelihoods(
     sight: PanelObservation, gain: Complexes | None, panels: int, sensor: SensorModel
 ) -> tuple[Floats, Floats]:
