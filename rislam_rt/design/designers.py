@@ -51,7 +51,8 @@ def _describe(
     name: str, problem: DesignProblem, objective: Objective, found: Integers | Floats, history: Floats,
     seconds: float, certify: bool,
 ) -> Design:  # fmt: skip
-    """Value the code or phases that a designer found: against the direct path's optimum and the relaxation bound."""
+    """Last step of all designers: value the code or phases found, against the direct path's optimum and the relaxation
+    bound."""
     step = 2.0 * np.pi / problem.levels
     discrete = np.issubdtype(found.dtype, np.integer)
     xi = np.asarray(found * step if discrete else found, dtype=np.float64)

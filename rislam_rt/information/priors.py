@@ -70,7 +70,8 @@ class MotionPrior:
 
     @property
     def accelerations(self) -> Floats:
-        """Prior standard deviations (axes,) [m/s^2] of the white-noise acceleration of each axis."""
+        """Standard deviations (axes,) [m/s^2] of each axis's white-noise acceleration in a bound's prior of the
+        motion."""
         sigma = np.full(self.axes, self.acceleration)
         if self.climb is not None:
             sigma[2] = self.climb
@@ -78,7 +79,8 @@ class MotionPrior:
 
     @property
     def start(self) -> Floats:
-        """Prior standard deviations (2 axes,) of position and velocity at the start [m, m/s]."""
+        """Standard deviations (2 axes,) of position and velocity at the start [m, m/s] in a bound's prior of the
+        motion."""
         std = np.repeat([self.start_position, self.start_velocity], self.axes)
         if self.climb is not None:
             std[[2, 5]] = 0.0

@@ -98,7 +98,8 @@ def single(received: Received) -> NoiselessComponents:
 
 
 def lone_errors(parts: NoiselessComponents, radio: RadioConfig, draws: Floats) -> ComponentErrors:
-    """Errors of components by the bound of a lone path, as if no other were near; `draws` (N, 5) standard normal."""
+    """Errors of multipath components, each as exact as a lone path's, as if no other were near; `draws` (N, 5) standard
+    normal."""
     tau, cosines = path_std(radio.integrated_snr(parts.gain), radio)
     deviation = np.column_stack([tau, cosines])
     gain_std = np.full(len(tau), np.sqrt(2.0) * amplitude_std(radio))

@@ -138,7 +138,8 @@ def _clipped(corners: Floats) -> Integers | None:
 
 
 def _ears(flat: Floats, ring: Integers) -> Integers | None:
-    """Triangles (T, 3) of a polygon's ring of corners (n, 2), turned like it; None where ears cannot be clipped."""
+    """Triangles (T, 3) of a mesh file's polygon, a ring of corners (n, 2), turned like it; None where ears cannot be
+    clipped."""
     turned = len(ring) > 2 and signed_area(flat[ring]) < 0.0
     order = ring[::-1] if turned else ring
     ears = triangulate(flat[order], []) if len(ring) > 2 else None
@@ -148,7 +149,8 @@ def _ears(flat: Floats, ring: Integers) -> Integers | None:
 
 
 def _crosses_itself(flat: Floats, margin: float) -> bool:
-    """Whether two edges of a polygon (n, 2) cross, each with both ends further than a margin off the other's line."""
+    """Whether two edges of a mesh file's polygon (n, 2) cross, each with both ends further than a margin off the
+    other's line."""
     ends = np.roll(flat, -1, axis=0)
     along = ends - flat
     length = np.linalg.norm(along, axis=1)
@@ -163,7 +165,8 @@ def _crosses_itself(flat: Floats, margin: float) -> bool:
 
 
 def _simplified(flat: Floats, near: float) -> tuple[Floats, Integers]:
-    """Corners (n, 2) of a polygon, those nearer than a length made one point, and its ring without repeats and spikes.
+    """Corners (n, 2) of a mesh file's polygon, those nearer than a length made one point, and its ring without repeats
+    and spikes.
 
     A spike is a corner at which the outline turns back along itself.
     """

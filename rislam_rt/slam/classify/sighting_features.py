@@ -212,7 +212,8 @@ def _mean(values: Floats, held: Booleans) -> Floats:
 
 
 def stillness(turn: Floats, turn_std: Floats, approach: Floats, approach_std: Floats) -> Floats:
-    """Probability (M,) that a track is a static point's, not a wall's, from fitted turn and approach; equal priors.
+    """Feature of a track's sightings: probability (M,) that it is a static point's, not a wall's, from fitted turn and
+    approach; equal priors.
 
     Each likelihood is Gaussian in the fitted turn and approach. A wall has turn 0 and approach 2 (0 for a pair of
     opposite walls); a landmark's path, images included, a turn of 1 with a spread of 0.35 and an approach of 1.8 with

@@ -30,8 +30,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.measurement_log import Residuals, empty_log, reweigh_wall_returns, squares
-from rislam_rt.slam.window.motion import coordinated_turn, motion_learning
-from rislam_rt.slam.window.motion.manoeuvres import with_climb, with_manoeuvre
+from rislam_rt.slam.window.motion import coordinated_turn, manoeuvres, motion_learning
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import level, relinearise
 from rislam_rt.slam.window.smoother import attitude, heave, motion, window_gaussian
@@ -93,7 +92,7 @@ def step(
     else:
         heading += state.turned
     turn, restarted = heading - float(state.heading[-1]), state.lost_log_odds == 0.0
-    state = with_climb(with_manoeuvre(with_rates(_move(state, dt, heading))))
+    state = manoeuvres.with_climb(manoeuvres.with_manoeuvre(with_rates(_move(state, dt, heading))))
     state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
     scene = state.scene
     heard = components_to_explain(measurement, scene)
@@ -187,11 +186,11 @@ def _associate_over_motions(
     learnt = state.config.motion == "learnt"  # a motion that is told stays told
     for axis in range(2 if learnt and len(best.groups.leader) and len(window.step) else 0):
         steps = (LATELY, CLIMBED)[axis]
-        solved = motion_learning.livelier(window.solved, steps, upwards=axis == 1)
+        solved = manoeuvres.livelier(window.solved, steps, upwards=axis == 1)
         now = window_gaussian.now_under(window, solved, (best.mean, best.covariance))
         prior = CONSTANTS.log_rare - axis * CONSTANTS.log_upright  # upwards, of a floor that is not level besides
         if score_again(best, *now, observed, strangers) + prior > best.score:
-            trial = motion_learning.solve_livelier(window, steps, upwards=axis == 1)
+            trial = manoeuvres.solve_livelier(window, steps, upwards=axis == 1)
             view = view_of(trial)
             log_odds = view.score + prior - best.score
             if log_odds > 0.0:
@@ -211,7 +210,7 @@ def _associate_over_motions(
             heaved = 0.0
     if best.surprise > 1.0 and learnt and window.turns and (window.step[-1:] > 0.0).any():
         angle = divergence_monitor.turn(best, observed, float(state.scene.sensor.cell_length[0]))
-        trial = divergence_monitor.turned(motion_learning.solve_livelier(window), angle)
+        trial = divergence_monitor.turned(manoeuvres.solve_livelier(window), angle)
         view = view_of(trial)
         if view.score + divergence_monitor.log_turn() > best.score:
             best, window = view, trial

@@ -42,7 +42,8 @@ class DelayConfig:
 
     @property
     def axes(self) -> Floats:
-        """Ones (3,) for the position's axes that filters by delay alone estimate, zero for a known height."""
+        """Ones (3,) for the position's axes that a filter by delay alone is configured to estimate, zero for a known
+        height."""
         return np.array([1.0, 1.0, 1.0 if self.height == "estimated" else 0.0])
 
     @property

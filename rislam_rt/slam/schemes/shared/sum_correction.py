@@ -22,7 +22,7 @@ ROUNDS, TOLERANCE = 30, 1e-3
 def claims(
     sums: Sums, sight: PredictedRanges, course: AgentTrajectory, scan: Scan, fresh: Floats, odds: Odds
 ) -> Association:
-    """Marginal probabilities of the association of K features with M ranges, by loopy belief propagation."""
+    """Probabilities with which K features' Gaussian sums claim M ranges, for their correction: by loopy association."""
     pair = np.zeros((len(sums.ident), len(scan.length)))
     np.add.at(pair, sums.owner, sums.share[:, None] * _ratios(sight.length, spread_of(sight, course), scan, odds))
     missed = 1.0 - sums.existence * odds.detection_probability

@@ -73,8 +73,8 @@ def jump(view: CycleAssociation, observed: Observations, use_vt: bool) -> Floats
 
 
 def turn(view: CycleAssociation, observed: Observations, cell: float) -> float:
-    """Turn of the body [rad] on which most pairs of predicted and measured directions agree, of paths alike in length
-    (within `cell` [m]), elevation and amplitude; 0 where there is none."""
+    """Turn of the body [rad] that the divergence monitor tries: that on which most pairs of predicted and measured
+    directions agree, of paths alike in length (within `cell` [m]), elevation and amplitude; 0 where there is none."""
     lead = view.groups.leader
     expected, heard = view.expected.seen[lead], observed.seen
     alike = np.abs(heard[:, 0] - expected[:, 0, None]) < cell
@@ -92,7 +92,8 @@ def turn(view: CycleAssociation, observed: Observations, cell: float) -> float:
 
 
 def log_turn() -> float:
-    """Prior log probability of an unannounced turn by one certain angle (within `ALIKE`), all alike."""
+    """Divergence monitor's prior log probability of an unannounced turn by one certain angle (within `ALIKE`), all
+    alike."""
     return CONSTANTS.log_rare + float(np.log(ALIKE / (2.0 * np.pi)))
 
 

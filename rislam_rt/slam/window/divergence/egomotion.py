@@ -120,9 +120,9 @@ def possible_changes(found: Rates, log_prior: float) -> Floats | None:
 def weigh_change(
     found: Rates, starts: Floats, calm: Floats, ways: list[Floats], log_prior: float
 ) -> tuple[float, Floats]:  # fmt: skip
-    """Posterior log odds that rates of path lengths change by a horizontal velocity or acceleration of one of the
-    covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,), from initial
-    values `starts` (S, 2); `log_prior` are the odds beforehand."""
+    """Egomotion across: posterior log odds that rates of path lengths change by a horizontal velocity or acceleration
+    of one of the covariances `ways` (2, 2), all alike, rather than `calm` (2, 2), and the likeliest such change (2,),
+    from initial values `starts` (S, 2); `log_prior` are the odds beforehand."""
     many = len(starts)
     spread = np.concatenate([np.repeat(ways, many, axis=0), calm[None]])
     every = _find_modes(found, np.concatenate([np.tile(starts, (len(ways), 1)), starts[:1]]), np.zeros(3), spread)
@@ -132,8 +132,8 @@ def weigh_change(
 
 
 def weigh_climb(found: Rates, calm: float, log_prior: float) -> tuple[float, float]:
-    """Posterior log odds that rates of path lengths change by a vertical acceleration of the liveliest mode rather than
-    of variance `calm`, and the likeliest one; `log_prior` are the odds beforehand."""
+    """Egomotion by a climb: posterior log odds that rates of path lengths change by a vertical acceleration of the
+    liveliest mode rather than of variance `calm`, and the likeliest one; `log_prior` are the odds beforehand."""
     up, nowhere = found.toward[:, 2], np.zeros((1, 2))
     starts = np.append(0.0, found.rate[up != 0.0] / up[up != 0.0])[:, None]
     level = np.log(_likelihoods(found, nowhere, starts)[0]).sum(axis=1)

@@ -15,12 +15,13 @@ from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
 from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares, unique_forms
-from rislam_rt.slam.window.motion.motion_learning import UP, solve_livelier, vertical_information
+from rislam_rt.slam.window.motion.motion_learning import COLUMNS, UP, vertical_information
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
-from rislam_rt.slam.window.solver_limits import CLIMBED, LASTED, STRIDE
+from rislam_rt.slam.window.smoother.window_gaussian import Window
+from rislam_rt.slam.window.solver_limits import CLIMBED, LASTED, LATELY, STRIDE
 from rislam_rt.slam.window.state import WindowState
 
 
@@ -146,3 +147,20 @@ def _log_returns(state: WindowState, begin: int) -> Floats:
     _, which = unique_forms(log.form[left.row, 0])
     square = left.left[:, 0] ** 2 * (1.0 + log.extra[left.row, 0] / log.std[left.row, 0] ** 2)
     return np.asarray(-0.5 * (np.bincount(which) + 1.0) * np.log(CONSTANTS.crowd + np.bincount(which, square)))
+
+
+def livelier(precision: Floats, steps: int = LATELY, *, upwards: bool = False) -> Floats:
+    """Prior precisions (K - 1, A) of the window's accelerations for the trial of a manoeuvre: those of the last `steps`
+    lowered to the liveliest motion mode's, of all axes but the vertical one, or of this alone."""
+    found, lively = precision.copy(), (COLUMNS[: precision.shape[1]] == UP) == upwards
+    found[-steps:, lively] = np.minimum(found[-steps:, lively], CONSTANTS.liveliest**-2.0)
+    return found
+
+
+def solve_livelier(window: Window, steps: int = LATELY, *, upwards: bool = False) -> Window:
+    """Window solved again for the trial of a manoeuvre, with `livelier` priors of its last steps."""
+    uneven = window.uneven.copy()
+    if upwards:
+        uneven[-steps:] = np.minimum(uneven[-steps:], CONSTANTS.liveliest**-2.0)
+    precision = livelier(window.precision, steps, upwards=upwards)
+    return window_gaussian.solve(window._replace(precision=precision, uneven=uneven))

@@ -15,12 +15,12 @@ import scipy
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.smoother import motion, window_gaussian
+from rislam_rt.slam.window.smoother import motion
 from rislam_rt.slam.window.smoother.cholesky import inverse, log_evidence
 from rislam_rt.slam.window.smoother.manoeuvre_segments import manoeuvring_share
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window, step_covariances
-from rislam_rt.slam.window.solver_limits import DAMPING, LATELY, PRIORS, STILL
+from rislam_rt.slam.window.solver_limits import DAMPING, PRIORS, STILL
 from rislam_rt.slam.window.state import WindowState
 
 UP = 1
@@ -170,20 +170,3 @@ def log_manoeuvre(state: WindowState) -> float:
     told = motion.log_likelihood(window.accel[-1:, :2], block[None], window.solved[-1:, 0])[0]
     calm = np.logaddexp.reduce(np.log(level[:-1] / level[:-1].sum()) + told[:-1])
     return max(learnt, rare + float(told[-1] - calm))
-
-
-def livelier(precision: Floats, steps: int = LATELY, *, upwards: bool = False) -> Floats:
-    """Prior precisions (K - 1, A) of the window's accelerations, those of the last `steps` lowered to the liveliest
-    motion mode: all but the vertical ones, or these alone."""
-    found, lively = precision.copy(), (COLUMNS[: precision.shape[1]] == UP) == upwards
-    found[-steps:, lively] = np.minimum(found[-steps:, lively], CONSTANTS.liveliest**-2.0)
-    return found
-
-
-def solve_livelier(window: Window, steps: int = LATELY, *, upwards: bool = False) -> Window:
-    """Window solved again under `livelier` priors of its last steps."""
-    uneven = window.uneven.copy()
-    if upwards:
-        uneven[-steps:] = np.minimum(uneven[-steps:], CONSTANTS.liveliest**-2.0)
-    precision = livelier(window.precision, steps, upwards=upwards)
-    return window_gaussian.solve(window._replace(precision=precision, uneven=uneven))

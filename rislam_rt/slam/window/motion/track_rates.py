@@ -167,7 +167,7 @@ def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> F
 
 
 def _shares(found: _Histories, state: WindowState) -> Floats:
-    """Probability (T,) that each track's length follows the poses, as half of all paths do; of the others a quarter
+    """Probability (T,) that each track's rate tells of the agent's way, as for half of all; of the others a quarter
     keep their length, as over opposite walls, and the rest have any rate that the agent's speed allows."""
     (rate, whole), spread = found.slopes(found.left, found.length)
     mean = np.stack(found.means(*found.toward.T), axis=1)

@@ -71,8 +71,8 @@ def rotation(angle: float) -> Floats:
 
 
 def step_transition(dt: float, angle: float, free: int) -> Floats:
-    """Transition matrix (7, 7 + A) from pose, velocity and compass offset, and a step's accelerations, to those `dt`
-    [s] later, the velocity turning by a turn [rad]."""
+    """Transition matrix (7, 7 + A) of the motion basis, from pose, velocity and compass offset, and a step's
+    accelerations, to those `dt` [s] later, the velocity turning by a turn [rad]."""
     found = np.eye(HEAD, HEAD + free)
     axes, turn = np.arange(3), rotation(angle)
     found[:3, 3:6], found[3:6, 3:6] = 0.5 * dt * (np.eye(3) + turn), turn
@@ -83,8 +83,8 @@ def step_transition(dt: float, angle: float, free: int) -> Floats:
 
 
 def step_back(found: Floats) -> Floats:
-    """Matrix (7, 7 + A) from pose, velocity and compass offset after a step, and its accelerations, to those before it:
-    the inverse of what `step_transition` has found."""
+    """Inverse of `step_transition` in the motion basis: matrix (7, 7 + A) from pose, velocity and compass offset after
+    a step, and its accelerations, to those before it."""
     back = found[3:6, 3:6].T
     before, push = found.copy(), found[3:6, HEAD:]
     before[3:6, 3:6], before[3:6, HEAD:] = back, -back @ push

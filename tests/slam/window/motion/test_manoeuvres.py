@@ -18,7 +18,6 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import filter as window_filter
 from rislam_rt.slam.window.divergence import egomotion, length_rates, motion_agreement
 from rislam_rt.slam.window.motion import manoeuvres
-from rislam_rt.slam.window.motion.motion_learning import solve_livelier
 from rislam_rt.slam.window.smoother import motion as motion_modes
 
 ROOM, COUNT = Path(__file__).parents[4] / "scenes" / "paper_room", 28
@@ -188,7 +187,7 @@ def test_a_climb_for_one_cycle_that_the_steps_contradict_leaves_no_height_open(m
     def climbing(state, *rest):
         state, view, _ = over(state, *rest)
         found.append(state.cycle)
-        window = solve_livelier(state.window, 3, upwards=True) if state.cycle == 4 else state.window
+        window = manoeuvres.solve_livelier(state.window, 3, upwards=True) if state.cycle == 4 else state.window
         return state._replace(window=window), view, (0.0, 1e-3 * (state.cycle == 4))
 
     monkeypatch.setattr(window_filter, "_associate_over_motions", climbing)
