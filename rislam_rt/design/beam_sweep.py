@@ -46,10 +46,10 @@ def search_code(
     """Panel code for a panel that the map lacks: the one under which it is likeliest to be heard, and known for it.
 
     That is the sweep's next beam, or the code that last lit the belief's panel candidate, or one that is aimed at it.
-    If the candidate does not come from the panel, one beam of all lights that. If it does, the code that lit it may do
-    so again, and an aimed one lights the places at which it gives half of the power or more. Codes take turns where one
-    alone leaves open what the candidate is: held and aimed ones, once that was asked in vain; and where the receiver
-    does not tell it from a scatterer, which any code lights, beams as well.
+    If the candidate is not the panel's direct path, one beam of all lights that path. If it is, and nothing hides it,
+    the code that lit it may do so again, and an aimed one lights the places at which it gives half of the power or
+    more. All three take turns where what it is was asked in vain, or where the receiver does not tell it from a
+    scatterer, which any code lights.
 
     `panel` is which of several panels is sought, and `lit` the candidate's code for this panel.
     """
@@ -58,13 +58,13 @@ def search_code(
         return sweep.beam(ris, radio, panel)
     code, share = _aimed(found, belief, ris, radio)
     panel_there = found.real * found.is_panel
-    known = panel_there * (1.0 if found.told else found.is_panel)
+    known = panel_there * found.clear * (1.0 if found.told else found.is_panel)
     new = (1.0 - panel_there) / len(sweep_codes(ris, radio.wavelength))
     again = known * found.again if lit is not None else 0.0
     aimed = known * share
     if max(again, aimed) <= new:
         return sweep.beam(ris, radio, panel)
-    turns, may = sweep.turns[panel], {HOLD: again > new, AIM: aimed > new, GO_ON: not found.told}
+    turns, may = sweep.turns[panel], {HOLD: again > new, AIM: aimed > new, GO_ON: True}
     if found.told and not found.examined:
         may = {HOLD: again >= aimed, AIM: again < aimed, GO_ON: False}
     turn = next(each for each in turns if may[each])

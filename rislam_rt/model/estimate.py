@@ -78,7 +78,7 @@ class PanelCandidate(NamedTuple):
     real: float
     """Probability that it is a path, and not false components one after the other."""
     is_panel: float
-    """Probability that, if so, it comes straight from the panel, and neither from a scatterer nor over a wall."""
+    """Probability that, if so, it is the direct path over the panel, and neither a scatterer's nor over walls."""
     again: float = 0.0
     """Probability that, if so, the code under which it was last heard lights it again; 0 where that is not known."""
     code: RisCode | None = None
@@ -89,6 +89,8 @@ class PanelCandidate(NamedTuple):
     """Whether what it is was asked already, and left open."""
     panel: int = 0
     """Number of the RIS panel that it may be."""
+    clear: float = 1.0
+    """Probability that nothing hides it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -160,12 +160,12 @@ def test_turns_go_round_however_many_codes_are_worth_it(blind, make_spec, radio,
     assert min(kinds.count(kind) for kind in ("held", "aimed", "")) >= 5
 
 
-def test_what_was_examined_in_vain_is_held_and_aimed_at_by_turns(blind, make_spec, radio, rng):
+def test_what_was_examined_in_vain_takes_turns_with_the_sweep(blind, make_spec, radio, rng):
     spec, sweep, lit = make_spec(), BeamSweep(), RisCode(rng.integers(4, size=(6, 6)), 4)
     belief = with_candidate(blind, 0.999, again=0.9, code=lit, examined=True)
-    sent = [search_code(belief, spec, radio, sweep, lit=lit).index for _ in range(4)]
-    aimed = aimed_at(blind, spec, radio)
-    np.testing.assert_array_equal(sent, [lit.index, aimed, lit.index, aimed])
+    sent = [search_code(belief, spec, radio, sweep, lit=lit).index for _ in range(6)]
+    aimed, beams = aimed_at(blind, spec, radio), sweep_codes(spec, radio.wavelength)
+    np.testing.assert_array_equal(sent, [lit.index, aimed, beams[0], lit.index, aimed, beams[1]])
     for again, code in ((0.6, aimed), (0.4, lit.index)):  # half of its places are lit by an aimed code
         half = np.where((np.arange(12) < 6)[:, None], PLACE, PLACE + np.array([0.0, 0.0, -9.0]))
         fresh = with_candidate(blind, 0.999, again=1.0 - again, code=lit, samples=half)
@@ -193,3 +193,15 @@ def test_a_candidate_on_the_agent_or_behind_the_panel_is_not_aimed_at(blind, mak
         assert code.min() >= 0
         if place is not blind.position:
             np.testing.assert_array_equal(code, beams[0])
+
+
+def test_what_something_hides_is_not_asked_for(blind, make_spec, radio, rng):
+    """By hand: `p clear again = (1 - p) / beams` at the limit, and no two codes count together."""
+    spec, again, lit = make_spec(), 0.6, RisCode(rng.integers(4, size=(6, 6)), 4)
+    beams = sweep_codes(spec, radio.wavelength)
+    half = np.where((np.arange(12) < 6)[:, None], PLACE, PLACE + np.array([0.0, 0.0, -9.0]))
+    real = 0.5
+    for over, asked in ((1.2, True), (0.8, False)):
+        clear = over * (1.0 - real) / len(beams) / real / again
+        belief = with_candidate(blind, real, samples=half, again=again, code=lit, clear=clear)
+        assert (search_code(belief, spec, radio, BeamSweep(), lit=lit) is lit) == asked

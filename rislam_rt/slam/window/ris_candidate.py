@@ -41,12 +41,10 @@ def weigh_tracks(
     tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, codes: tuple[RisCode | None, ...]
 ) -> WindowTracks:
     """Update of RIS candidates by this cycle's amplitude or missed detection under the phase codes (K,) up to now: each
-    track's odds of being a panel, were it a point heard over no wall, of being real, and of coming straight from a
-    panel.
+    track's odds of being a panel, were it a point heard over no wall, of being real, and of being over no wall.
 
-    What comes straight from a panel, over no wall but on the leg from the Tx, comes from where the panel is: a code
-    aimed along it lights the panel's own path. What comes over a wall is known to be lit by the code that lit it alone,
-    and by others as far as they are like that.
+    The direct path over a panel is lit by what sends its place's direction back. A path over panel and walls is known
+    to be lit by the code that lit it alone, and by others as far as they are like that.
     """
     code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
@@ -64,11 +62,11 @@ def weigh_tracks(
     real, direct = tracks.log_real.copy(), tracks.log_direct.copy()
     may_be = (sight.side[:, None] == PANEL + np.arange(scene.num_panels)) | (sight.side[:, None] == UNTOLD)
     ago, inverse = np.unique(cycle - np.where(sight.seen, tracks.earlier[rows], tracks.last[rows]), return_inverse=True)
+    then = np.where(sight.seen, tracks.earlier_log_amplitude[rows], tracks.log_amplitude[rows])
     likeness = np.stack([_likeness(code, _code_then(codes, int(each)), scene.ris) for each in ago])[inverse]
-    again = np.maximum(_again(tracks, rows, scene.sensor, likeness), CONSTANTS.rare)
+    again = np.maximum(_again(then[:, None] + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
     lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)
-    tells = np.where(sight.seen[:, None], np.log(lit / again), np.log1p(-lit) - np.log1p(-again))
-    direct[rows] += tells.clip(-CONSTANTS.max_log_ratio, CONSTANTS.max_log_ratio)
+    direct[rows] += np.where(sight.seen[:, None], np.log(lit / again), np.log1p(-lit) - np.log1p(-again))
     real[rows] += np.where(sight.seen, 0.0, np.log1p(-np.where(may_be, again, 1.0).min(axis=1)))
     return after._replace(log_real=real, log_direct=np.clip(direct, -CERTAIN, CERTAIN))
 
@@ -93,11 +91,9 @@ def _likeness(one: RisCode, other: RisCode | None, ris: DataSheet) -> Floats:
     return np.abs([np.exp(2j * np.pi / one.levels * (a.index - b.index)).mean() for a, b in pairs])
 
 
-def _again(tracks: WindowTracks, rows: Integers, sensor: SensorModel, likeness: Floats | None = None) -> Floats:
-    """Probability (R,) that RIS candidates `rows` are heard again as loud as they were; or (R, Q) under codes that send
-    `likeness` (R, Q) of their amplitude their way."""
-    snr = sensor.radio.integrated_snr(np.exp(tracks.log_amplitude[rows]))
-    return CONSTANTS.shown * sensor.detection_probability(snr if likeness is None else snr[:, None] * likeness**2)
+def _again(log_amplitude: Floats, sensor: SensorModel) -> Floats:
+    """Probability (...,) that RIS candidates of log amplitudes (...,) are heard again."""
+    return CONSTANTS.shown * sensor.detection_probability(sensor.radio.integrated_snr(np.exp(log_amplitude)))
 
 
 def find_candidate(
@@ -106,9 +102,10 @@ def find_candidate(
 ) -> PanelCandidate | None:  # fmt: skip
     """Point or track that is the likeliest to be RIS panel number `panel`, or None if there is none.
 
-    A track has to be real, over the panel, and straight from it. One that is not told to be over the panel and seems to
-    come from behind a wall may be a scatterer's mirror image, or the wall ends before: the panel is there as rarely as
-    any new feature behind a wall that is heard (`hypothesis_evidence.log_opacity`).
+    A track has to be real, over the panel, and over no wall besides. One that seems to come from behind a wall may be
+    the panel over that wall, or the wall ends before. What is told to be over the panel is there as rarely as the wall
+    takes power, what is not as rarely as any new feature behind a wall that is heard
+    (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
@@ -123,20 +120,22 @@ def find_candidate(
     over_panel = _against_all(np.concatenate([landmarks.log_ris[points], tracks.log_ris[rows]]), panel)
     direct = np.append(np.full(len(points), CERTAIN), tracks.log_direct[rows, panel])
     is_panel = -np.logaddexp(-over_panel, -direct)
-    is_panel[len(points) :] += CONSTANTS.log_rare * behind * (tracks.side[rows] == UNTOLD)
+    is_panel[len(points) :] += behind * np.where(
+        tracks.side[rows] == UNTOLD, CONSTANTS.log_rare, 2.0 * CONSTANTS.wall_ratio
+    )
     real = np.append(np.full(len(points), CERTAIN), tracks.log_real[rows])
     if not len(real):
         return None
     odds = _log_both(is_panel, real)
-    best, again, code, told, asked = int(np.argmax(odds)), 0.0, None, False, True
+    best, again, code, told, asked, clear = int(np.argmax(odds)), 0.0, None, False, True, 1.0
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
         told, asked = bool(tracks.side[row] == PANEL + panel), bool(0 < tracks.looked[row] <= tracks.hits[row])
         code = _code_then(codes, int(cycle - tracks.last[row]))
-        again = float(_again(tracks, rows[[best - len(points)]], sensor)[0])
+        again, clear = float(_again(tracks.log_amplitude[row], sensor)), 1.0 - float(tracks.hidden[row, panel])
     one, other = scipy.special.expit([real[best], is_panel[best]])
-    return PanelCandidate(places[best], samples[best], float(one), float(other), again, code, told, asked, panel)
+    return PanelCandidate(places[best], samples[best], float(one), float(other), again, code, told, asked, panel, clear)
 
 
 def _against_all(log_ris: Floats, panel: int) -> Floats:

@@ -42,6 +42,8 @@ class WindowTracks(NamedTuple):
     """(T,) cycle of the last one."""
     earlier: Integers
     """(T,) cycle of the one before it; of the last where it is the first."""
+    earlier_log_amplitude: Floats
+    """(T,) of that one."""
     hits: Integers
     """(T,) number of measurements."""
     looked: Integers
@@ -49,7 +51,7 @@ class WindowTracks(NamedTuple):
     log_real: Floats
     """(T,) log odds of being a path that a code of the panel has lit, and not false components one after the other."""
     log_direct: Floats
-    """(T, Q) log odds, were it over each of Q panels, that it comes straight from that, over no wall before the Rx."""
+    """(T, Q) log odds, were it over each of Q panels, that it is over no wall besides."""
     log_grid: Floats
     """(T, G) log posterior of its strength (root of a cross-section), were it a scatterer heard over no wall
     (see `panel_evidence`)."""
@@ -76,8 +78,8 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     """Empty set of tracks, for a room of so many panels."""
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
-        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, none, none, np.zeros(0),
-        np.zeros((0, panels)), *unknown(0, panels), nothing_heard(0), 0,
+        none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, np.zeros(0), none, none,
+        np.zeros(0), np.zeros((0, panels)), *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
 
 
@@ -200,11 +202,20 @@ def extend(tracks: WindowTracks, rows: Integers, observed: Observations, picks: 
     gain = spread[..., 0] / (spread[..., 0, 0] + observed.std[picks] ** 2)[..., None]
     mean[rows] = prior + gain * (observed.seen[picks] - prior[..., 0])[..., None]
     covariance[rows] = spread - gain[..., :, None] * spread[..., None, 0, :]
-    level, hits = tracks.log_amplitude.copy(), tracks.hits.copy()
-    last, earlier = tracks.last.copy(), tracks.earlier.copy()
-    level[rows], earlier[rows], last[rows] = observed.log_amplitude[picks], last[rows], cycle
+    level, last, hits = tracks.log_amplitude.copy(), tracks.last.copy(), tracks.hits.copy()
+    earlier, before = tracks.earlier.copy(), tracks.earlier_log_amplitude.copy()
+    earlier[rows], before[rows] = last[rows], level[rows]
+    level[rows], last[rows] = observed.log_amplitude[picks], cycle
     hits[rows] += 1
-    return tracks._replace(mean=mean, covariance=covariance, log_amplitude=level, last=last, earlier=earlier, hits=hits)
+    return tracks._replace(
+        mean=mean,
+        covariance=covariance,
+        log_amplitude=level,
+        last=last,
+        earlier=earlier,
+        earlier_log_amplitude=before,
+        hits=hits,
+    )
 
 
 def start(
@@ -221,9 +232,9 @@ def start(
     covariance[..., 0, 0], covariance[..., 1, 1] = observed.std[picks] ** 2, rate**2
     fresh = (
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
-        observed.log_amplitude[picks],
-        observed.sides[picks], *np.full((3, count), cycle), np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64), np.zeros(count) + log_real,
+        observed.log_amplitude[picks], observed.sides[picks], *np.full((3, count), cycle),
+        observed.log_amplitude[picks], np.ones(count, dtype=np.int64), np.zeros(count, dtype=np.int64),
+        np.zeros(count) + log_real,
         np.zeros((count, tracks.log_ris.shape[1])), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))

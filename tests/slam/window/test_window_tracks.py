@@ -98,3 +98,15 @@ def test_a_faint_path_keeps_its_track_where_the_motion_is_told(told):
             owners.append(int(state.log.track[at]))
     assert len(set(owners[:8])) == 1 if told == "told" else len(set(owners)) > 8
     assert (-1 in owners) == (told == "told")  # born
+
+
+def test_a_track_keeps_when_and_how_loud_it_was_heard_before():
+    seen = np.array([[5.0, 0.1, 0.2]])
+    heard = Observations(seen, np.full((1, 3), 1e-2), np.array([-3.0]), np.full(1, 0.1), np.ones(1))
+    found, _ = tracks.start(tracks.no_tracks(2), heard, np.array([0]), np.full((1, 3), 0.02), 3)
+    assert (found.last[0], found.earlier[0], found.earlier_log_amplitude[0]) == (3, 3, -3.0)
+    np.testing.assert_array_equal(found.log_direct, np.zeros((1, 2)))
+    for cycle, loud, before, then in ((5, -2.0, 3, -3.0), (6, -1.0, 5, -2.0)):
+        louder = heard._replace(log_amplitude=np.array([loud]))
+        found = tracks.extend(found, np.array([0]), louder, np.array([0]), cycle)
+        assert (found.last[0], found.earlier[0], found.earlier_log_amplitude[0]) == (cycle, before, then)

@@ -64,8 +64,9 @@ def resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Flo
         track[rows] = ident
         fresh.append((
             ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
-            *log.cycle[late[:-3:-1]], len(rows), 0, CERTAIN, np.zeros(tracks.log_ris.shape[1]),
-            *(field[0] for field in unknown(1, tracks.log_ris.shape[1])), nothing_heard(1)[0],
+            *log.cycle[late[:-3:-1]], log.log_amplitude[late[-2]], len(rows), 0, CERTAIN,
+            np.zeros(tracks.log_ris.shape[1]), *(field[0] for field in unknown(1, tracks.log_ris.shape[1])),
+            nothing_heard(1)[0],
         ))  # fmt: skip
         ident += 1
     if not fresh:

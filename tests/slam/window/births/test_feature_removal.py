@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from rislam_rt.slam.predicted_returns import NONE, TX
-from rislam_rt.slam.window.births.feature_removal import features_to_remove
+from rislam_rt.slam.window.births.feature_removal import features_to_remove, resume
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
-from rislam_rt.slam.window.solver_limits import FEWEST
+from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.solver_limits import CERTAIN, FEWEST
+from rislam_rt.slam.window.tracks import no_tracks
 
 
 def _judged(residual, log_odds=(5.0, 5.0), count=FEWEST):
@@ -36,3 +38,23 @@ def test_what_its_measurements_contradict_goes():
 
 def test_what_is_not_there_goes():
     assert _judged(1.0, log_odds=(5.0, -5.0)).tolist() == [False, True]
+
+
+def test_what_is_taken_back_is_a_track_again_as_it_was_heard():
+    """Six returns of one path, 0.1 s apart, that grows by 1 cm a cycle."""
+    count, panels = 6, 2
+    form = np.full((count, 2, 5), NONE)
+    form[:, 0] = [TX, NONE, NONE, 0, NONE]
+    cycle, level = np.array([3, 4, 5, 7, 8, 9]), np.linspace(-3.0, -2.0, count)
+    log = empty_log()._replace(
+        cycle=cycle, seen=np.array([5.0, 0.1, 0.2]) + 0.01 * cycle[:, None] * [1.0, 0.0, 0.0], form=form,
+        std=np.full((count, 3), 1e-3), log_amplitude=level, side=np.zeros(count, dtype=np.int64),
+        track=np.full(count, -1),
+    )  # fmt: skip
+    found, log = resume(no_tracks(panels), log, np.ones(count, dtype=np.bool_), 9, np.full(9, 0.1))
+    assert (found.born[0], found.earlier[0], found.last[0], found.hits[0]) == (3, 8, 9, count)
+    np.testing.assert_allclose([found.earlier_log_amplitude[0], found.log_amplitude[0]], level[-2:])
+    np.testing.assert_allclose(found.mean[0, 0], [5.09, 0.1], atol=1e-9)
+    np.testing.assert_array_equal(found.log_direct, np.zeros((1, panels)))
+    assert found.log_real[0] == CERTAIN
+    assert (log.track == found.ident[0]).all()
