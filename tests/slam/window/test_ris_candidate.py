@@ -31,7 +31,7 @@ from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
 from rislam_rt.slam.predicted_returns import Poses
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
-from rislam_rt.slam.window.landmarks.ris_identification import unknown
+from rislam_rt.slam.window.landmarks.ris_identification import log_silence, unknown
 from rislam_rt.slam.window.ris_candidate import false_density, find_candidate, weigh_tracks
 from rislam_rt.slam.window.tracks import WindowTracks, no_tracks
 
@@ -275,6 +275,37 @@ def test_an_aimed_code_tells_whether_a_track_is_the_direct_path():
         expected.append(expected[-1] + np.log(silence / (1.0 - rare)))
         hidden = before / silence
     np.testing.assert_allclose(over_a_wall[2:5], expected[1:], atol=2e-2)
+    # what a code does not light that lit nothing of it before tells next to nothing of whether it is real
+    scene, aimed, gain = aimed_scene()
+    beam = RisCode((aimed.index + 2 * np.arange(6)) % 4, 4)
+    track = at_place(gain)
+    after = weigh_tracks(track, 1, poses(), scene, (beam, aimed))
+    np.testing.assert_allclose(after.log_real - track.log_real, np.log1p(-rare))
+
+
+def test_silence_of_a_panel_is_by_its_gain_and_by_what_may_hide_it():
+    """By hand: a path at the threshold is missed half the time, by noise of its own; a strong one as it is merged."""
+    radio, rare = SENSOR.radio, CONSTANTS.rare
+    level = np.sqrt(SENSOR.threshold / float(radio.integrated_snr(np.ones(()))))
+    gain = level * np.array([[[1.0], [10.0], [0.1]], [[10.0], [1.0], [10.0]]])
+    hidden = np.array([[0.5, 0.0, 0.9], [0.0, 0.5, 0.9], [0.0, 0.2, 0.9]])
+    found = np.exp(log_silence(gain, hidden, SENSOR))
+    heard = CONSTANTS.shown * np.array([[0.5, 1.0, 0.0], [1.0, 0.5, 1.0]]).T
+    before = hidden[:, :2] + rare * (1.0 - hidden[:, :2])
+    np.testing.assert_allclose(found, 1.0 - (1.0 - before) * heard, atol=0.05)
+
+
+def test_a_point_of_the_map_is_over_no_wall():
+    """Beside a track with the same odds against a scatterer it is the likelier one: the track may be over a wall."""
+    place = np.array([4.0, 4.0, 2.5])
+    landmarks = enter(empty_table(1), False, HERE, 9, 5.0, unknown(1, 1))
+    landmarks = landmarks._replace(log_ris=np.array([[0.0]]))
+    mean = np.concatenate([HERE, np.zeros(4), place])
+    track = tracks_at(np.array([[1.0, 3.0, 2.5]]), [0.0])._replace(log_direct=np.zeros((1, 1)))
+    found = find_candidate(track, landmarks, mean, CYCLE, poses(), CODES, SENSOR)
+    assert found is not None
+    np.testing.assert_allclose(found.position, place)
+    np.testing.assert_allclose(found.is_panel, 0.5)
 
 
 @pytest.mark.parametrize("turned", [1, 2, 3])
@@ -300,6 +331,7 @@ def test_what_is_heard_under_a_code_unlike_the_one_that_lit_it_is_the_direct_pat
     np.testing.assert_array_equal(other.log_direct, 0.0)
     blind = weigh_tracks(track, 4, poses(), scene, (*(beam,) * 4, None))
     np.testing.assert_array_equal(blind.log_direct, 0.0)
+    assert (blind.log_grid != track.log_grid).any()
 
 
 def test_each_track_is_asked_by_the_code_that_lit_it():
@@ -308,13 +340,13 @@ def test_each_track_is_asked_by_the_code_that_lit_it():
     snr = 12.0
     loud = np.log(np.sqrt(snr / SENSOR.radio.integrated_snr(np.ones(()))))
     fields = [np.repeat(field, 4, axis=0) for field in one[:-1]]
-    ago = np.array([2, 3, 4, len(CODES)])
+    ago = np.array([len(CODES), 3, 2, 4])
     four = WindowTracks._make([*fields, 4])._replace(last=CYCLE - ago, log_amplitude=np.full(4, loud))
     scene = KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True)
     after = weigh_tracks(four, CYCLE, poses(), scene, CODES)
     missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
     unlike = np.log1p(-CONSTANTS.rare)
-    np.testing.assert_allclose(after.log_real, 3.0 + np.array([missed, unlike, unlike, unlike]))
+    np.testing.assert_allclose(after.log_real, 3.0 + np.array([unlike, unlike, missed, unlike]))
 
 
 def test_a_candidate_is_no_scatterer_and_over_no_wall():
