@@ -90,7 +90,7 @@ class PanelCandidate(NamedTuple):
     panel: int = 0
     """Number of the RIS panel that it may be."""
     clear: float = 1.0
-    """Probability that nothing hides it."""
+    """Probability that nothing hides it in the next cycle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

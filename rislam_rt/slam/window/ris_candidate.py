@@ -63,10 +63,13 @@ def weigh_tracks(
     may_be = (sight.side[:, None] == PANEL + np.arange(scene.num_panels)) | (sight.side[:, None] == UNTOLD)
     ago, inverse = np.unique(cycle - np.where(sight.seen, tracks.earlier[rows], tracks.last[rows]), return_inverse=True)
     then = np.where(sight.seen, tracks.earlier_log_amplitude[rows], tracks.log_amplitude[rows])
-    likeness = np.stack([_likeness(code, _code_then(codes, int(each)), scene.ris) for each in ago])[inverse]
+    before_now = [_code_then(codes, int(each)) for each in ago]
+    known = np.array([each is not None for each in before_now])[inverse]
+    likeness = np.stack([_likeness(code, each, scene.ris) for each in before_now])[inverse]
     again = np.maximum(_again(then[:, None] + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
     lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)
-    direct[rows] += np.where(sight.seen[:, None], np.log(lit / again), np.log1p(-lit) - np.log1p(-again))
+    tells = np.where(sight.seen[:, None], np.log(lit / again), np.log1p(-lit) - np.log1p(-again))
+    direct[rows] += np.where(known[:, None], tells, 0.0)
     real[rows] += np.where(sight.seen, 0.0, np.log1p(-np.where(may_be, again, 1.0).min(axis=1)))
     return after._replace(log_real=real, log_direct=np.clip(direct, -CERTAIN, CERTAIN))
 
@@ -126,16 +129,20 @@ def find_candidate(
     real = np.append(np.full(len(points), CERTAIN), tracks.log_real[rows])
     if not len(real):
         return None
-    odds = _log_both(is_panel, real)
-    best, again, code, told, asked, clear = int(np.argmax(odds)), 0.0, None, False, True, 1.0
+    hidden = tracks.hidden[rows, panel]
+    clear = np.append(np.ones(len(points)), CONSTANTS.cleared * hidden + (1.0 - CONSTANTS.rare) * (1.0 - hidden))
+    best = int(np.argmax(_log_both(is_panel, real) + np.log(clear)))
+    again, code, told, asked = 0.0, None, False, True
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
         told, asked = bool(tracks.side[row] == PANEL + panel), bool(0 < tracks.looked[row] <= tracks.hits[row])
         code = _code_then(codes, int(cycle - tracks.last[row]))
-        again, clear = float(_again(tracks.log_amplitude[row], sensor)), 1.0 - float(tracks.hidden[row, panel])
-    one, other = scipy.special.expit([real[best], is_panel[best]])
-    return PanelCandidate(places[best], samples[best], float(one), float(other), again, code, told, asked, panel, clear)
+        again = float(_again(tracks.log_amplitude[row], sensor))
+    one, other = float(scipy.special.expit(real[best])), float(scipy.special.expit(is_panel[best]))
+    return PanelCandidate(
+        places[best], samples[best], one, other, again, code, told, asked, panel, float(clear[best])
+    )  # fmt: skip
 
 
 def _against_all(log_ris: Floats, panel: int) -> Floats:

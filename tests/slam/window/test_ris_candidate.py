@@ -13,16 +13,15 @@ from rislam_rt.design.beam_sweep import BeamSweep, search_code
 from rislam_rt.model import (
     Body,
     Measurement,
-    PanelCandidate,
     RadioConfig,
     RisCode,
     RisSpec,
     RisSpecs,
     SensorModel,
-    SlamEstimate,
     empty_map,
     join_codes,
-)  # fmt: skip
+)
+from rislam_rt.model.estimate import PanelCandidate, SlamEstimate
 from rislam_rt.ris import leg_response
 from rislam_rt.ris.path_gain import panel_path_gain
 from rislam_rt.slam import SlamConfig, StartPrior
@@ -347,6 +346,7 @@ def test_each_track_is_asked_by_the_code_that_lit_it():
     missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
     unlike = np.log1p(-CONSTANTS.rare)
     np.testing.assert_allclose(after.log_real, 3.0 + np.array([unlike, unlike, missed, unlike]))
+    assert after.log_direct[0, 0] == four.log_direct[0, 0]
 
 
 def test_a_candidate_is_no_scatterer_and_over_no_wall():
@@ -371,7 +371,11 @@ def test_a_candidate_carries_how_likely_it_is_heard_again_and_what_may_hide_it()
     found = best(both._replace(log_amplitude=loud, hidden=np.array([[0.1, 0.2], [0.3, 0.4]])))
     assert found is not None
     np.testing.assert_allclose(found.again, CONSTANTS.shown * SENSOR.detection_probability(12.0))
-    np.testing.assert_allclose(found.clear, 0.7)
+    np.testing.assert_allclose(found.clear, 0.3 * CONSTANTS.cleared + 0.7 * (1.0 - CONSTANTS.rare))
+    # what is hidden for sure gives way to what is less likely, and heard
+    found = best(both._replace(log_amplitude=loud, hidden=np.array([[0.0, 0.2], [1.0, 0.4]])))
+    assert found is not None
+    np.testing.assert_allclose(found.again, CONSTANTS.shown * SENSOR.detection_probability(40.0))
 
 
 def test_what_was_aimed_at_in_vain_gives_way_to_the_sweep():
