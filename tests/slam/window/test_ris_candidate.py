@@ -39,8 +39,7 @@ CYCLE = 40
 SENSOR = SensorModel(RadioConfig(), false_alarms=2.0)
 SHEET = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
 ACROSS = [np.array([[0, 0], [0, 0]]), np.array([[0, 2], [0, 2]]), np.array([[0, 0], [2, 2]])]
-CODES = tuple(RisCode(ACROSS[index], 4) for index in (0, 1, 2, 2, 2))
-"""Three codes of which none lights what another one does, the last for three cycles."""
+CODES = tuple(RisCode(ACROSS[index], 4) for index in (0, 1, 2, 2, 2))  # none lights what another one does
 
 
 def poses() -> Poses:
@@ -341,8 +340,7 @@ def test_each_track_is_asked_by_the_code_that_lit_it():
     fields = [np.repeat(field, 4, axis=0) for field in one[:-1]]
     ago = np.array([len(CODES), 3, 2, 4])
     four = WindowTracks._make([*fields, 4])._replace(last=CYCLE - ago, log_amplitude=np.full(4, loud))
-    scene = KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True)
-    after = weigh_tracks(four, CYCLE, poses(), scene, CODES)
+    after = weigh_tracks(four, CYCLE, poses(), KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True), CODES)
     missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
     unlike = np.log1p(-CONSTANTS.rare)
     np.testing.assert_allclose(after.log_real, 3.0 + np.array([unlike, unlike, missed, unlike]))
@@ -381,7 +379,7 @@ def test_a_candidate_carries_how_likely_it_is_heard_again_and_what_may_hide_it()
 def test_what_was_aimed_at_in_vain_gives_way_to_the_sweep():
     """A track that is surely real and over the panel, silent under codes aimed at it: soon a beam is sent."""
     scene, aimed, gain = aimed_scene()
-    beam, sweep, codes, kinds = RisCode((aimed.index + 2 * np.arange(6)) % 4, 4), BeamSweep(), [], []
+    beam, sweep, kinds = RisCode((aimed.index + 2 * np.arange(6)) % 4, 4), BeamSweep(), []
     codes, track = [beam], at_place(gain)._replace(log_ris=np.array([[12.0]]), hits=np.array([2]))
     mean, belief = np.concatenate([HERE, np.zeros(4)]), make_estimate()
     for cycle in range(1, 12):
