@@ -106,8 +106,8 @@ def find_candidate(
     """Point or track that is the likeliest to be RIS panel number `panel`, or None if there is none.
 
     A track has to be real, over the panel, and over no wall besides. One that seems to come from behind a wall may be
-    the panel over that wall, or the wall ends before. What is told to be over the panel is there as rarely as the wall
-    takes power, what is not as rarely as any new feature behind a wall that is heard
+    the panel over that wall, or the wall ends before. What is told to be over the panel counts there by the share of
+    power that a wall leaves (`wall_ratio`), what is not by how rare any new feature behind a wall that is heard is
     (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
