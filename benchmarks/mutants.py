@@ -182,8 +182,8 @@ MUTANTS = (
     ),
     Mutant(
         "the receiver mirrors a cosine", "measurement/waveform_receiver.py",
-        "clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))",
-        "clip_to_unit_disc(unmirrored(parameters[:, 1:] * [1.0, -1.0], radio))",
+        "unmirrored(parameters[:, 1:], gain, radio)",
+        "unmirrored(parameters[:, 1:] * [1.0, -1.0], gain, radio)",
         (
             "measurement/test_known_paths.py",
             "measurement/test_variance_inflation.py",

@@ -111,19 +111,40 @@ def _leak_odds(
 ) -> Floats:
     """Odds (N, S) of each component for being the leak of each of another capture's sources, against a path of its own,
     for the panel's probability."""
-    array = radio.array
-    cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
-    gap = found.points[:, None] - sources.points
-    variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2
-    place = np.prod(np.exp(-0.5 * gap**2 / variance) / np.sqrt(2.0 * np.pi * variance) * cell, axis=-1)
-    row, source = np.nonzero(place > NOWHERE)
+    place, aliased = _place_densities(found, sources, radio)
+    row, source = np.nonzero(place + aliased > NOWHERE)
     expected = sources.gain[:, None] * factors
     spacing = np.abs(np.gradient(expected, axis=1))
     width = (MIXTURE * np.abs(expected)) ** 2 + spacing**2 / 6.0
     spread = found.gain_std[row, None] ** 2 + width[source]
-    miss = np.abs(found.gain[row, None] - expected[source]) ** 2
-    leak = (np.exp(-miss / spread) / (np.pi * spread)) @ _shifts(factors.shape[-1])[1]
+    leak, turned = (
+        (np.exp(-(np.abs(found.gain[row, None] - sign * expected[source]) ** 2) / spread) / (np.pi * spread))
+        @ _shifts(factors.shape[-1])[1]
+        for sign in (1.0, -1.0)
+    )
     own = DENSITY / (2.0 * np.pi * DYNAMIC_RANGE * np.abs(found.gain) ** 2)
     odds = np.zeros(place.shape)
-    odds[row, source] = place[row, source] * leak / own[row]
+    odds[row, source] = (place[row, source] * leak + aliased[row, source] * turned) / own[row]
     return odds
+
+
+def _place_densities(
+    found: ReportedComponents, sources: ReportedComponents, radio: RadioConfig
+) -> tuple[Floats, Floats]:
+    """Densities (N, S) per cell of the place of each component, were it the leak of each source, with the source's gain
+    and with the opposite one, for the panel's probability: at the rim of the unit disc a path may be found at the
+    opposite rim (`RxArray.mirrored_signs`)."""
+    array = radio.array
+    gap = found.points[:, None] - sources.points
+    cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
+    variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2
+    scale, period = cell / np.sqrt(2.0 * np.pi * variance), np.array([0.0, 1.0, 1.0]) / array.spacing
+    here, beyond = (
+        scale * sum(np.exp(-0.5 * (gap + turn * period) ** 2 / variance) for turn in turns)
+        for turns in ((0.0,), (-1.0, 1.0))
+    )
+    delay, (u, v), (far_u, far_v) = here[..., 0], np.moveaxis(here[..., 1:], -1, 0), np.moveaxis(beyond[..., 1:], -1, 0)
+    turned_u, turned_v = array.mirrored_signs < 0.0
+    same_u, other_u = (u, far_u) if turned_u else (u + far_u, 0.0)
+    same_v, other_v = (v, far_v) if turned_v else (v + far_v, 0.0)
+    return delay * (same_u * same_v + other_u * other_v), delay * (same_u * other_v + other_u * same_v)

@@ -7,7 +7,7 @@ believes the bound alone is sure of what is wrong.
 import numpy as np
 import scipy
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Complexes, Floats
 from rislam_rt.model import RadioConfig
 
 PEAK_EXCESS = 2.5
@@ -46,12 +46,13 @@ def crowding(parameters: Floats, threshold: float, radio: RadioConfig) -> Floats
     return factor
 
 
-def unmirrored(cosines: Floats, radio: RadioConfig) -> Floats:
+def unmirrored(cosines: Floats, gain: Complexes, radio: RadioConfig) -> tuple[Floats, Complexes]:
     """Direction cosines (N, 2) whose variance is inflated, those outside the unit disc moved into it by an array's
-    period (grating lobe)."""
-    period = 1.0 / radio.array.spacing
+    period (grating lobe), and the complex gains (N,) of their paths there."""
     outside = np.linalg.norm(cosines, axis=-1, keepdims=True) > 1.0
-    return np.where(outside, cosines - period * np.round(cosines / period), cosines)
+    periods = np.where(outside, np.round(cosines * radio.array.spacing), 0.0)
+    turned = np.where(periods % 2.0 == 1.0, radio.array.mirrored_signs, 1.0).prod(axis=-1)
+    return cosines - periods / radio.array.spacing, gain * turned
 
 
 def mirror_variance(cosines: Floats, deviation: Floats, radio: RadioConfig) -> Floats:

@@ -169,7 +169,8 @@ def _find(one: Capture, radio: RadioConfig, config: ReceiverConfig, known: Float
     samples = one.samples / np.sqrt(one.noise_psd)
     fit = estimate_paths(sounding, grid, samples, threshold, window, config.max_components, known)
     parameters, gain, deviation, amplitude_std = _resolved(fit, one.samples.size, radio)
-    cosines = clip_to_unit_disc(unmirrored(parameters[:, 1:], radio))
+    inside, gain = unmirrored(parameters[:, 1:], gain, radio)
+    cosines = clip_to_unit_disc(inside)
     variance = deviation**2 * peak_bias(np.abs(gain) ** 2 * one.samples.size)[:, None]
     variance *= crowding(parameters, threshold, radio)
     mirrored = mirror_variance(cosines, np.sqrt(variance[:, 1:]), radio)

@@ -80,6 +80,13 @@ class RxArray:
         """Number L of antennas of the radio's receive array."""
         return self.rows * self.cols
 
+    @property
+    def mirrored_signs(self) -> Floats:
+        """Factors (2,) of a path's gain at the middle of the radio's array, were its cosine along each axis told
+        1 / `spacing` away, where the array hears it alike: the middle of an even number of antennas lies half a
+        spacing from the next one."""
+        return np.where(np.array([self.rows, self.cols]) % 2 == 0, -1.0, 1.0)
+
     def receives(self, height: Floats, margin: float = 0.0) -> Booleans:
         """Whether the radio's array receives rays from cosines `height` (...,) to its boresight, to `margin` below its
         plane."""

@@ -70,11 +70,27 @@ def test_neighbours_count_along_the_axis_on_which_they_pull():
 
 
 def test_directions_outside_the_sky_come_back_on_the_other_side():
-    assert unmirrored(np.array([[1.02, 0.1], [0.9, 0.1], [0.0, -1.01]]), RADIO) == pytest.approx(
-        np.array([[-0.98, 0.1], [0.9, 0.1], [0.0, 0.99]])
-    )
+    outside = np.array([[1.02, 0.1], [0.9, 0.1], [0.0, -1.01], [1.02, -1.03]])
+    inside, _ = unmirrored(outside, np.ones(4, dtype=complex), RADIO)
+    assert inside == pytest.approx(np.array([[-0.98, 0.1], [0.9, 0.1], [0.0, 0.99], [-0.98, 0.97]]))
     fine = RadioConfig(array=RxArray(spacing=0.4))  # no second direction with the same samples
-    assert unmirrored(np.array([[1.02, 0.1]]), fine) == pytest.approx(np.array([[1.02, 0.1]]))
+    inside, gain = unmirrored(outside[:1], np.ones(1, dtype=complex), fine)
+    assert inside == pytest.approx(outside[:1])
+    assert gain == 1.0
+
+
+@pytest.mark.parametrize(("rows", "cols"), [(4, 4), (3, 4), (4, 3), (5, 3)])
+def test_gains_of_directions_that_come_back_make_the_same_signal(rows: int, cols: int) -> None:
+    """Samples at the antennas of what lies outside the unit disc, and of the same path told inside."""
+    radio = RadioConfig(array=RxArray(rows=rows, cols=cols))
+    antennas = radio.array.positions(1.0)[:, :2]
+    outside, gain = np.array([[1.02, 0.1], [0.0, -1.01], [-1.02, 1.03], [0.3, 0.2]]), np.exp(1j * np.arange(4.0))
+    inside, there = unmirrored(outside, gain, radio)
+    samples, again = (
+        amplitude[:, None] * np.exp(2j * np.pi * cosines @ antennas.T)
+        for cosines, amplitude in ((outside, gain), (inside, there))
+    )
+    np.testing.assert_allclose(again, samples, atol=1e-12)
 
 
 def test_doubt_is_even_on_the_horizon_and_gone_above_it():
