@@ -41,10 +41,11 @@ def weigh_tracks(
     tracks: WindowTracks, cycle: int, poses: Poses, scene: KnownEnvironment, codes: tuple[RisCode | None, ...]
 ) -> WindowTracks:
     """Update of RIS candidates by this cycle's amplitude or missed detection under the phase codes (K,) up to now: each
-    track's odds of being a panel, were it a point heard over no wall, of being real, and of being over no wall.
+    track's odds of being a panel, were it a point heard over no wall, of being real, of being over no wall, and of
+    being a leak.
 
     The direct path over a panel is lit by what sends its place's direction back. A path over panel and walls is known
-    to be lit by the code that lit it alone, and by others as far as they are like that.
+    to be lit by the code that lit it alone, and by others as far as they are like that. A leak is heard under any code.
     """
     code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
@@ -59,19 +60,21 @@ def weigh_tracks(
     after = tracks._replace(**tracks.identity.put(rows, fresh.clipped())._asdict())
     if gain is None or code is None:
         return after
-    real, direct = tracks.log_real.copy(), tracks.log_direct.copy()
+    real, direct, leak = tracks.log_real.copy(), tracks.log_direct.copy(), tracks.log_leak.copy()
     may_be = (sight.side[:, None] == PANEL + np.arange(scene.num_panels)) | (sight.side[:, None] == UNTOLD)
     ago, inverse = np.unique(cycle - np.where(sight.seen, tracks.earlier[rows], tracks.last[rows]), return_inverse=True)
-    then = np.where(sight.seen, tracks.earlier_log_amplitude[rows], tracks.log_amplitude[rows])
+    then = np.where(sight.seen, tracks.earlier_log_amplitude[rows], tracks.log_amplitude[rows])[:, None]
     before_now = [_code_then(codes, int(each)) for each in ago]
     known = np.array([each is not None for each in before_now])[inverse]
     likeness = np.stack([_likeness(code, each, scene.ris) for each in before_now])[inverse]
-    again = np.maximum(_again(then[:, None] + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
+    always = np.maximum(_again(then, scene.sensor), CONSTANTS.rare)
+    again = np.maximum(_again(then + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
     lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)
-    tells = np.where(sight.seen[:, None], np.log(lit / again), np.log1p(-lit) - np.log1p(-again))
-    direct[rows] += np.where(known[:, None], tells, 0.0)
+    for odds, one, other in ((direct, lit, again), (leak, always, lit)):
+        tells = np.where(sight.seen[:, None], np.log(one / other), np.log1p(-one) - np.log1p(-other))
+        odds[rows] = np.clip(odds[rows] + np.where(known[:, None], tells, 0.0), -CERTAIN, CERTAIN)
     real[rows] += np.where(sight.seen, 0.0, np.log1p(-np.where(may_be, again, 1.0).min(axis=1)))
-    return after._replace(log_real=real, log_direct=np.clip(direct, -CERTAIN, CERTAIN))
+    return after._replace(log_real=real, log_direct=direct, log_leak=leak)
 
 
 def _places(tracks: WindowTracks, rows: Integers, poses: Poses) -> Floats:
@@ -105,10 +108,10 @@ def find_candidate(
 ) -> PanelCandidate | None:  # fmt: skip
     """Point or track that is the likeliest to be RIS panel number `panel`, or None if there is none.
 
-    A track has to be real, over the panel, and over no wall besides. One that seems to come from behind a wall may be
-    the panel over that wall, or the wall ends before. What is told to be over the panel counts there by the share of
-    power that a wall leaves (`wall_ratio`), what is not by how rare any new feature behind a wall that is heard is
-    (`hypothesis_evidence.log_opacity`).
+    A track has to be real, over the panel, over no wall besides, and no leak. One that seems to come from behind a wall
+    may be the panel over that wall, or the wall ends before. What is told to be over the panel counts there by the
+    share of power that a wall leaves (`wall_ratio`), what is not by how rare any new feature behind a wall that is
+    heard is (`hypothesis_evidence.log_opacity`).
     """
     features, walls = mean[HEAD:].reshape(-1, 3), landmarks.walls
     points = landmarks.points[~np.isin(landmarks.points, landmarks.panels)]  # what is another panel is not this one
@@ -122,26 +125,27 @@ def find_candidate(
     places = np.concatenate([features[points], places])
     over_panel = _against_all(np.concatenate([landmarks.log_ris[points], tracks.log_ris[rows]]), panel)
     direct = np.append(np.full(len(points), CERTAIN), tracks.log_direct[rows, panel])
-    is_panel = -np.logaddexp(-over_panel, -direct)
-    is_panel[len(points) :] += behind * np.where(
-        tracks.side[rows] == UNTOLD, CONSTANTS.log_rare, 2.0 * CONSTANTS.wall_ratio
-    )
+    told = np.append(np.zeros(len(points), dtype=np.bool_), tracks.side[rows] == PANEL + panel)
+    leak = np.where(told, np.append(np.zeros(len(points)), tracks.log_leak[rows, panel]), -np.inf)
+    is_panel = -np.logaddexp.reduce([-over_panel, -direct, leak])
+    in_front = np.where(told, 2.0 * CONSTANTS.wall_ratio, CONSTANTS.log_rare)[len(points) :]
+    is_panel[len(points) :] += behind * in_front
     real = np.append(np.full(len(points), CERTAIN), tracks.log_real[rows])
     if not len(real):
         return None
     hidden = tracks.hidden[rows, panel]
     clear = np.append(np.ones(len(points)), CONSTANTS.cleared * hidden + (1.0 - CONSTANTS.rare) * (1.0 - hidden))
     best = int(np.argmax(_log_both(is_panel, real) + np.log(clear)))
-    again, code, told, asked = 0.0, None, False, True
+    again, code, asked = 0.0, None, True
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
-        told, asked = bool(tracks.side[row] == PANEL + panel), bool(0 < tracks.looked[row] <= tracks.hits[row])
+        asked = bool(0 < tracks.looked[row] == tracks.hits[row])
         code = _code_then(codes, int(cycle - tracks.last[row]))
         again = float(_again(tracks.log_amplitude[row], sensor))
     one, other = float(scipy.special.expit(real[best])), float(scipy.special.expit(is_panel[best]))
     return PanelCandidate(
-        places[best], samples[best], one, other, again, code, told, asked, panel, float(clear[best])
+        places[best], samples[best], one, other, again, code, bool(told[best]), asked, panel, float(clear[best])
     )  # fmt: skip
 
 

@@ -52,6 +52,9 @@ class WindowTracks(NamedTuple):
     """(T,) log odds of being a path that a code of the panel has lit, and not false components one after the other."""
     log_direct: Floats
     """(T, Q) log odds, were it over each of Q panels, that it is over no wall besides."""
+    log_leak: Floats
+    """(T, Q) log odds that it leaks, a path over no panel that is told for each of Q panels' under any code, against
+    that panel's direct path."""
     log_grid: Floats
     """(T, G) log posterior of its strength (root of a cross-section), were it a scatterer heard over no wall
     (see `panel_evidence`)."""
@@ -79,8 +82,14 @@ def no_tracks(panels: int = 1) -> WindowTracks:
     none = np.zeros(0, dtype=np.int64)
     return WindowTracks(
         none, np.zeros((0, 3, 2)), np.zeros((0, 3, 2, 2)), np.zeros(0), none, none, none, none, np.zeros(0), none, none,
-        np.zeros(0), np.zeros((0, panels)), *unknown(0, panels), nothing_heard(0), 0,
+        np.zeros(0), *unlike(0, panels), *unknown(0, panels), nothing_heard(0), 0,
     )  # fmt: skip
+
+
+def unlike(count: int, panels: int = 1) -> tuple[Floats, Floats]:
+    """Log odds (T, Q) of so many new tracks of being a panel's direct path, and of being a leak: the first is as likely
+    as not, and a leak is rare."""
+    return np.zeros((count, panels)), np.full((count, panels), CONSTANTS.log_rare)
 
 
 def advance(tracks: WindowTracks, dt: float, turn: float, bend: Floats, velocity: Floats) -> WindowTracks:
@@ -234,8 +243,8 @@ def start(
         ident, np.stack([observed.seen[picks], np.zeros((count, 3))], axis=-1), covariance,
         observed.log_amplitude[picks], observed.sides[picks], *np.full((3, count), cycle),
         observed.log_amplitude[picks], np.ones(count, dtype=np.int64), np.zeros(count, dtype=np.int64),
-        np.zeros(count) + log_real,
-        np.zeros((count, tracks.log_ris.shape[1])), *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
+        np.zeros(count) + log_real, *unlike(count, tracks.log_ris.shape[1]),
+        *unknown(count, tracks.log_ris.shape[1]), nothing_heard(count),
     )  # fmt: skip
     joined = (np.concatenate(pair) for pair in zip(tracks[:-1], fresh, strict=True))
     return WindowTracks._make([*joined, tracks.next_ident + count]), ident

@@ -1,66 +1,29 @@
 """RIS candidates: which track or point the phase design aims at while no panel is known."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
+from lit_candidates import ACROSS, CODES, CYCLE, HERE, SENSOR, SHEET, poses, tracks_at
 
 from rislam_rt import slam
 from rislam_rt.arrays import Floats
 from rislam_rt.constants import SPEED_OF_LIGHT
-from rislam_rt.design import exact_code
-from rislam_rt.design.beam_sweep import BeamSweep, search_code
 from rislam_rt.model import (
     Body,
     Measurement,
-    RadioConfig,
     RisCode,
     RisSpec,
     RisSpecs,
     SensorModel,
-    empty_map,
     join_codes,
 )
-from rislam_rt.model.estimate import PanelCandidate, SlamEstimate
-from rislam_rt.ris import leg_response
-from rislam_rt.ris.path_gain import panel_path_gain
+from rislam_rt.model.estimate import PanelCandidate
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD, Observations
-from rislam_rt.slam.predicted_returns import Poses
+from rislam_rt.slam.observations import PANEL, UNTOLD, Observations
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable, empty_table, enter
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import log_silence, unknown
 from rislam_rt.slam.window.ris_candidate import false_density, find_candidate, weigh_tracks
-from rislam_rt.slam.window.tracks import WindowTracks, no_tracks
-
-HERE = np.array([2.0, 2.0, 1.0])
-CYCLE = 40
-SENSOR = SensorModel(RadioConfig(), false_alarms=2.0)
-SHEET = RisSpec(2, 2, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
-ACROSS = [np.array([[0, 0], [0, 0]]), np.array([[0, 2], [0, 2]]), np.array([[0, 0], [2, 2]])]
-CODES = tuple(RisCode(ACROSS[index], 4) for index in (0, 1, 2, 2, 2))  # none lights what another one does
-
-
-def poses() -> Poses:
-    return Poses(HERE, HERE, np.array(0.0))
-
-
-def tracks_at(places: Floats, log_odds: list[float], hits: int = 3, log_real: float = 30.0) -> WindowTracks:
-    """Tracks of the last cycle that come from places (T, 3), with log odds of being a panel and of being real."""
-    count, empty, span = len(places), no_tracks(1), places - HERE
-    length = 2.0 * np.linalg.norm(span, axis=1)
-    mean = np.zeros((count, 3, 2))
-    mean[:, 0, 0], mean[:, 1:, 0] = length, span[:, :2] / np.linalg.norm(span, axis=1)[:, None]
-    whole = np.full(count, CYCLE)
-    fields = {name: np.zeros((count, *getattr(empty, name).shape[1:])) for name in ("log_grid", "hidden", "rises")}
-    return empty._replace(
-        ident=np.arange(count), mean=mean, covariance=np.zeros((count, 3, 2, 2)), log_amplitude=np.zeros(count),
-        side=whole * 0 + PANEL, born=whole - hits, last=whole, earlier=whole,
-        earlier_log_amplitude=np.zeros(count), hits=whole * 0 + hits, looked=whole * 0,
-        log_ris=np.array(log_odds)[:, None], log_real=np.full(count, log_real),
-        log_direct=np.full((count, 1), 30.0), next_ident=count, **fields,
-    )  # fmt: skip
+from rislam_rt.slam.window.tracks import WindowTracks
 
 
 def best(tracks: WindowTracks, walls: list[Floats] | None = None) -> PanelCandidate | None:
@@ -113,18 +76,6 @@ def test_candidates_carry_the_code_that_lit_them():
         assert found.code is code
 
 
-def test_silence_under_the_code_that_lit_it_tells_against_a_candidate_and_under_another_one_does_not():
-    scene = KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True)
-    before = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)
-    snr = 12.0
-    loud = np.log(np.sqrt(snr / SENSOR.radio.integrated_snr(np.ones(()))))
-    before = before._replace(log_amplitude=np.array([loud]), log_grid=unknown(1).log_grid)
-    missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
-    for ago, change in ((0, 0.0), (2, missed), (3, np.log1p(-CONSTANTS.rare))):
-        after = weigh_tracks(before._replace(last=before.last - ago), CYCLE, poses(), scene, CODES)
-        np.testing.assert_allclose(after.log_real, 3.0 + change)
-
-
 def test_of_several_panels_the_part_that_lit_it_counts():
     """A track that is told for the second panel; of both, one that is not told."""
     normal, up, spacing = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]), np.array([0.015, 0.015])
@@ -134,7 +85,7 @@ def test_of_several_panels_the_part_that_lit_it_counts():
     track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)
     track = track._replace(
         last=track.last - 2, log_grid=unknown(1).log_grid, log_ris=np.zeros((1, 2)), hidden=np.zeros((1, 3)),
-        log_direct=np.zeros((1, 2)),
+        log_direct=np.zeros((1, 2)), log_leak=np.full((1, 2), -np.inf),
     )  # fmt: skip
     for side, falls in ((PANEL + 1, True), (PANEL, False), (UNTOLD, False)):
         after = weigh_tracks(track._replace(side=np.array([side])), CYCLE, poses(), scene, codes)
@@ -143,7 +94,7 @@ def test_of_several_panels_the_part_that_lit_it_counts():
 
 def test_one_track_is_not_two_panels_at_a_time():
     track = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0])._replace(
-        log_ris=np.array([[5.0, 5.0]]), log_direct=np.full((1, 2), 30.0)
+        log_ris=np.array([[5.0, 5.0]]), log_direct=np.full((1, 2), 30.0), log_leak=np.full((1, 2), -np.inf)
     )
     mean = np.concatenate([HERE, np.zeros(4)])
     for side, panels in ((UNTOLD, (0, 1)), (PANEL + 1, (1,))):
@@ -221,66 +172,6 @@ def test_the_filter_follows_how_likely_its_tracks_are_real():
         assert suspect.code is code
 
 
-SIX = RisSpec(6, 6, np.array([0.015, 0.015]), np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0]))
-PLACE = HERE + np.array([1.0, 0.7, 2.0])
-
-
-def aimed_scene() -> tuple[KnownEnvironment, RisCode, float]:
-    """What is told of a panel of 6 x 6, the code aimed at `PLACE`, and the amplitude under it: an SNR of 40."""
-    leg = leg_response(SIX, PLACE[None], HERE, np.ones(1, dtype=np.complex128), SENSOR.radio.wavelength)
-    index, _ = exact_code((leg**2).reshape(1, -1), SIX.levels)
-    aimed = RisCode(index.reshape(6, 6), SIX.levels)
-    gain = np.abs(panel_path_gain(SIX, aimed, PLACE[None], HERE, HERE, np.ones(1), SENSOR.radio))[0]
-    radio = replace(SENSOR.radio, energy=SENSOR.radio.energy * 40.0 / float(SENSOR.radio.integrated_snr(gain)))
-    return KnownEnvironment(None, radio, SensorModel(radio, false_alarms=2.0), SIX, 2, True), aimed, float(gain)
-
-
-def at_place(gain: float) -> WindowTracks:
-    """Track at `PLACE` that was heard with that amplitude in cycle 0, and of which no code has told anything."""
-    first = np.zeros(1, dtype=np.int64)
-    return tracks_at(PLACE[None], [0.0])._replace(
-        log_amplitude=np.log([gain]), earlier_log_amplitude=np.log([gain]), log_grid=unknown(1).log_grid,
-        log_direct=np.zeros((1, 1)), hidden=np.zeros((1, 2)), last=first, earlier=first,
-    )  # fmt: skip
-
-
-def lit_by_turns(straight: bool, rng: np.random.Generator) -> Floats:
-    """Log odds of a track of being over no wall, after a beam that lit it, that beam again, three codes aimed at it and
-    three others; a path over a wall besides is lit by its own beam alone."""
-    scene, aimed, gain = aimed_scene()
-    beam = aimed if straight else RisCode((aimed.index + 2 * np.arange(6)) % 4, 4)
-    codes = [beam, beam, *[aimed] * 3, *[RisCode(rng.integers(4, size=(6, 6)), 4) for _ in range(3)]]
-    track, odds = at_place(gain), []
-    for cycle, code in enumerate(codes):
-        if code is beam:
-            track = track._replace(earlier=track.last, last=np.array([cycle]))
-        track = weigh_tracks(track, cycle, poses(), scene, tuple(codes[: cycle + 1]))
-        odds.append(track.log_direct[0, 0])
-    return np.array(odds)
-
-
-def test_an_aimed_code_tells_whether_a_track_is_the_direct_path():
-    """By hand: what lit it and what is lit again say nothing; silence under an aimed code says all that a detection
-    that fails, and what may hide it, leave of it."""
-    straight, over_a_wall = (lit_by_turns(kind, np.random.default_rng(5)) for kind in (True, False))
-    np.testing.assert_allclose(straight[:5], 0.0, atol=1e-9)
-    assert straight[-1] > -1.0  # other codes light neither
-    np.testing.assert_allclose(over_a_wall[:2], 0.0, atol=1e-9)
-    rare, missed, hidden, expected = CONSTANTS.rare, 1.0 - CONSTANTS.shown, 0.0, [0.0]
-    for _ in range(3):
-        before = hidden + rare * (1.0 - hidden)
-        silence = before + (1.0 - before) * missed
-        expected.append(expected[-1] + np.log(silence / (1.0 - rare)))
-        hidden = before / silence
-    np.testing.assert_allclose(over_a_wall[2:5], expected[1:], atol=2e-2)
-    # what a code does not light that lit nothing of it before tells next to nothing of whether it is real
-    scene, aimed, gain = aimed_scene()
-    beam = RisCode((aimed.index + 2 * np.arange(6)) % 4, 4)
-    track = at_place(gain)
-    after = weigh_tracks(track, 1, poses(), scene, (beam, aimed))
-    np.testing.assert_allclose(after.log_real - track.log_real, np.log1p(-rare))
-
-
 def test_silence_of_a_panel_is_by_its_gain_and_by_what_may_hide_it():
     """By hand: a path at the threshold is missed half the time, by noise of its own; a strong one as it is merged."""
     radio, rare = SENSOR.radio, CONSTANTS.rare
@@ -306,55 +197,20 @@ def test_a_point_of_the_map_is_over_no_wall():
     np.testing.assert_allclose(found.is_panel, 0.5)
 
 
-@pytest.mark.parametrize("turned", [1, 2, 3])
-@pytest.mark.parametrize("faint", [0.3, 1.0])
-def test_what_is_heard_under_a_code_unlike_the_one_that_lit_it_is_the_direct_path_by_as_much(turned, faint):
-    """By hand, from how loud it was then: the code that lit it has so many rows the other way."""
-    scene, aimed, gain = aimed_scene()
-    beam = RisCode((aimed.index + 2 * (np.arange(6) < turned)[:, None]) % 4, 4)
-    likeness = 1.0 - turned / 3.0
-    track = at_place(gain)._replace(last=np.array([4]), earlier_log_amplitude=np.log([gain * faint]))
-    after = weigh_tracks(track, 4, poses(), scene, (beam, beam, beam, beam, aimed))
-    snr = 40.0 * (faint * likeness) ** 2
-    again = max(CONSTANTS.shown * float(scene.sensor.detection_probability(snr)), CONSTANTS.rare)
-    lit = (1.0 - CONSTANTS.rare) * CONSTANTS.shown
-    np.testing.assert_allclose(after.log_direct[0, 0], np.log(max(lit, again) / again), atol=2e-2)
-    np.testing.assert_allclose(after.log_real, track.log_real)
-    # as loud as it is now would be another thing
-    same = weigh_tracks(track, 4, poses(), scene, (aimed,) * 5)
-    if faint == 1.0:
-        np.testing.assert_allclose(same.log_direct, 0.0, atol=1e-9)
-    # of what is told for another thing nothing is asked, and without a code nothing is told but the panel's side
-    other = weigh_tracks(track._replace(side=np.array([OTHER])), 4, poses(), scene, (beam,) * 4 + (aimed,))
-    np.testing.assert_array_equal(other.log_direct, 0.0)
-    blind = weigh_tracks(track, 4, poses(), scene, (*(beam,) * 4, None))
-    np.testing.assert_array_equal(blind.log_direct, 0.0)
-    assert (blind.log_grid != track.log_grid).any()
-
-
-def test_each_track_is_asked_by_the_code_that_lit_it():
-    """Lit by three codes, the newest first; one that was lit before all that are kept is known by no code."""
-    one = tracks_at(np.array([[4.0, 4.0, 2.5]]), [0.0], log_real=3.0)._replace(log_grid=unknown(1).log_grid)
-    snr = 12.0
-    loud = np.log(np.sqrt(snr / SENSOR.radio.integrated_snr(np.ones(()))))
-    fields = [np.repeat(field, 4, axis=0) for field in one[:-1]]
-    ago = np.array([len(CODES), 3, 2, 4])
-    four = WindowTracks._make([*fields, 4])._replace(last=CYCLE - ago, log_amplitude=np.full(4, loud))
-    after = weigh_tracks(four, CYCLE, poses(), KnownEnvironment(None, SENSOR.radio, SENSOR, SHEET, 2, True), CODES)
-    missed = np.log1p(-CONSTANTS.shown * SENSOR.detection_probability(snr))
-    unlike = np.log1p(-CONSTANTS.rare)
-    np.testing.assert_allclose(after.log_real, 3.0 + np.array([unlike, unlike, missed, unlike]))
-    assert after.log_direct[0, 0] == four.log_direct[0, 0]
-
-
 def test_a_candidate_is_no_scatterer_and_over_no_wall():
-    """By hand: of three things that exclude each other, each as likely, one; each panel by odds of its own."""
+    """By hand: of three things that exclude each other, each as likely, one; of four, where it may leak; each panel by
+    odds of its own."""
     place = np.array([[4.0, 4.0, 2.5], [1.0, 3.0, 2.5]])
-    found = best(tracks_at(place, [0.0, -1.0])._replace(log_direct=np.zeros((2, 1))))
-    assert found is not None
-    np.testing.assert_allclose(found.is_panel, 1.0 / 3.0)
+    both = tracks_at(place, [0.0, -1.0])._replace(log_direct=np.zeros((2, 1)))
+    for leak, told, share in ((-np.inf, PANEL, 3.0), (0.0, PANEL, 4.0), (0.0, UNTOLD, 3.0)):
+        found = best(both._replace(log_leak=np.full((2, 1), leak), side=np.full(2, told)))
+        assert found is not None
+        np.testing.assert_allclose(found.is_panel, 1.0 / share)
     two = tracks_at(place[:1], [0.0])._replace(
-        log_ris=np.array([[0.0, 0.0]]), log_direct=np.array([[-20.0, 20.0]]), side=np.array([UNTOLD])
+        log_ris=np.array([[0.0, 0.0]]),
+        log_direct=np.array([[-20.0, 20.0]]),
+        side=np.array([UNTOLD]),
+        log_leak=np.zeros((1, 2)),
     )
     mean = np.concatenate([HERE, np.zeros(4)])
     first, second = (find_candidate(two, empty_table(2), mean, CYCLE, poses(), CODES, SENSOR, q) for q in (0, 1))
@@ -374,27 +230,3 @@ def test_a_candidate_carries_how_likely_it_is_heard_again_and_what_may_hide_it()
     found = best(both._replace(log_amplitude=loud, hidden=np.array([[0.0, 0.2], [1.0, 0.4]])))
     assert found is not None
     np.testing.assert_allclose(found.again, CONSTANTS.shown * SENSOR.detection_probability(40.0))
-
-
-def test_what_was_aimed_at_in_vain_gives_way_to_the_sweep():
-    """A track that is surely real and over the panel, silent under codes aimed at it: soon a beam is sent."""
-    scene, aimed, gain = aimed_scene()
-    beam, sweep, kinds = RisCode((aimed.index + 2 * np.arange(6)) % 4, 4), BeamSweep(), []
-    codes, track = [beam], at_place(gain)._replace(log_ris=np.array([[12.0]]), hits=np.array([2]))
-    mean, belief = np.concatenate([HERE, np.zeros(4)]), make_estimate()
-    for cycle in range(1, 12):
-        found = find_candidate(track, empty_table(1), mean, cycle - 1, poses(), tuple(codes), scene.sensor)
-        assert found is not None
-        code = search_code(replace(belief, suspects=(found,)), SIX, scene.radio, sweep, lit=found.code)
-        kinds.append("held" if code is beam else "aimed" if (code.index == aimed.index).all() else "beam")
-        codes.append(code)
-        if code is beam:
-            track = track._replace(earlier=track.last, last=np.array([cycle]), hits=track.hits + 1)
-        track = weigh_tracks(track, cycle, poses(), scene, tuple(codes))
-    assert kinds[0] == "aimed"
-    assert kinds.count("beam") >= 7
-
-
-def make_estimate() -> SlamEstimate:
-    """Belief of an agent at `HERE` that knows nothing of the room."""
-    return SlamEstimate(HERE, np.zeros(3), 0.0, 1e-4 * np.eye(6), HERE + np.zeros((4, 3)), Body(), empty_map())

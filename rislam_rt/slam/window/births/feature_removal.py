@@ -15,7 +15,7 @@ from rislam_rt.slam.window.relinearisation import relinearise
 from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.solver_limits import CERTAIN, FEWEST
 from rislam_rt.slam.window.state import WindowState
-from rislam_rt.slam.window.tracks import WindowTracks
+from rislam_rt.slam.window.tracks import WindowTracks, unlike
 
 
 def resolve(context: WindowState, steps: int) -> tuple[WindowState, Residuals]:
@@ -49,7 +49,7 @@ def resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Flo
     forms, which = np.unique(log.form[:, 0], axis=0, return_inverse=True)
     track = log.track.copy()
     fresh: list[tuple[object, ...]] = []
-    ident, time = tracks.next_ident, np.concatenate([[0.0], np.cumsum(step)])
+    ident, time, panels = tracks.next_ident, np.concatenate([[0.0], np.cumsum(step)]), tracks.log_ris.shape[1]
     for number in np.unique(which[lost]):
         rows = (lost & (which == number)).nonzero()[0]
         if len(rows) < 4 or forms[number][0] == UNKNOWN:
@@ -65,8 +65,7 @@ def resume(tracks: WindowTracks, log: Log, lost: Booleans, cycle: int, step: Flo
         fresh.append((
             ident, best.T, spread, log.log_amplitude[late[-1]], log.side[late[-1]], log.cycle[rows[0]],
             *log.cycle[late[:-3:-1]], log.log_amplitude[late[-2]], len(rows), 0, CERTAIN,
-            np.zeros(tracks.log_ris.shape[1]), *(field[0] for field in unknown(1, tracks.log_ris.shape[1])),
-            nothing_heard(1)[0],
+            *(field[0] for field in (*unlike(1, panels), *unknown(1, panels))), nothing_heard(1)[0],
         ))  # fmt: skip
         ident += 1
     if not fresh:
