@@ -6,8 +6,10 @@ import pytest
 from rislam_rt.measurement import ReceiverConfig, measure
 from rislam_rt.measurement.estimation.path_signals import build_sounding, waves_at
 from rislam_rt.measurement.estimation.refine import accuracy, fit_amplitudes, refine
+from rislam_rt.measurement.received_paths import receive
 from rislam_rt.measurement.received_signal import add_noise
 from rislam_rt.measurement.variance_inflation import UNSEEN, crowding, mirror_variance, peak_bias, unmirrored
+from rislam_rt.measurement.waveform_receiver import capture, find_components
 from rislam_rt.model import PathKind, RadioConfig, RxArray
 
 RADIO = RadioConfig()
@@ -114,3 +116,22 @@ def test_level_paths_err_as_reported(make_paths, make_gain):
     assert len(ratio) > 55
     # one on the wrong side in thirty would make this 10, were it reported like the others
     assert np.sqrt(np.mean(np.square(ratio))) < 2.0
+
+
+@pytest.mark.parametrize(("rows", "cols"), [(4, 4), (5, 4)])
+def test_the_gain_of_a_level_path_is_that_of_the_side_on_which_it_is_found(make_paths, make_gain, rows, cols) -> None:
+    """A gain that is turned the wrong way misses the true one by twice itself; at 16 dB noise is a sixth of it."""
+    radio, rng, across = RadioConfig(array=RxArray(rows=rows, cols=cols)), np.random.default_rng(6), 0
+    gain = make_gain(16.0, radio, 0.4)
+    for level in ((-0.99, 0.05), (0.99, -0.05), (0.05, 0.99), (-0.05, -0.99)):
+        paths = make_paths([(PathKind.VS, 6.0, (*level, np.sqrt(1.0 - level[0] ** 2 - level[1] ** 2)), gain)])
+        for _ in range(12):
+            found = find_components(
+                capture(receive(paths, 0, 0.0, radio, WAVEFORM), radio, WAVEFORM, rng=rng), radio, WAVEFORM
+            )
+            loudest = np.argmax(np.abs(found.gain))
+            other = found.cosines[loudest] @ level < 0.0
+            sign = radio.array.mirrored_signs[int(np.argmax(np.abs(level)))] if other else 1.0
+            across += int(other)
+            assert abs(sign * found.gain[loudest] - gain) < 0.8 * abs(gain)
+    assert across > 5
