@@ -48,9 +48,8 @@ def search_code(
     That is the sweep's next beam, or the code that last lit the belief's panel candidate, or one that is aimed at it.
     If the candidate is not the panel's direct path, one beam of all lights that path. If it is, and nothing hides it,
     the code that lit it may do so again, and an aimed one lights the places at which it gives half of the power or
-    more. All three take turns where the receiver does not tell it from a scatterer, which any code lights, and from the
-    next beam on where what it is was asked in vain, until it is heard again: what is heard under that beam as well is no
-    panel.
+    more. All three take turns where what it is was asked in vain, or where the receiver does not tell it from a
+    scatterer, which any code lights: what is heard under a beam as well is no panel.
 
     `panel` is which of several panels is sought, and `lit` the candidate's code for this panel.
     """
@@ -67,11 +66,9 @@ def search_code(
         return sweep.beam(ris, radio, panel)
     turns, may = sweep.turns[panel], {HOLD: again > new, AIM: aimed > new, GO_ON: True}
     if found.told and not found.examined:
-        turn = HOLD if again >= aimed else AIM
-        turns[:] = GO_ON, HOLD, AIM
-    else:
-        turn = next(each for each in turns if may[each])
-        turns.append(turns.pop(turns.index(turn)))
+        may = {HOLD: again >= aimed, AIM: again < aimed, GO_ON: False}
+    turn = next(each for each in turns if may[each])
+    turns.append(turns.pop(turns.index(turn)))
     if turn == HOLD and lit is not None:
         return lit
     return code if turn == AIM else sweep.beam(ris, radio, panel)

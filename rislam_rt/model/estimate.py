@@ -86,7 +86,7 @@ class PanelCandidate(NamedTuple):
     told: bool = False
     """Whether the receiver tells, by alternated codes, that it is over the panel."""
     examined: bool = False
-    """Whether what it is was asked already, left open, and nothing was heard of it since."""
+    """Whether what it is was asked already, and left open."""
     panel: int = 0
     """Number of the RIS panel that it may be."""
     clear: float = 1.0

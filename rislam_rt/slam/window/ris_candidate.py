@@ -140,7 +140,7 @@ def find_candidate(
     samples = np.concatenate([np.repeat(features[points][:, None], DRAWS, axis=1), samples])
     if best >= len(points):
         row = rows[best - len(points)]
-        asked = bool(0 < tracks.looked[row] == tracks.hits[row])
+        asked = bool(0 < tracks.looked[row] <= tracks.hits[row])
         code = _code_then(codes, int(cycle - tracks.last[row]))
         again = float(_again(tracks.log_amplitude[row], sensor))
     one, other = float(scipy.special.expit(real[best])), float(scipy.special.expit(is_panel[best]))

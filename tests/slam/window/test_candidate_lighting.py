@@ -163,7 +163,7 @@ def test_what_is_told_for_the_panels_under_any_code_gives_way_to_the_sweep_and_i
             if len(due(track, cycle)):
                 track = track._replace(looked=track.hits)
         kinds[leaks] = np.array(lights)
-    assert kinds[False].mean() > 0.75
+    assert kinds[False].mean() > 0.6  # all codes, and two of three once it was examined
     assert kinds[True][-8:].sum() == 0
 
 
