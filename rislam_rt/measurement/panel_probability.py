@@ -132,19 +132,23 @@ def _place_densities(
     found: ReportedComponents, sources: ReportedComponents, radio: RadioConfig
 ) -> tuple[Floats, Floats]:
     """Densities (N, S) per cell of the place of each component, were it the leak of each source, with the source's gain
-    and with the opposite one, for the panel's probability: at the rim of the unit disc a path may be found at the
-    opposite rim (`RxArray.mirrored_signs`)."""
+    and with the opposite one, for the panel's probability: cosines 1 / `spacing` apart are alike to an array
+    (`RxArray.mirrored_signs`), so that a path at the rim of the unit disc may be found at the opposite rim."""
     array = radio.array
+    counts = np.array([1, array.rows, array.cols])
+    cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in counts[1:])])
     gap = found.points[:, None] - sources.points
-    cell = np.array([1.0 / radio.bandwidth, *(1.0 / (n * array.spacing) for n in (array.rows, array.cols))])
     variance = found.deviation[:, None] ** 2 + sources.deviation**2 + (BLUR * cell) ** 2
-    scale, period = cell / np.sqrt(2.0 * np.pi * variance), np.array([0.0, 1.0, 1.0]) / array.spacing
-    here, beyond = (
-        scale * sum(np.exp(-0.5 * (gap + turn * period) ** 2 / variance) for turn in turns)
-        for turns in ((0.0,), (-1.0, 1.0))
-    )
-    delay, (u, v), (far_u, far_v) = here[..., 0], np.moveaxis(here[..., 1:], -1, 0), np.moveaxis(beyond[..., 1:], -1, 0)
-    turned_u, turned_v = array.mirrored_signs < 0.0
-    same_u, other_u = (u, far_u) if turned_u else (u + far_u, 0.0)
-    same_v, other_v = (v, far_v) if turned_v else (v + far_v, 0.0)
-    return delay * (same_u * same_v + other_u * other_v), delay * (same_u * other_v + other_u * same_v)
+    scale, period = cell / np.sqrt(2.0 * np.pi * variance), np.where(counts > 1, 1.0 / array.spacing, np.inf)
+    most = int(np.ceil(2.0 * array.spacing))  # two cosines are 2 apart at most
+    same, opposite = np.zeros_like(gap), np.zeros_like(gap)
+    turned = np.append(1.0, array.mirrored_signs) < 0.0
+    for turns in range(-most, most + 1):
+        shift = turns * period if turns else np.zeros(3)
+        density = scale * np.exp(-0.5 * (gap + shift) ** 2 / variance)
+        odd = turned & (turns % 2 == 1)
+        same += np.where(odd, 0.0, density)
+        opposite += np.where(odd, density, 0.0)
+    delay, u, v = np.moveaxis(same, -1, 0)
+    _, other_u, other_v = np.moveaxis(opposite, -1, 0)
+    return delay * (u * v + other_u * other_v), delay * (u * other_v + other_u * v)

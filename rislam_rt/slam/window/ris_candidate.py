@@ -17,7 +17,7 @@ from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironm
 from rislam_rt.slam.window.landmarks.ris_identification import PanelObservation, gains, log_silence, weigh
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import CERTAIN, DRAWS
-from rislam_rt.slam.window.tracks import WindowTracks
+from rislam_rt.slam.window.tracks import WindowTracks, share
 
 DEEP = 0.5
 """Distance [m] behind a wall beyond which a track counts as a mirror image; the panel itself hangs on a wall."""
@@ -45,7 +45,8 @@ def weigh_tracks(
     being a leak.
 
     The direct path over a panel is lit by what sends its place's direction back. A path over panel and walls is known
-    to be lit by the code that lit it alone, and by others as far as they are like that. A leak is heard under any code.
+    to be lit by the code that lit it alone, and by others as far as they are like that. A leak is heard under any code,
+    as often as it was before.
     """
     code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
@@ -67,7 +68,8 @@ def weigh_tracks(
     before_now = [_code_then(codes, int(each)) for each in ago]
     known = np.array([each is not None for each in before_now])[inverse]
     likeness = np.stack([_likeness(code, each, scene.ris) for each in before_now])[inverse]
-    always = np.maximum(_again(then, scene.sensor), CONSTANTS.rare)
+    often = share(tracks, cycle)[rows, None]
+    always = np.maximum(often * _again(then, scene.sensor), CONSTANTS.rare)
     again = np.maximum(_again(then + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
     lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)
     for odds, one, other in ((direct, lit, again), (leak, always, lit)):

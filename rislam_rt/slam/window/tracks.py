@@ -53,8 +53,8 @@ class WindowTracks(NamedTuple):
     log_direct: Floats
     """(T, Q) log odds, were it over each of Q panels, that it is over no wall besides."""
     log_leak: Floats
-    """(T, Q) log odds that it leaks, a path over no panel that is told for each of Q panels' under any code, against
-    that panel's direct path."""
+    """(T, Q) log odds that it leaks, a path over something else that is told for each of Q panels' under any code,
+    against that panel's direct path."""
     log_grid: Floats
     """(T, G) log posterior of its strength (root of a cross-section), were it a scatterer heard over no wall
     (see `panel_evidence`)."""

@@ -64,4 +64,5 @@ def at_place(gain: float) -> WindowTracks:
     return tracks_at(PLACE[None], [0.0])._replace(
         log_amplitude=np.log([gain]), earlier_log_amplitude=np.log([gain]), log_grid=unknown(1).log_grid,
         log_direct=np.zeros((1, 1)), hidden=np.zeros((1, 2)), last=first, earlier=first,
+        born=first, hits=first + 1,
     )  # fmt: skip

@@ -219,6 +219,21 @@ def test_a_candidate_is_no_scatterer_and_over_no_wall():
     np.testing.assert_allclose([first.is_panel, second.is_panel], [0.0, 1.0 / 3.0], atol=1e-8)
 
 
+def test_of_two_panels_each_has_its_own_leak_and_of_two_tracks_the_best_says_whether_it_is_told():
+    place, mean = np.array([[4.0, 4.0, 2.5], [1.0, 3.0, 2.5]]), np.concatenate([HERE, np.zeros(4)])
+    second = tracks_at(place[:1], [0.0])._replace(
+        log_ris=np.array([[-30.0, 5.0]]), log_direct=np.full((1, 2), 30.0), log_leak=np.array([[30.0, -30.0]]),
+        side=np.array([PANEL + 1]),
+    )  # fmt: skip
+    found = find_candidate(second, empty_table(2), mean, CYCLE, poses(), CODES, SENSOR, 1)
+    assert found is not None
+    np.testing.assert_allclose(found.is_panel, 1.0 / (1.0 + np.exp(-5.0)))
+    for sides in ((PANEL, UNTOLD), (UNTOLD, PANEL)):
+        found = best(tracks_at(place, [5.0, 0.0])._replace(side=np.array(sides)))
+        assert found is not None
+        assert found.told == (sides[0] == PANEL)
+
+
 def test_a_candidate_carries_how_likely_it_is_heard_again_and_what_may_hide_it():
     loud = 0.5 * np.log(np.array([40.0, 12.0]) / SENSOR.radio.integrated_snr(np.ones(())))
     both = tracks_at(np.array([[4.0, 4.0, 2.5], [1.0, 3.0, 2.5]]), [0.0, 2.0])

@@ -106,6 +106,7 @@ def test_a_track_keeps_when_and_how_loud_it_was_heard_before():
     found, _ = tracks.start(tracks.no_tracks(2), heard, np.array([0]), np.full((1, 3), 0.02), 3)
     assert (found.last[0], found.earlier[0], found.earlier_log_amplitude[0]) == (3, 3, -3.0)
     np.testing.assert_array_equal(found.log_direct, np.zeros((1, 2)))
+    np.testing.assert_array_equal(found.log_leak, np.full((1, 2), CONSTANTS.log_rare))
     for cycle, loud, before, then in ((5, -2.0, 3, -3.0), (6, -1.0, 5, -2.0)):
         louder = heard._replace(log_amplitude=np.array([loud]))
         found = tracks.extend(found, np.array([0]), louder, np.array([0]), cycle)

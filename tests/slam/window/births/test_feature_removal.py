@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births.feature_removal import features_to_remove, resume
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table, enter
@@ -56,5 +57,6 @@ def test_what_is_taken_back_is_a_track_again_as_it_was_heard():
     np.testing.assert_allclose([found.earlier_log_amplitude[0], found.log_amplitude[0]], level[-2:])
     np.testing.assert_allclose(found.mean[0, 0], [5.09, 0.1], atol=1e-9)
     np.testing.assert_array_equal(found.log_direct, np.zeros((1, panels)))
+    np.testing.assert_array_equal(found.log_leak, np.full((1, panels), CONSTANTS.log_rare))
     assert found.log_real[0] == CERTAIN
     assert (log.track == found.ident[0]).all()
