@@ -68,7 +68,7 @@ def weigh_tracks(
     before_now = [_code_then(codes, int(each)) for each in ago]
     known = np.array([each is not None for each in before_now])[inverse]
     likeness = np.stack([_likeness(code, each, scene.ris) for each in before_now])[inverse]
-    often = share(tracks, cycle)[rows, None]
+    often = share(tracks._replace(hits=tracks.hits - (tracks.last == cycle)), cycle)[rows, None]
     always = np.maximum(often * _again(then, scene.sensor), CONSTANTS.rare)
     again = np.maximum(_again(then + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
     lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)

@@ -141,7 +141,7 @@ def test_a_leak_is_heard_under_any_code_as_often_as_before(turned, heard, hits):
     )
     after = weigh_tracks(track, 4, poses(), scene, (*(aimed,) * 4, code))
     again = CONSTANTS.shown * float(scene.sensor.detection_probability(40.0))
-    always, lit = (hits + 1) / 6.0 * again, again if turned == 0 else CONSTANTS.rare
+    always, lit = (hits + 1 - heard) / 6.0 * again, again if turned == 0 else CONSTANTS.rare
     expected = np.log(always / lit) if heard else np.log1p(-always) - np.log1p(-lit)
     np.testing.assert_allclose(after.log_leak[0, 0], expected, atol=2e-2)
     unknown_code = weigh_tracks(track, 4, poses(), scene, (code,))  # what lit it is not known
@@ -153,7 +153,7 @@ def test_what_an_aimed_code_lights_is_no_leak_for_that_and_odds_stay_finite():
     can be."""
     scene, aimed, gain = aimed_scene()
     unlike_it = RisCode((aimed.index + 2 * (np.arange(6) < 3)[:, None]) % 4, 4)
-    track = at_place(gain)._replace(log_leak=np.zeros((1, 1)), last=np.array([4]), hits=np.array([5]))
+    track = at_place(gain)._replace(log_leak=np.zeros((1, 1)), last=np.array([4]), hits=np.array([6]))
     after = weigh_tracks(track, 4, poses(), scene, (*(unlike_it,) * 4, aimed))
     np.testing.assert_allclose(after.log_leak, 0.0, atol=5e-2)
     for _ in range(40):

@@ -39,8 +39,10 @@ def advance(log_odds: float, score: float, silent: Floats, kept: int) -> float:
     ratio `score`.
 
     Of the tracks `kept` ones go on, and others end, which were due with probabilities `silent` (S,): a faint one comes
-    and goes. They need no pose: if many end at once, the agent may be elsewhere.
+    and goes, and any may be hidden, which is `rare`. They need no pose: if many end at once, the agent may be
+    elsewhere.
     """
+    silent = np.minimum(silent, 1.0 - CONSTANTS.rare)
     ended = np.log((1.0 - (1.0 - CUT) * silent) / (1.0 - silent)).sum()
     burst = ended + kept * np.log(1.0 - CUT)
     rate = 1.0 / (1.0 + np.exp(-CONSTANTS.log_lost - max(burst, 0.0)))

@@ -282,6 +282,16 @@ def test_tracks_that_are_heard_now_and_then_end_without_a_jump():
     assert odds == pytest.approx(CONSTANTS.log_lost)
 
 
+def test_one_track_that_was_never_missed_may_be_hidden():
+    """Alone among few others its end is no jump; by hand, at the odds of 0.02 that something hides it."""
+    odds = divergence_monitor.advance(CONSTANTS.log_lost, 0.0, np.ones(1), 3)
+    assert odds == pytest.approx(CONSTANTS.log_lost, abs=0.7)
+    burst = np.log((1.0 - 0.3 * 0.98) / 0.02)  # and with none that goes on
+    assert divergence_monitor.advance(CONSTANTS.log_lost, 0.0, np.ones(1), 0) == pytest.approx(
+        np.logaddexp(CONSTANTS.log_lost, CONSTANTS.log_lost + burst), abs=1e-2
+    )
+
+
 @pytest.mark.parametrize(
     ("score", "ended", "motion", "cause"),
     [(0.4, 17, 0.0, "TRACKS"), (-9.0, 0, 2.0, "MAP"), (2.0, 0, 9.0, "MOTION")],
