@@ -208,15 +208,42 @@ def lengths(heard: Heard) -> Lengths:
     )  # fmt: skip
 
 
-def rates(found: Lengths) -> Rates:
+def rates(found: Lengths, scattered: bool = False) -> Rates:
     """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
-    positions leave of the lengths' change."""
+    positions leave of the lengths' change.
+
+    Each path scatters by no more than fits (`crowd`), or, if `scattered`, by what it shows, where that is more: one
+    that hops from neighbour to neighbour within its cell has no rate.
+    """
     place, time = found.heard.place, found.heard.step * max(len(found.heard.place) - 1, 1)
     velocity = (place[-1] - place[0]) / time
     (rate,), variance, fine = _slopes(found, found.time, found.left)
+    if scattered:
+        (long,) = (found.number >= found.enough).nonzero()
+        rows = np.isin(found.which, long).nonzero()[0]
+        rows = rows[np.lexsort((found.time[rows], found.which[rows]))]
+        which = np.searchsorted(long, found.which[rows])
+        shown = shown_scatter(which, found.time[rows], found.length[rows], found.weight[rows])
+        variance[long] *= np.maximum(shown / CONSTANTS.crowd, 1.0)
     rate = rate + found.toward @ velocity
     bends = _bends(found, float(velocity @ velocity))
     return _rates(found, fine, (rate, variance, rate), time, np.zeros(3), bends)
+
+
+def shown_scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:
+    """Mean square (T,) to expect of the errors of tracks' lengths (N,), in reported deviations, from what they show
+    about a quadratic in time, for their rates; what is expected of any return beforehand counts as `memory`
+    components."""
+    count = np.bincount(which)
+    rows = np.stack([np.ones(len(time)), time, time**2], axis=1)
+    first = np.searchsorted(which, np.arange(len(count)))
+    start, heavy = length - length[first][which], weight[:, None] * rows
+    normal = np.add.reduceat(heavy[:, :, None] * rows[:, None], first) + 1e-9 * np.eye(3)
+    best = np.linalg.solve(normal, np.add.reduceat(heavy * start[:, None], first)[..., None])[..., 0]
+    square = np.bincount(which, weight * (start - np.vecdot(rows, best[which])) ** 2)
+    free = count - 3.0
+    shown = np.maximum(square / free, 1.0)
+    return np.asarray((CONSTANTS.memory * CONSTANTS.crowd + free * shown) / (CONSTANTS.memory + free))
 
 
 def accelerations(found: Lengths, steps: int) -> Rates:

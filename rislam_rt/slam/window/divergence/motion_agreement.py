@@ -48,7 +48,7 @@ def check_start(state: WindowState) -> egomotion.StartCheck | None:
 def log_other_motion(state: WindowState) -> float:
     """Log likelihood ratio of the agent having moved in any other way over the last `PAST` cycles against as estimated,
     give or take a manoeuvre, from the rates at which path lengths changed; 0 where too few are known."""
-    found = _latest_rates(state)
+    found = _latest_rates(state, scattered=True)
     if found is None:
         return 0.0
     lively = np.sqrt(motion.expected_variance(state.level[0])) * _latest(state.window)[1]
@@ -115,21 +115,21 @@ def _with_history(state: WindowState, found: length_rates.Rates, steps: int) -> 
     return egomotion.with_history(found, before, (place[-1] - place[0]) / passed.sum()) if before.number else found
 
 
-def _latest_rates(state: WindowState) -> length_rates.Rates | None:
+def _latest_rates(state: WindowState, scattered: bool = False) -> length_rates.Rates | None:
     """Rates of path lengths over the last `PAST` cycles, with which motion must agree; None where they are too few."""
     cycles, time = _latest(state.window)
     if cycles < length_rates.MEASURED - 1:
         return None
-    found = _rates(state, slice(-1 - cycles, None), time / cycles)
+    found = _rates(state, slice(-1 - cycles, None), time / cycles, scattered)
     return found if found.number >= egomotion.FEWEST else None
 
 
-def _rates(state: WindowState, rows: slice, step: float) -> length_rates.Rates:
+def _rates(state: WindowState, rows: slice, step: float, scattered: bool = False) -> length_rates.Rates:
     """Rates of path lengths over the window's poses `rows`, `step` [s] apart, seen under the estimated headings.
 
     Where the heading is estimated, its deviation turns all directions: each rate by twice the way across.
     """
-    found, window = length_rates.rates(_lengths(state, rows, step)), state.window
+    found, window = length_rates.rates(_lengths(state, rows, step), scattered), state.window
     if not window.turns:
         return found
     heading_std = np.sqrt(np.diag(pose_covariance(window, TURN))[rows].max())

@@ -15,7 +15,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
-from rislam_rt.slam.window.divergence.length_rates import enough_measured
+from rislam_rt.slam.window.divergence.length_rates import enough_measured, shown_scatter
 from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
@@ -122,7 +122,7 @@ def _histories(state: WindowState, ends: PathDirections, start: int) -> _Histori
     # seen from the two ends a point, or a wall's normal, lies in directions so much apart
     apart = 2.0 * baseline * mass / np.maximum(total(weight * length), 1e-9)
     own = (apart**2 + doubt) * speed**2 + turning**2 + STILL**2
-    weight = weight / (1.0 + CONSTANTS.memory * (_scatter(which, time, length, weight) - 1.0))[which]
+    weight = weight / (1.0 + CONSTANTS.memory * (shown_scatter(which, time, length, weight) - 1.0))[which]
     return _Histories(
         which, slot, time, length, weight, toward, length - (follow - follow[first][which]), spans, span, speed, own,
         ends.owner,
@@ -149,21 +149,6 @@ def _directions(heading: Floats, ends: PathDirections, slot: Integers, clock: Fl
         up = np.sqrt(np.maximum(1.0 - np.vecdot(smooth, smooth), 0.0))
         toward -= np.concatenate([smooth, up[:, None]], axis=1)
     return toward, spread_by_legs(1.0 / s, ends.legs)
-
-
-def _scatter(which: Integers, time: Floats, length: Floats, weight: Floats) -> Floats:
-    """Mean square (T,) to expect of tracks' errors of length, in reported deviations, from what they show about a
-    quadratic in time; what is expected of any return beforehand counts as `memory` components."""
-    count = np.bincount(which)
-    rows = np.stack([np.ones(len(time)), time, time**2], axis=1)
-    first = np.searchsorted(which, np.arange(len(count)))
-    start, heavy = length - length[first][which], weight[:, None] * rows
-    normal = np.add.reduceat(heavy[:, :, None] * rows[:, None], first) + 1e-9 * np.eye(3)
-    best = np.linalg.solve(normal, np.add.reduceat(heavy * start[:, None], first)[..., None])[..., 0]
-    square = np.bincount(which, weight * (start - np.vecdot(rows, best[which])) ** 2)
-    free = count - 3.0
-    shown = np.maximum(square / free, 1.0)
-    return np.asarray((CONSTANTS.memory * CONSTANTS.crowd + free * shown) / (CONSTANTS.memory + free))
 
 
 def _shares(found: _Histories, state: WindowState) -> Floats:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window.divergence.length_rates import Heard, lengths
+from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.divergence.length_rates import Heard, lengths, rates
 from rislam_rt.slam.window.measurement_log import empty_log
 
 
@@ -44,3 +45,22 @@ def test_directions_count_by_how_sure_they_are():
     found = lengths(Heard(log, np.full(8, 0.8), np.zeros((8, 3)), 0.1, np.zeros(3), 0.5))
     np.testing.assert_allclose(found.toward[0], [2.0, 0.0, 0.0], atol=0.05)
     assert found.blur[0] == pytest.approx(2.0 * 0.003 / 2.0, rel=0.1)
+
+
+@pytest.mark.parametrize("count", [6, 11])
+def test_a_path_that_hops_within_its_cell_has_no_rate_and_one_that_speeds_up_has(count):
+    """By hand: the mean square about a quadratic, with what is expected beforehand as `memory` components."""
+    log = _wall_heard(np.zeros(count), np.full((count, 2), 0.003))
+    time = 0.1 * np.arange(count)
+    hops = np.random.default_rng(2).normal(0.0, 0.1, count)
+    for beside in (0.5 * time**2, hops):
+        one = log._replace(seen=log.seen + beside[:, None] * [1.0, 0.0, 0.0])
+        found = lengths(Heard(one, np.zeros(count), np.zeros((count, 3)), 0.1, np.zeros(3), 0.5))
+        plain, scattered = rates(found), rates(found, scattered=True)
+        np.testing.assert_array_equal(scattered.rate, plain.rate)
+        left = beside - np.polyval(np.polyfit(time, beside, 2), time)
+        square = np.maximum(np.sum(left**2) / 1e-6 / (count - 3), 1.0)
+        shown = (CONSTANTS.memory * CONSTANTS.crowd + (count - 3) * square) / (CONSTANTS.memory + count - 3)
+        expected = np.maximum(shown / CONSTANTS.crowd, 1.0)
+        np.testing.assert_allclose(scattered.variance / plain.variance, expected, rtol=1e-6)
+        assert (expected > 100.0) == (beside is hops)
