@@ -57,6 +57,7 @@ def test_along_an_axis_without_aperture_nothing_is_heard_elsewhere() -> None:
     odds = [1.0 / told(row, [0.0, gap, 0.0], 1.0) - 1.0 for gap in (0.0, 0.3)]
     variance = 2.0 * 0.02**2 + (BLUR / 0.5) ** 2  # an axis of one antenna has cells as wide as the disc
     assert odds[0] / odds[1] == pytest.approx(np.exp(0.5 * 0.3**2 / variance), rel=1e-6)
+    assert told(row, [0.0, 1.9, 0.0], 1.0) > 0.99
 
 
 def test_odds_of_a_leak_fall_with_its_distance_as_normal_densities_do() -> None:

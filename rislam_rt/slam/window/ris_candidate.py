@@ -46,7 +46,7 @@ def weigh_tracks(
 
     The direct path over a panel is lit by what sends its place's direction back. A path over panel and walls is known
     to be lit by the code that lit it alone, and by others as far as they are like that. A leak is heard under any code,
-    as often as it was before.
+    as often as it was before: what lights the panel tells nothing of it.
     """
     code, rows = codes[-1], (tracks.side != OTHER).nonzero()[0]
     if scene.ris is None or not len(rows):
@@ -72,7 +72,7 @@ def weigh_tracks(
     always = np.maximum(often * _again(then, scene.sensor), CONSTANTS.rare)
     again = np.maximum(_again(then + np.log(np.maximum(likeness, 1e-9)), scene.sensor), CONSTANTS.rare)
     lit = np.maximum(-np.expm1(log_silence(gain, before.hidden, scene.sensor)), again)
-    for odds, one, other in ((direct, lit, again), (leak, always, lit)):
+    for odds, one, other in ((direct, lit, again), (leak, always, np.maximum(often * lit, CONSTANTS.rare))):
         tells = np.where(sight.seen[:, None], np.log(one / other), np.log1p(-one) - np.log1p(-other))
         odds[rows] = np.clip(odds[rows] + np.where(known[:, None], tells, 0.0), -CERTAIN, CERTAIN)
     real[rows] += np.where(sight.seen, 0.0, np.log1p(-np.where(may_be, again, 1.0).min(axis=1)))

@@ -11,7 +11,7 @@ from rislam_rt.design.beam_sweep import BeamSweep, search_code
 from rislam_rt.model import Body, RisCode, empty_map
 from rislam_rt.model.estimate import SlamEstimate
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import OTHER
+from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.measurement_prediction import KnownEnvironment
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
@@ -141,9 +141,13 @@ def test_a_leak_is_heard_under_any_code_as_often_as_before(turned, heard, hits):
     )
     after = weigh_tracks(track, 4, poses(), scene, (*(aimed,) * 4, code))
     again = CONSTANTS.shown * float(scene.sensor.detection_probability(40.0))
-    always, lit = (hits + 1 - heard) / 6.0 * again, again if turned == 0 else CONSTANTS.rare
+    often = (hits + 1 - heard) / 6.0
+    always, lit = often * again, often * again if turned == 0 else CONSTANTS.rare
     expected = np.log(always / lit) if heard else np.log1p(-always) - np.log1p(-lit)
     np.testing.assert_allclose(after.log_leak[0, 0], expected, atol=2e-2)
+    hidden = weigh_tracks(track._replace(hidden=np.array([[0.99, 0.0]])), 4, poses(), scene, (*(aimed,) * 4, code))
+    if turned == 0:  # what may hide it says no more
+        np.testing.assert_allclose(hidden.log_leak[0, 0], 0.0, atol=0.1)
     unknown_code = weigh_tracks(track, 4, poses(), scene, (code,))  # what lit it is not known
     np.testing.assert_array_equal(unknown_code.log_leak, 0.0)
 
@@ -192,9 +196,22 @@ def test_a_leak_gives_way_to_the_sweep_however_often_it_is_heard(often):
     assert asked_for(np.array([often, often]), 100)[-40:].mean() < 0.3
 
 
-def test_the_direct_path_keeps_most_of_the_codes():
+@pytest.mark.parametrize("often", [0.5, 0.9])
+def test_the_direct_path_keeps_most_of_the_codes(often):
     """All until it is examined, then two of three."""
-    assert asked_for(np.array([0.0, 0.9]), 100).mean() > 0.6
+    assert asked_for(np.array([0.0, often]), 100).mean() > 0.55
+
+
+def test_other_tracks_have_no_say_in_how_often_one_is_heard():
+    scene, aimed, gain = aimed_scene()
+    unlike_it = RisCode((aimed.index + 2 * (np.arange(6) < 3)[:, None]) % 4, 4)
+    one = at_place(gain)._replace(log_leak=np.zeros((1, 1)), last=np.array([4]), hits=np.array([3]))
+    fields = [np.repeat(field, 2, axis=0) for field in one[:-1]]
+    two = WindowTracks._make([*fields, 2])._replace(side=np.array([OTHER, PANEL]), hits=np.array([5, 3]))
+    alone, beside = (
+        weigh_tracks(tracks, 4, poses(), scene, (*(aimed,) * 4, unlike_it)).log_leak[-1] for tracks in (one, two)
+    )
+    np.testing.assert_array_equal(beside, alone)
 
 
 def make_estimate() -> SlamEstimate:

@@ -212,8 +212,8 @@ def rates(found: Lengths, scattered: bool = False) -> Rates:
     """Rates at which the lengths of tracks and explained paths change, by weighted line fits over time to what the
     positions leave of the lengths' change.
 
-    Each path scatters by no more than fits (`crowd`), or, if `scattered`, by what it shows, where that is more: one
-    that hops from neighbour to neighbour within its cell has no rate.
+    Each path scatters by no more than fits (`crowd`), or, if `scattered`, by what it shows about a smooth way or about
+    the positions', where that is more: one that hops to and fro within its cell has next to no rate.
     """
     place, time = found.heard.place, found.heard.step * max(len(found.heard.place) - 1, 1)
     velocity = (place[-1] - place[0]) / time
@@ -223,8 +223,10 @@ def rates(found: Lengths, scattered: bool = False) -> Rates:
         rows = np.isin(found.which, long).nonzero()[0]
         rows = rows[np.lexsort((found.time[rows], found.which[rows]))]
         which = np.searchsorted(long, found.which[rows])
-        shown = shown_scatter(which, found.time[rows], found.length[rows], found.weight[rows])
-        variance[long] *= np.maximum(shown / CONSTANTS.crowd, 1.0)
+        ways = (
+            shown_scatter(which, found.time[rows], way[rows], found.weight[rows]) for way in (found.length, found.left)
+        )
+        variance[long] *= np.maximum(np.minimum(*ways) / CONSTANTS.crowd, 1.0)
     rate = rate + found.toward @ velocity
     bends = _bends(found, float(velocity @ velocity))
     return _rates(found, fine, (rate, variance, rate), time, np.zeros(3), bends)

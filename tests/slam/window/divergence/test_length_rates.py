@@ -1,9 +1,12 @@
 """Directions in which paths come in, by which the rates of their lengths tell of the motion."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
+from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.divergence.length_rates import Heard, lengths, rates
 from rislam_rt.slam.window.measurement_log import empty_log
 
@@ -64,3 +67,54 @@ def test_a_path_that_hops_within_its_cell_has_no_rate_and_one_that_speeds_up_has
         expected = np.maximum(shown / CONSTANTS.crowd, 1.0)
         np.testing.assert_allclose(scattered.variance / plain.variance, expected, rtol=1e-6)
         assert (expected > 100.0) == (beside is hops)
+
+
+def _paths_heard(beside: list[np.ndarray]):
+    """Lengths of tracks to the west, each with what is beside its own, in the last of eleven cycles as it is long."""
+    parts = [_wall_heard(np.zeros(len(one)), np.full((len(one), 2), 0.003)) for one in beside]
+    for number, (log, one) in enumerate(zip(parts, beside, strict=True)):
+        log.seen[:, 0] += one
+        log.cycle[:] += 11 - len(one)
+        log.track[:] = number
+    joined = empty_log()._replace(
+        **{name: np.concatenate([getattr(log, name) for log in parts]) for name in empty_log()._fields}
+    )
+    order = np.argsort(joined.cycle, kind="stable")
+    return lengths(Heard(joined.take(order), np.zeros(11), np.zeros((11, 3)), 0.1, np.zeros(3), 0.5))
+
+
+def test_each_path_has_the_scatter_that_it_shows_itself():
+    """Three components, five, which are too few for a rate, eleven that hop, and eleven that do not."""
+    hops = np.random.default_rng(5).normal(0.0, 0.1, 11)
+    found = _paths_heard([hops[:3], hops[:5], hops, np.zeros(11)])
+    plain, scattered = rates(found), rates(found, scattered=True)
+    assert scattered.number == 2
+    ratio = scattered.variance / plain.variance
+    assert ratio[np.argmax(np.abs(plain.rate))] > 100.0
+    assert ratio[np.argmin(np.abs(plain.rate))] == 1.0
+
+
+def test_a_motion_that_is_no_quadratic_is_no_scatter_where_the_positions_follow_it():
+    time = 0.1 * np.arange(11)
+    place = np.stack([0.1 * np.sin(15.0 * time), np.zeros(11), np.zeros(11)], axis=1)
+    log = _wall_heard(np.zeros(11), np.full((11, 2), 0.003))
+    log.seen[:, 0] += 2.0 * place[:, 0]
+    found = lengths(Heard(log, np.zeros(11), place, 0.1, np.zeros(3), 0.5))
+    np.testing.assert_allclose(rates(found, scattered=True).variance, rates(found).variance)
+
+
+def test_another_motion_is_asked_for_by_paths_as_they_scatter_and_births_by_paths_as_they_fit(monkeypatch):
+    asked = []
+    monkeypatch.setattr(motion_agreement, "_lengths", lambda *given: given)
+    monkeypatch.setattr(motion_agreement, "is_checked", lambda state: True)
+    monkeypatch.setattr(
+        motion_agreement.length_rates, "rates", lambda found, scattered=False: asked.append(scattered) or NOTHING
+    )
+    window = SimpleNamespace(step=np.full(10, 0.1), turns=False)
+    state = SimpleNamespace(window=window)
+    assert motion_agreement.log_other_motion(state) == 0.0
+    assert motion_agreement.log_agreement(state, window) == 0.0
+    assert asked == [True, False]
+
+
+NOTHING = SimpleNamespace(number=0)
