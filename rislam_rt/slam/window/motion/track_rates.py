@@ -16,6 +16,7 @@ from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.length_rates import enough_measured, shown_scatter
+from rislam_rt.slam.window.motion.motion_evidence import with_motion_evidence
 from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
@@ -70,15 +71,16 @@ class _Histories(NamedTuple):
 
 
 def with_rates(state: WindowState) -> WindowState:
-    """State whose window holds what the rates of its unexplained tracks tell of the poses."""
-    return state._replace(window=state.window._replace(rates=rate_factor(state)))
+    """State whose window holds what the rates of its unexplained tracks tell of the poses; where wall returns are
+    thrown away, of those that are held for none."""
+    return state._replace(window=state.window._replace(rates=rate_factor(with_motion_evidence(state))))
 
 
 def rate_factor(state: WindowState) -> RateFactor | None:
-    """What the lengths of the window's unexplained tracks tell of its poses; None where no track is long enough, where
-    their directions hang on an estimated heading, and without wall returns, which then must move nothing."""
+    """What the lengths of the window's unexplained tracks tell of its poses; None where no track is long enough, or
+    where their directions hang on an estimated heading."""
     window, log = state.window, state.log
-    if window.turns or not state.scene.use_vt or len(state.heading) != window.num_poses:
+    if window.turns or len(state.heading) != window.num_poses:
         return None
     first = state.cycle - window.num_poses + 1
     rows = (~log.explained & (log.track >= 0) & (log.cycle >= first)).nonzero()[0]
