@@ -85,7 +85,8 @@ def weigh_manoeuvre(
 
     It is an acceleration of the liveliest mode, where the agent faces or in any direction, or upwards.
     """
-    found, log_odds, change = length_rates.accelerations(told, steps), -np.inf, np.zeros(3)
+    log_odds, change, shares = -np.inf, np.zeros(3), length_rates.kind_shares(state.scene.use_vt)
+    found = length_rates.accelerations(told, steps)._replace(shares=shares)
     if found.number < egomotion.FEWEST:
         return log_odds, change
     found = _with_history(state, found, steps)
@@ -112,6 +113,7 @@ def _with_history(state: WindowState, found: length_rates.Rates, steps: int) -> 
         return found
     place, passed = window_gaussian.floor_poses(state.window)[rows, :3], state.window.step[rows.start : until - 1]
     before = length_rates.rates(_lengths(state._replace(log=log), rows, float(passed.mean())))
+    before = before._replace(shares=found.shares)
     return egomotion.with_history(found, before, (place[-1] - place[0]) / passed.sum()) if before.number else found
 
 

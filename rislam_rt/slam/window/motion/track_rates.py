@@ -15,7 +15,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
-from rislam_rt.slam.window.divergence.length_rates import enough_measured, shown_scatter
+from rislam_rt.slam.window.divergence.length_rates import enough_measured, kind_shares, shown_scatter
 from rislam_rt.slam.window.motion.motion_evidence import with_motion_evidence
 from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
@@ -154,16 +154,17 @@ def _directions(heading: Floats, ends: PathDirections, slot: Integers, clock: Fl
 
 
 def _shares(found: _Histories, state: WindowState) -> Floats:
-    """Probability (T,) that each track's rate tells of the agent's way, as for half of all; of the others a quarter
-    keep their length, as over opposite walls, and the rest have any rate that the agent's speed allows."""
+    """Probability (T,) that each track's rate tells of the agent's way, as those do that come back as they went; of the
+    others some keep their length, and the rest have any rate that the agent's speed allows."""
+    follows, keeps = kind_shares(state.scene.use_vt)
     (rate, whole), spread = found.slopes(found.left, found.length)
     mean = np.stack(found.means(*found.toward.T), axis=1)
     doubt = np.vecdot(mean**2, way_variance(state.window, *found.ends.T)) / found.span**2
     half = 1.0 / np.bincount(found.owner)[found.owner]
-    along = 0.5 * half * _normal(rate, spread + found.own_variance + doubt)
-    kept = 0.5 / 4.0 * _normal(whole, spread)
+    along = follows * half * _normal(rate, spread + found.own_variance + doubt)
+    kept = keeps * _normal(whole, spread)
     either = np.bincount(found.owner, along)[found.owner]
-    return along / (either + kept + 0.5 * 3.0 / 4.0 / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
+    return along / (either + kept + (1.0 - follows - keeps) / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
 
 
 def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:
