@@ -87,6 +87,13 @@ class Rates(_PlainRates):
     """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
     an array hears some alike from two."""
 
+    def take(self, kept: Booleans) -> "Rates":
+        """Rates of only some (E,) of the directions of tracks and paths."""
+        each = {name: field[kept] for name, field in self._asdict().items() if name in _EACH and field is not None}
+        owner = None if self.owner is None else np.unique(self.owner[kept], return_inverse=True)[1]
+        astray = self.astray[kept] if isinstance(self.astray, np.ndarray) else self.astray
+        return self._replace(**each, owner=owner, astray=astray)
+
     @cached_property
     def number(self) -> int:
         """Number T of the tracks and paths whose lengths have a rate."""
@@ -133,6 +140,10 @@ class Rates(_PlainRates):
     def mixed_kept(self) -> Floats:
         """(T,) these densities by track or path, over its directions."""
         return self.mixed(self.share * self.kept)
+
+
+_EACH = ("toward", "rate", "variance", "blur", "whole", "bend", "bend_variance", "name")
+"""Fields of `Rates` with a row for each direction of a track or path."""
 
 
 class Heard(NamedTuple):

@@ -15,7 +15,6 @@ from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
 from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares, unique_forms
-from rislam_rt.slam.window.motion.motion_evidence import with_motion_evidence
 from rislam_rt.slam.window.motion.motion_learning import COLUMNS, UP, vertical_information
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise
@@ -39,8 +38,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
         return state
     if len(window.step) <= LASTED[0] or not (window.step > 0.0).all():
         return state
-    evidence = with_motion_evidence(state)
-    told = motion_agreement.latest_lengths(evidence)
+    told = motion_agreement.latest_lengths(state)
     if told is None:
         return state
     # who manoeuvres goes on doing so; who does not may have begun in any of the steps
@@ -50,7 +48,7 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     best, accel, steps = 0.0, np.zeros(3), 0
     for each in [each for each in LASTED if each < len(window.step)]:
         share = np.maximum(lively, 1.0 - CONSTANTS.stay**each)
-        log_odds, by = motion_agreement.weigh_manoeuvre(evidence, told, each, np.log(share / (1.0 - share)) - least)
+        log_odds, by = motion_agreement.weigh_manoeuvre(state, told, each, np.log(share / (1.0 - share)) - least)
         if log_odds > best:
             best, accel, steps = log_odds, by, each
     if not steps:

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Floats, Integers
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
 from rislam_rt.slam.window.divergence.length_rates import enough_measured, kind_shares, shown_scatter
-from rislam_rt.slam.window.motion.motion_evidence import with_motion_evidence
+from rislam_rt.slam.window.divergence.motion_evidence import are_no_wall_returns
 from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
@@ -54,6 +54,16 @@ class _Histories(NamedTuple):
     owner: Integers
     """(T,) track of each direction."""
 
+    def take(self, kept: Booleans) -> "_Histories":
+        """Histories of only some (T,) of the tracks, from all their directions."""
+        ends = kept[self.owner]
+        rows, number = ends[self.which], np.cumsum(ends) - 1
+        each = {name: field[rows] for name, field in self._asdict().items() if name not in _BY_DIRECTION}
+        every = {name: field[ends] for name, field in self._asdict().items() if name in _BY_DIRECTION}
+        return _Histories(
+            **each | every | {"which": number[self.which[rows]], "owner": (np.cumsum(kept) - 1)[every["owner"]]}
+        )
+
     def total(self, value: Floats) -> Floats:
         """Sums (T,) over each track's history of values (N,)."""
         return np.asarray(np.bincount(self.which, value, len(self.span)), dtype=np.float64)
@@ -70,10 +80,14 @@ class _Histories(NamedTuple):
         return [self.total(weighted * value) / information for value in values], 1.0 / information
 
 
+_BY_DIRECTION = ("ends", "span", "speed", "own_variance", "owner")
+"""Fields of `_Histories` with a row for each track's direction; the others have one for each component."""
+
+
 def with_rates(state: WindowState) -> WindowState:
     """State whose window holds what the rates of its unexplained tracks tell of the poses; where wall returns are
-    thrown away, of those that are held for none."""
-    return state._replace(window=state.window._replace(rates=rate_factor(with_motion_evidence(state))))
+    thrown away, of those that are classified as none."""
+    return state._replace(window=state.window._replace(rates=rate_factor(state)))
 
 
 def rate_factor(state: WindowState) -> RateFactor | None:
@@ -93,7 +107,9 @@ def rate_factor(state: WindowState) -> RateFactor | None:
     ends = log.both_ends(rows, which, state.scene.radio.array.spacing)
     apart = state.scene.body.tx_offset - state.scene.body.rx_offset
     found = _histories(state, with_reciprocal(log, ends, apart), first)
-    return _factor(found, _shares(found, state), state)
+    if not state.scene.use_vt:  # paired with all that is heard, but of these alone
+        found = found.take(are_no_wall_returns(state, np.unique(log.track[rows])))
+    return _factor(found, _shares(found, state), state) if len(found.span) else None
 
 
 def _histories(state: WindowState, ends: PathDirections, start: int) -> _Histories:

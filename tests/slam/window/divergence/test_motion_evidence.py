@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rislam_rt.slam.window.motion.motion_evidence import log_odds_of_no_wall_return, with_motion_evidence
 from scipy.stats import norm
 
 from rislam_rt.model import RadioConfig
@@ -12,7 +13,6 @@ from rislam_rt.slam.observations import OTHER, PANEL
 from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
-from rislam_rt.slam.window.motion.motion_evidence import log_odds_of_no_wall_return, with_motion_evidence
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.smoother import window_gaussian
 

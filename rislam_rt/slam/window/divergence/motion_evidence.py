@@ -1,38 +1,46 @@
-"""What may tell of the motion before it is understood: all that is heard, or, where wall returns are thrown away, what
-is held for none.
+"""Which tracks and paths are evidence of the motion: all that are heard, or, where wall returns are thrown away, those
+that are classified as none.
 
-How loud a track is tells it from a wall's return long before its bends do: a mirror of any building material is louder
-than a small thing. What is held for no wall return tells of the motion, as the points do that it may become.
+How loud a track is tells it from a wall return long before the bends of its length do: most walls reflect more than a
+small thing scatters. A track that is classified as no wall return is evidence, as the point is that it may become.
 """
 
 import numpy as np
 
-from rislam_rt.arrays import Floats
+from rislam_rt.arrays import Booleans, Floats, Integers
 from rislam_rt.ris.path_gain import point_amplitude
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL, free_space
 from rislam_rt.slam.predicted_returns import TX
+from rislam_rt.slam.window.divergence.length_rates import BEYOND_WALLS, Rates
 from rislam_rt.slam.window.measurement_log import Log
 from rislam_rt.slam.window.state import WindowState
 
 
-def with_motion_evidence(state: WindowState) -> WindowState:
-    """State whose log holds what may tell of the motion: all of it, or, without wall returns, explained components that
-    bounce off more than walls, and tracks that are held for no wall return by how loud they are (`born`)."""
+def with_evidence(state: WindowState, found: Rates) -> Rates:
+    """Rates of path lengths that are evidence of the motion: all, or, without wall returns, those of explained paths
+    over more than walls and of tracks that are classified as no wall return."""
     if state.scene.use_vt:
-        return state
-    log = state.log
-    free = (~log.explained & (log.track >= 0)).nonzero()[0]
-    tells = log.explained & (log.form[:, 0, 0] != TX)
-    if len(free):
-        _, which = np.unique(log.track[free], return_inverse=True)
-        tells[free] = (log_odds_of_no_wall_return(state, log.take(free), which) > CONSTANTS.log_born)[which]
-    return state._replace(log=log.take(tells))
+        return found
+    assert found.name is not None
+    track = found.name[:, -1]
+    return found.take(np.where(track < 0, found.name[:, 0] != TX, are_no_wall_returns(state, track)))._replace(
+        shares=BEYOND_WALLS
+    )
 
 
-def log_odds_of_no_wall_return(state: WindowState, log: Log, which: np.ndarray) -> Floats:
+def are_no_wall_returns(state: WindowState, track: Integers) -> Booleans:
+    """Which of the tracks with these idents (T,) are classified as no wall returns (`born`), as evidence of the motion,
+    by those of their components that nothing explains."""
+    free = state.log.take(~state.log.explained & (state.log.track >= 0))
+    ident, which = np.unique(free.track, return_inverse=True)
+    return np.isin(track, ident[log_odds_of_no_wall_return(state, free, which) > CONSTANTS.log_born])
+
+
+def log_odds_of_no_wall_return(state: WindowState, log: Log, which: Integers) -> Floats:
     """Log odds (T,) that tracks, to which the components of a `log` belong as `which` (N,) tells, are paths over points
-    or panels against returns over one wall or two, by their mean length and amplitude.
+    against returns over one wall or two, by their mean length and log amplitude; what most codes tell to run over a
+    panel is no wall return.
 
     Densities beforehand are those by which births weigh the same paths (`hypothesis_evidence`), but that what is louder
     than a mirror may be a wall return, too, which others have joined.
