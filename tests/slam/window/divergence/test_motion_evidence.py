@@ -1,18 +1,25 @@
-"""What may tell of the motion where wall returns are thrown away: tracks that are too faint for one."""
+"""Evidence of the motion where wall returns are thrown away: tracks that are too faint for one."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rislam_rt.slam.window.motion.motion_evidence import log_odds_of_no_wall_return, with_motion_evidence
+from scipy.optimize import brentq
 from scipy.stats import norm
 
 from rislam_rt.model import RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import OTHER, PANEL
+from rislam_rt.slam.observations import OTHER, PANEL, UNTOLD
 from rislam_rt.slam.predicted_returns import NONE, TX
+from rislam_rt.slam.window.divergence import length_rates
+from rislam_rt.slam.window.divergence.motion_evidence import (
+    are_no_wall_returns,
+    log_odds_of_no_wall_return,
+    with_evidence,
+)
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.motion import track_rates
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.smoother import window_gaussian
 
@@ -83,20 +90,112 @@ def test_faint_tracks_tell_the_velocity_and_wall_returns_move_nothing():
     np.testing.assert_allclose(loud, TRUE[:2], atol=5e-3)
 
 
-def test_of_tracks_of_both_kinds_the_faint_ones_are_kept():
-    log = with_motion_evidence(state_of(tracks(LENGTH, np.where(np.arange(4) < 2, WALLS, SPHERES)))).log
-    assert set(log.track) == {2, 3}
-    assert len(log.cycle) == 2 * COUNT
+def told_by(log):
+    """Which of four tracks are classified as no wall returns."""
+    return are_no_wall_returns(state_of(log), np.arange(4)).tolist()
 
 
-def test_what_is_understood_is_kept_unless_it_runs_over_walls_alone():
-    log = with_motion_evidence(state_of(tracks(LENGTH, WALLS, base=np.array([TX, 3, UNKNOWN, 4])))).log
-    assert set(log.form[:, 0, 0]) == {3, 4}
+def level_of(length, log_odds):
+    """Log amplitude at which a track of a length [m] is no wall return at these log odds, below the mirrors'."""
+
+    def off(level):
+        log = tracks(np.full(1, length), np.full(1, level))
+        return log_odds_of_no_wall_return(state_of(log), log, np.zeros(COUNT, dtype=np.int64))[0] - log_odds
+
+    return brentq(off, mirror(length, 0.1) - 4.0, mirror(length, 0.5))
 
 
-def test_what_the_codes_tell_to_run_over_a_panel_is_no_wall_return_however_loud():
-    log = with_motion_evidence(state_of(tracks(LENGTH, WALLS, side=np.array([PANEL, OTHER, OTHER, OTHER])))).log
-    assert set(log.track) == {0}
+def test_what_is_merely_likelier_to_be_no_wall_return_is_no_evidence():
+    """Held for true from log odds of 2.94 on, 19 to 1; all tracks have the same mean length."""
+    log = tracks(np.full(4, 7.0), np.array([level_of(7.0, odds) for odds in (0.5, 2.7, 3.2, 6.0)]))
+    log.seen[:, 0] = 7.0
+    assert told_by(log) == [False, False, True, True]
+
+
+def test_a_track_is_classified_by_its_mean_log_amplitude():
+    """As faint as a sphere in half of its cycles, and as a wall in the others, it is louder than spheres are."""
+    log = tracks(LENGTH, SPHERES)
+    log.log_amplitude[:] = np.where((log.cycle % 2 == 0) & (log.track < 2), WALLS[log.track], SPHERES[log.track])
+    quiet = tracks(LENGTH, 0.5 * (WALLS + SPHERES))
+    assert told_by(log)[:2] == told_by(quiet)[:2]
+    assert told_by(log)[2:] == [True, True]
+    few = tracks(LENGTH, SPHERES)
+    few.log_amplitude[few.cycle == 0] = WALLS
+    assert told_by(few) == [True] * 4
+
+
+def test_tracks_over_a_panel_are_no_wall_returns_however_loud():
+    """Over any panel, if the receiver tells it for certain, in most cycles."""
+    assert told_by(tracks(LENGTH, WALLS, side=np.array([PANEL, PANEL + 1, OTHER, UNTOLD]))) == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    log = tracks(LENGTH, WALLS)
+    log.side[:] = np.where(log.cycle < np.array([2, 5, 8, 12])[log.track], PANEL, OTHER)
+    assert told_by(log) == [False, False, True, True]
+
+
+def test_what_is_explained_counts_for_no_track():
+    """A track's earlier components, as the map explains them, tell nothing of what it is by now."""
+    log = tracks(LENGTH, SPHERES)
+    log.form[log.cycle < 6, 0, 0] = 3
+    log.log_amplitude[log.cycle < 6] = 0.0
+    assert told_by(log) == [True] * 4
+
+
+def test_the_log_and_the_tracks_stay_as_they_are():
+    state = state_of(tracks(LENGTH, np.where(np.arange(4) < 2, WALLS, SPHERES)))
+    after = with_rates(state)
+    assert after.log is state.log
+    assert after.window.rates.common.shape == (COUNT, 3, 4)  # two numbers of each of two tracks
+
+
+def _rates(state):
+    """Rates of all tracks and explained paths."""
+    place = window_gaussian.poses(state.window)[:, :3]
+    heard = length_rates.Heard(state.log, state.heading, place, STEP, np.zeros(3), 0.5)
+    return length_rates.rates(length_rates.lengths(heard))
+
+
+def test_rates_of_walls_alone_are_no_evidence():
+    """Of tracks by their loudness, of explained paths by what they run over; with wall returns all are."""
+    log = tracks(LENGTH, np.array([WALLS[0], SPHERES[1], WALLS[2], WALLS[3]]), base=np.array([TX, UNKNOWN, UNKNOWN, 4]))
+    found = _rates(state_of(log))
+    told = with_evidence(state_of(log), found)
+    assert {(int(base), int(track)) for base, *_, track in told.name} == {(UNKNOWN, 1), (4, -1)}
+    rows = [found.name.tolist().index(name) for name in told.name.tolist()]
+    for field in ("toward", "rate", "variance", "blur", "whole", "bend", "bend_variance"):
+        np.testing.assert_array_equal(getattr(told, field), getattr(found, field)[rows])
+    assert with_evidence(state_of(log, use_vt=True), found) is found
+    np.testing.assert_allclose(found.kinds.follows, 0.5)
+    np.testing.assert_allclose(told.kinds.follows, 0.25)  # of 3079 paths beyond walls 26 to 37 %
+    np.testing.assert_allclose(told.kinds.follows + told.kinds.keeps + told.kinds.other, 1.0)
+
+
+def test_a_track_that_is_heard_alike_from_two_directions_keeps_both():
+    found = _rates(state_of(tracks(LENGTH, SPHERES)))
+    owner = np.array([0, 1, 2, 3, 1])
+    twice = found._replace(owner=owner, **{
+        name: getattr(found, name)[owner]
+        for name in ("toward", "rate", "variance", "blur", "whole", "bend", "bend_variance", "name")
+    })  # fmt: skip
+    kept = twice.take(owner != 0)
+    np.testing.assert_array_equal(kept.owner, [0, 1, 2, 0])
+    np.testing.assert_array_equal(kept.share, [0.5, 1.0, 1.0, 0.5])
+    np.testing.assert_array_equal(kept.rate, found.rate[[1, 2, 3, 1]])
+
+
+def test_a_path_whose_reciprocal_is_louder_has_both_directions():
+    """Two tracks as long as each other, one over the limit and one below: it alone counts, along both directions."""
+    way = -(RAYS[0] + RAYS[1]) @ TRUE
+    log = tracks(np.full(4, 7.0), np.array([level_of(7.0, odds) for odds in (3.2, 2.6, -2.0, -2.0)]))
+    log.seen[:, 0] = 7.0 + np.array([0.0, 0.0, 3.0, 6.0])[log.track] + way * STEP * log.cycle
+    assert told_by(log)[:2] == [True, False]
+    told = with_rates(state_of(log)).window.rates
+    toward = np.unique(told.common.reshape(COUNT, 3, -1, 2)[3, :, :, 0].T.round(12), axis=0)
+    assert len(toward) == 2  # back as it went, and along both
 
 
 @pytest.mark.parametrize("length", [4.0, 12.0, 30.0])
@@ -118,3 +217,14 @@ def test_the_odds_are_those_of_the_densities_of_loudness(length, below):
     log.seen[:, 0] = length
     found = log_odds_of_no_wall_return(state_of(log), log, np.zeros(COUNT, dtype=np.int64))
     np.testing.assert_allclose(found, expected, rtol=1e-9)  # sums of logarithms in double precision
+
+
+def test_fewer_paths_beyond_walls_come_back_as_they_went(monkeypatch):
+    """Of tracks that agree with the motion, the odds are those beforehand times what their rates tell."""
+    shares = []
+    monkeypatch.setattr(track_rates, "_factor", lambda found, share, state: shares.append(share) or None)
+    for use_vt in (True, False):
+        with_rates(state_of(tracks(LENGTH, SPHERES), use_vt=use_vt))
+    every, beyond = (share / (1.0 - share) for share in shares)
+    # a length that changes by 0.3 m/s is not one that stays
+    np.testing.assert_allclose(beyond / every, (0.25 / 0.72) / (0.5 / 0.375), rtol=1e-3)
