@@ -17,26 +17,6 @@ EARLY = 4
 """...and of one of the first tracks, while there are no longer ones: the fewest that scatter about a quadratic."""
 
 
-class KindShares(NamedTuple):
-    """Shares of all paths, beforehand, by how their lengths change as the agent moves."""
-
-    follows: float
-    """Comes back as it went: over one wall, two at right angles, or a thing alone."""
-    keeps: float
-    """Keeps its length, as over opposite walls; the rest does neither."""
-
-
-ANY_PATHS = KindShares(0.5, 0.125)
-"""Of all that is heard: half come back as they went; a quarter of the others keep their length."""
-BEYOND_WALLS = KindShares(0.25, 0.03)
-"""Of paths that are no wall returns: one point is heard straight once, and over a wall on one leg in many ways."""
-
-
-def kind_shares(use_vt: bool) -> KindShares:
-    """Shares of the paths that are asked for their rates: of all, or, without wall returns, of others alone."""
-    return ANY_PATHS if use_vt else BEYOND_WALLS
-
-
 class _PlainRates(NamedTuple):
     """Rates of the path lengths of T tracks or explained paths, E in all."""
 
@@ -66,8 +46,6 @@ class _PlainRates(NamedTuple):
     """(E,) probability of a rate that no thing at rest gives: the track changed paths, or something moves by itself."""
     name: Integers | None = None
     """(E, 6) what names the track or path for life."""
-    shares: KindShares = ANY_PATHS
-    """Of the kinds of paths, beforehand."""
     known: "Kinds | None" = None
     """What each path is held for by what it did before; None where nothing is known of that."""
 
@@ -86,13 +64,6 @@ class Kinds(NamedTuple):
 class Rates(_PlainRates):
     """Rates at which the lengths of T tracks or explained paths change, with their directions of arrival: E in all, as
     an array hears some alike from two."""
-
-    def take(self, kept: Booleans) -> "Rates":
-        """Rates of only some (E,) of the directions of tracks and paths."""
-        each = {name: field[kept] for name, field in self._asdict().items() if name in _EACH and field is not None}
-        owner = None if self.owner is None else np.unique(self.owner[kept], return_inverse=True)[1]
-        astray = self.astray[kept] if isinstance(self.astray, np.ndarray) else self.astray
-        return self._replace(**each, owner=owner, astray=astray)
 
     @cached_property
     def number(self) -> int:
@@ -120,9 +91,9 @@ class Rates(_PlainRates):
 
     @cached_property
     def kinds(self) -> Kinds:
-        """What each path is held for: by what it was, or else as `shares` have it."""
-        every, (follows, keeps) = np.ones(self.number), self.shares
-        return self.known or Kinds(follows * self.share, keeps * every, (1.0 - follows - keeps) * every)
+        """What each path is held for: half of all follow the agent; of the others a quarter keep their length."""
+        every = np.ones(self.number)
+        return self.known or Kinds(0.5 * self.share, 0.125 * every, 0.375 * every)
 
     @cached_property
     def lean(self) -> Floats:
@@ -140,10 +111,6 @@ class Rates(_PlainRates):
     def mixed_kept(self) -> Floats:
         """(T,) these densities by track or path, over its directions."""
         return self.mixed(self.share * self.kept)
-
-
-_EACH = ("toward", "rate", "variance", "blur", "whole", "bend", "bend_variance", "name")
-"""Fields of `Rates` with a row for each direction of a track or path."""
 
 
 class Heard(NamedTuple):

@@ -10,7 +10,6 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.divergence import egomotion, length_rates
-from rislam_rt.slam.window.divergence.motion_evidence import with_evidence
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
@@ -86,7 +85,7 @@ def weigh_manoeuvre(
 
     It is an acceleration of the liveliest mode, where the agent faces or in any direction, or upwards.
     """
-    found, log_odds, change = with_evidence(state, length_rates.accelerations(told, steps)), -np.inf, np.zeros(3)
+    found, log_odds, change = length_rates.accelerations(told, steps), -np.inf, np.zeros(3)
     if found.number < egomotion.FEWEST:
         return log_odds, change
     found = _with_history(state, found, steps)
@@ -112,7 +111,7 @@ def _with_history(state: WindowState, found: length_rates.Rates, steps: int) -> 
     if silent or until - rows.start < length_rates.MEASURED:
         return found
     place, passed = window_gaussian.floor_poses(state.window)[rows, :3], state.window.step[rows.start : until - 1]
-    before = with_evidence(state, length_rates.rates(_lengths(state._replace(log=log), rows, float(passed.mean()))))
+    before = length_rates.rates(_lengths(state._replace(log=log), rows, float(passed.mean())))
     return egomotion.with_history(found, before, (place[-1] - place[0]) / passed.sum()) if before.number else found
 
 

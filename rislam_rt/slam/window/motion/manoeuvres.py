@@ -33,8 +33,8 @@ def with_manoeuvre(state: WindowState) -> WindowState:
     not. What scatter wall returns were held to have is weighed again, as long as it goes on: first by the cycles
     before, so that they tell of the motion what they can, then by all.
     """
-    window = state.window
-    if window.turns or state.config.motion != "learnt":  # as `rate_factor` has it; told stays told
+    window, scene = state.window, state.scene
+    if window.turns or not scene.use_vt or state.config.motion != "learnt":  # as `rate_factor` has it; told stays told
         return state
     if len(window.step) <= LASTED[0] or not (window.step > 0.0).all():
         return state

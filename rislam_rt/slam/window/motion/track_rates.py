@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rislam_rt.arrays import Booleans, Floats, Integers
+from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
-from rislam_rt.slam.window.divergence.length_rates import enough_measured, kind_shares, shown_scatter
-from rislam_rt.slam.window.divergence.motion_evidence import are_no_wall_returns
+from rislam_rt.slam.window.divergence.length_rates import enough_measured, shown_scatter
 from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance
@@ -54,16 +53,6 @@ class _Histories(NamedTuple):
     owner: Integers
     """(T,) track of each direction."""
 
-    def take(self, kept: Booleans) -> "_Histories":
-        """Histories of only some (T,) of the tracks, from all their directions."""
-        ends = kept[self.owner]
-        rows, number = ends[self.which], np.cumsum(ends) - 1
-        each = {name: field[rows] for name, field in self._asdict().items() if name not in _BY_DIRECTION}
-        every = {name: field[ends] for name, field in self._asdict().items() if name in _BY_DIRECTION}
-        return _Histories(
-            **each | every | {"which": number[self.which[rows]], "owner": (np.cumsum(kept) - 1)[every["owner"]]}
-        )
-
     def total(self, value: Floats) -> Floats:
         """Sums (T,) over each track's history of values (N,)."""
         return np.asarray(np.bincount(self.which, value, len(self.span)), dtype=np.float64)
@@ -80,21 +69,16 @@ class _Histories(NamedTuple):
         return [self.total(weighted * value) / information for value in values], 1.0 / information
 
 
-_BY_DIRECTION = ("ends", "span", "speed", "own_variance", "owner")
-"""Fields of `_Histories` with a row for each track's direction; the others have one for each component."""
-
-
 def with_rates(state: WindowState) -> WindowState:
-    """State whose window holds what the rates of its unexplained tracks tell of the poses; where wall returns are
-    thrown away, of those that are classified as none."""
+    """State whose window holds what the rates of its unexplained tracks tell of the poses."""
     return state._replace(window=state.window._replace(rates=rate_factor(state)))
 
 
 def rate_factor(state: WindowState) -> RateFactor | None:
-    """What the lengths of the window's unexplained tracks tell of its poses; None where no track is long enough, or
-    where their directions hang on an estimated heading."""
+    """What the lengths of the window's unexplained tracks tell of its poses; None where no track is long enough, where
+    their directions hang on an estimated heading, and without wall returns, which then must move nothing."""
     window, log = state.window, state.log
-    if window.turns or len(state.heading) != window.num_poses:
+    if window.turns or not state.scene.use_vt or len(state.heading) != window.num_poses:
         return None
     first = state.cycle - window.num_poses + 1
     rows = (~log.explained & (log.track >= 0) & (log.cycle >= first)).nonzero()[0]
@@ -107,9 +91,7 @@ def rate_factor(state: WindowState) -> RateFactor | None:
     ends = log.both_ends(rows, which, state.scene.radio.array.spacing)
     apart = state.scene.body.tx_offset - state.scene.body.rx_offset
     found = _histories(state, with_reciprocal(log, ends, apart), first)
-    if not state.scene.use_vt:  # paired with all that is heard, but of these alone
-        found = found.take(are_no_wall_returns(state, np.unique(log.track[rows])))
-    return _factor(found, _shares(found, state), state) if len(found.span) else None
+    return _factor(found, _shares(found, state), state)
 
 
 def _histories(state: WindowState, ends: PathDirections, start: int) -> _Histories:
@@ -170,17 +152,16 @@ def _directions(heading: Floats, ends: PathDirections, slot: Integers, clock: Fl
 
 
 def _shares(found: _Histories, state: WindowState) -> Floats:
-    """Probability (T,) that each track's rate tells of the agent's way, as those do that come back as they went; of the
-    others some keep their length, and the rest have any rate that the agent's speed allows."""
-    follows, keeps = kind_shares(state.scene.use_vt)
+    """Probability (T,) that each track's rate tells of the agent's way, as for half of all; of the others a quarter
+    keep their length, as over opposite walls, and the rest have any rate that the agent's speed allows."""
     (rate, whole), spread = found.slopes(found.left, found.length)
     mean = np.stack(found.means(*found.toward.T), axis=1)
     doubt = np.vecdot(mean**2, way_variance(state.window, *found.ends.T)) / found.span**2
     half = 1.0 / np.bincount(found.owner)[found.owner]
-    along = follows * half * _normal(rate, spread + found.own_variance + doubt)
-    kept = keeps * _normal(whole, spread)
+    along = 0.5 * half * _normal(rate, spread + found.own_variance + doubt)
+    kept = 0.5 / 4.0 * _normal(whole, spread)
     either = np.bincount(found.owner, along)[found.owner]
-    return along / (either + kept + (1.0 - follows - keeps) / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
+    return along / (either + kept + 0.5 * 3.0 / 4.0 / (4.0 * found.speed + 2.0 * np.sqrt(doubt)))
 
 
 def _factor(found: _Histories, share: Floats, state: WindowState) -> RateFactor:

@@ -15,7 +15,6 @@ from rislam_rt.pipeline.scheme_simulation import without_panel
 from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.observations import free_space
 from rislam_rt.slam.window import filter as window_filter
 from rislam_rt.slam.window.divergence import egomotion, length_rates, motion_agreement
 from rislam_rt.slam.window.motion import manoeuvres
@@ -135,13 +134,15 @@ def test_a_manoeuvre_that_begins_has_to_be_held_for_true(lively, level, monkeypa
     assert len(found) == 3
 
 
-@pytest.mark.parametrize("blind", [None, "turns", "told"])
+@pytest.mark.parametrize("blind", [None, "turns", "no walls", "told"])
 def test_who_knows_all_that_it_hears_asks_as_well(monkeypatch, blind):
     """Where the map explains every component no track has a rate, and the explained paths tell of a manoeuvre."""
     state, asked = about_to_hear(25), []
     state = state._replace(window=state.window._replace(rates=None))
     if blind == "turns":
         state = state._replace(window=state.window._replace(accel=np.zeros((24, 4))))
+    if blind == "no walls":
+        state = state._replace(scene=state.scene._replace(use_vt=False))
     if blind == "told":
         state = state._replace(config=replace(CONFIG, motion="told"))
     monkeypatch.setattr(motion_agreement, "weigh_manoeuvre", lambda *_: asked.append(1) or (-1.0, np.zeros(3)))
@@ -281,30 +282,3 @@ def test_a_low_return_tells_less_of_a_climb():
     angle = np.arcsin(np.maximum(up, np.sqrt(0.5 * blur)))
     np.testing.assert_allclose(found.lean, blur / np.tan(angle), rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(found._replace(blur=np.zeros(4)).lean, 0.0)
-
-
-@cache
-def setting_off():
-    """The state of an agent that has set off from rest at 1 m/s^2 for 0.8 s, as it asks for manoeuvres next."""
-    time = np.maximum(0.1 * (np.arange(10) - 1), 0.0)
-    place = np.array([1.2, 3.4, 0.8]) + 0.5 * time[:, None] ** 2 * [1.0, 0.0, 0.0]
-    *_, state = states(place, time[:, None] * [1.0, 0.0, 0.0], 0.7, 1)
-    return manoeuvres.with_rates(window_filter._move(state, 0.1, 0.7))
-
-
-def test_without_wall_returns_only_faint_tracks_tell_of_a_manoeuvre(monkeypatch):
-    """As loud as mirrors, what speaks for one with wall returns does not without; twenty times fainter it does."""
-    heard, asked, weigh = setting_off(), [], egomotion.with_history
-    mirrors = free_space(heard.scene.radio) - np.log(heard.log.seen[:, 0]) + np.log(0.55)
-    heard = heard._replace(log=heard.log._replace(log_amplitude=mirrors))
-    assert manoeuvres.with_manoeuvre(heard) is not heard
-    deaf = heard._replace(scene=heard.scene._replace(use_vt=False))
-    assert manoeuvres.with_manoeuvre(deaf) is deaf
-    faint = deaf._replace(log=deaf.log._replace(log_amplitude=mirrors - np.log(20.0)))
-    monkeypatch.setattr(egomotion, "with_history", lambda *each: asked.extend(each[:2]) or weigh(*each))
-    after = manoeuvres.with_manoeuvre(faint)
-    assert after is not faint
-    speed = [window_filter.window_gaussian.now(each.window)[0][3] for each in (after, faint)]
-    assert speed[0] == pytest.approx(0.8, abs=0.1)
-    assert asked
-    assert all(each.shares == length_rates.BEYOND_WALLS for each in asked)

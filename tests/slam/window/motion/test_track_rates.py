@@ -25,7 +25,7 @@ def _log(rate):
     )  # fmt: skip
 
 
-def _state(log):
+def _state(log, *, use_vt=True):
     """An agent that is told to move at `TOLD` within 0.02 m/s, on a floor, at a constant velocity."""
     window = window_gaussian.begin(np.zeros(3), TOLD, np.array([1e-5, 1e-5, 1e-5, 0.02, 0.02, 1e-4, 0.0]))
     for _ in range(COUNT - 1):
@@ -33,7 +33,7 @@ def _state(log):
     body = SimpleNamespace(tx_offset=np.zeros(3), rx_offset=np.zeros(3))
     return SimpleNamespace(
         window=window_gaussian.solve(window), log=log, cycle=COUNT - 1, heading=np.zeros(COUNT),
-        scene=SimpleNamespace(use_vt=True, body=body, radio=RadioConfig()),
+        scene=SimpleNamespace(use_vt=use_vt, body=body, radio=RadioConfig()),
     )  # fmt: skip
 
 
@@ -71,6 +71,10 @@ def test_what_the_map_explains_counts_no_more():
     assert one.common.shape == (COUNT, 3, 2)
     log.form[:] = 0
     assert rate_factor(_state(log)) is None
+
+
+def test_wall_returns_that_are_thrown_away_move_nothing():
+    assert rate_factor(_state(_log(-2.0 * RAYS @ TRUE), use_vt=False)) is None
 
 
 def test_a_lone_path_of_another_kind_is_held_for_that():
