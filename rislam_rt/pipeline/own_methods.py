@@ -139,8 +139,7 @@ def large_sources(names: Iterable[str]) -> list[str]:
 def _copied(names: Iterable[str]) -> dict[str, Path]:
     """Files of a user's own methods that a run's folder is to hold, by path relative to the folder of their import."""
     found: dict[str, Path] = {}
-    installed = {folder.resolve() for folder in INSTALLED}
-    path = [folder for folder in _import_path() if folder not in installed]
+    path = [folder for folder in _import_path() if folder not in _installed()]
     for name in names:
         named = Path(import_module(name.partition(":")[0]).__file__ or "")  # it may import what it names
         for file in (named, Path(_file(load_own(name)) or "")):
@@ -270,10 +269,14 @@ def own_digest(file: Path) -> str:
 
 
 def _closure(file: Path) -> set[Path]:
-    """The file of a user's own method, and all that it imports, directly or not, from its own folder or package."""
-    files, left = {file}, [file]
+    """The file of a user's own method, and all that it imports, directly or not, from its own folder or package.
+
+    Its own package alone where it is installed: beside it lie all other libraries.
+    """
+    files, left, root = {file}, [file], _root(file)
+    own = root / file.relative_to(root).parts[0] if root.resolve() in _installed() else root
     while left:
-        fresh = set(_imported(left.pop())) - files
+        fresh = {one for one in _imported(left.pop()) if own in (one, *one.parents)} - files
         files |= fresh
         left += fresh
     return files
@@ -315,6 +318,11 @@ def _root(file: Path) -> Path:
         folder = folder.parent
     path = set(_import_path())
     return next((one for one in (folder, *folder.parents) if one.resolve() in path), folder)
+
+
+def _installed() -> set[Path]:
+    """`INSTALLED`, without symbolic links."""
+    return {folder.resolve() for folder in INSTALLED}
 
 
 def _import_path() -> list[Path]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rislam_rt
-from rislam_rt.pipeline.own_methods import own_digests, own_sources
+from rislam_rt.pipeline.own_methods import load_own, own_digests, own_sources
 from rislam_rt.storage.checksums import seal
 from rislam_rt.studies.score_card.score import OVER_TIME
 
@@ -100,7 +100,9 @@ def test_what_is_no_run_is_one_line(run, tmp_path, folder):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_of_a_method_of_ones_own_is_reported_and_repeated_where_its_file_is_not(run, tmp_path):
+def test_a_run_of_a_method_of_ones_own_is_reported_and_repeated_where_its_file_is_not(
+    run, tmp_path, monkeypatch, undrawn
+):
     module = f"repeated_{tmp_path.name}"
     (tmp_path / f"{module}.py").write_text(f"from {module}_more import *\n")
     (tmp_path / f"{module}_more.py").write_text(OWN)
@@ -118,11 +120,19 @@ def test_a_run_of_a_method_of_ones_own_is_reported_and_repeated_where_its_file_i
         line = (sys.executable, "-m", "rislam_rt", *words)
         return subprocess.run(line, cwd=tmp_path / "away", capture_output=True, text=True, check=False)
 
+    def report(*words):  # as a program would that starts in `away`, and has loaded nothing
+        monkeypatch.chdir(tmp_path / "away")
+        monkeypatch.setattr(sys, "path", [one for one in sys.path if one != str(tmp_path)])
+        for loaded in [one for one in sys.modules if one.startswith(module)]:
+            monkeypatch.delitem(sys.modules, loaded)
+        load_own.cache_clear()
+        return run("report", tmp_path / "mine", *words)
+
     (tmp_path / "away").mkdir()
-    done = away("report", tmp_path / "mine", "--json", "summary.json")
-    assert done.returncode == 0, done.stderr
-    assert f"'{name}': no module '{module}'; these scores are those that the run stored\n" in done.stderr
-    stored, told = (json.loads(Path(one, "summary.json").read_text())["schemes"] for one in ("mine", "away"))
+    code, _, err = report("--json", "summary.json")
+    assert code == 0, err
+    assert f"'{name}': no module '{module}'; these scores are those that the run stored\n" in err
+    stored, told = (json.loads((tmp_path / one / "summary.json").read_text())["schemes"] for one in ("mine", "away"))
     assert stored == told
     assert name in (tmp_path / "mine" / "report.html").read_text()
     # `python -m` looks in the working folder first: a file edited since is not what ran
@@ -138,7 +148,7 @@ def test_a_run_of_a_method_of_ones_own_is_reported_and_repeated_where_its_file_i
     files = {one.replace("@", ":"): digest for one, digest in marker.pop("files").items()}
     marker = seal({key: marker[key] for key in marker if key not in ("schema", "checksum")} | {"files": files})
     (tmp_path / "mine" / "run.json").write_text(json.dumps(marker))
-    assert away("report", tmp_path / "mine").returncode == 0
+    assert report()[0] == 0
     done = away("run", tmp_path / "mine" / "config.toml", "--no-report", "--out", "again")
     assert done.returncode == 0, done.stderr
     again = tmp_path / "away" / "again" / f"estimate_{module}@Resting.tum"

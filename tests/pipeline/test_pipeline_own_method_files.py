@@ -64,6 +64,20 @@ def test_within_a_package_absolute_names_are_looked_up_from_its_root(folder: Pat
     assert own_digest(folder / "tools" / "deep.py") != before
 
 
+def test_of_an_installed_method_its_own_package_counts_and_no_library_beside_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(own_methods, "INSTALLED", {folder})
+    monkeypatch.syspath_prepend(folder)
+    (folder / "tools" / "deep.py").write_text("import beside\nfrom . import near\n")
+    digests = {name: own_digest(folder / name) for name in ("mine.py", "tools/deep.py")}
+    (folder / "beside.py").write_text("a_library = 1\n")
+    assert {name: own_digest(folder / name) for name in digests} == digests
+    (folder / "tools" / "further" / "inner.py").write_text("x = 2\n")
+    assert own_digest(folder / "mine.py") == digests["mine.py"]
+    assert own_digest(folder / "tools" / "deep.py") != digests["tools/deep.py"]
+
+
 DESIGNER = "def design(belief, panel, radio, *, rng):\n    return 0\n"
 
 

@@ -97,13 +97,14 @@ def test_views_and_animations_of_a_run_have_its_colours(six):
 
 def inside(figure):
     """Whether all that a figure shows lies within it."""
-    FigureCanvasAgg(figure).draw()
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()
     box, page = figure.get_tightbbox().transformed(figure.dpi_scale_trans), figure.bbox
     return page.x0 <= box.x0 < box.x1 <= page.x1 and page.y0 <= box.y0 < box.y1 <= page.y1
 
 
 @pytest.mark.parametrize("name", FIGURES)
-@pytest.mark.parametrize("count", [1, 3, 6])
+@pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.slow), 3, 6])
 def test_no_figure_of_a_run_is_cut_off(six, name, count):
     schemes = dict(list(six.schemes.items())[-count:])
     figure = FIGURES[name](replace(six, schemes=schemes))

@@ -104,7 +104,8 @@ def measurements_of_all_slices_give_the_estimate_again(folder, spec, scheme):
 def test_warnings_of_a_run_of_which_figures_show_some_cycles(room, spec, short_slices, tmp_path, monkeypatch):
     """Clocks that lose the direct path from the fifth cycle on: 0.33 ns of 0.1 m, at 1 ns a second."""
     monkeypatch.setattr(slices, "SHOWN", 4)
-    told = spec.model_copy(update={"told": spec.told.model_copy(update={"clock_drift_ns_s": -1.0})})
+    told = spec.told.model_copy(update={"clock_drift_ns_s": -1.0})
+    told = spec.model_copy(update={"told": told, "schemes": ["no_ris"]})
     found = lead(room, told, tmp_path / "run")
     assert len(found.shown.scene.agent) == 4
     (line,) = (line for line in found.shown.warnings if "receiver.min_delay" in line)
@@ -158,7 +159,7 @@ def test_it_can_be_read_again_and_a_changed_slice_is_told(short_slices, done, tm
         read_any(folder)
 
 
-def test_it_is_reported_where_a_method_of_ones_own_is_not(room, short_slices, tmp_path, monkeypatch):
+def test_it_is_reported_where_a_method_of_ones_own_is_not(room, short_slices, tmp_path, monkeypatch, undrawn):
     """Warnings of late paths once asked the method whether it uses the panel."""
     module, folder = f"away_{tmp_path.name}", tmp_path / "run"
     (tmp_path / f"{module}.py").write_text(
