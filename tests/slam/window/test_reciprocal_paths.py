@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rislam_rt.slam.window.divergence.length_rates import Heard, lengths, rates
 from rislam_rt.slam.window.measurement_log import empty_log
 from rislam_rt.slam.window.motion import track_rates
+from rislam_rt.slam.window.motion.length_rates import Heard, lengths, rates
 from rislam_rt.slam.window.reciprocal_paths import with_reciprocal
 
 STEP, COUNT = 0.1, 10

@@ -11,7 +11,6 @@ from rislam_rt.slam.window import tracks
 from rislam_rt.slam.window.births.feature_removal import remove_from_map, resolve
 from rislam_rt.slam.window.births.track_classification import NEW, TrackDecision, decide_tracks, is_clear
 from rislam_rt.slam.window.cycle_association import CycleAssociation
-from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.hypotheses.hypotheses import BESIDE, BOTH_WAYS, known_features
 from rislam_rt.slam.window.hypotheses.map_explanations import explanations
 from rislam_rt.slam.window.hypotheses.track_summary import TrackSummary, summarise_tracks
@@ -20,6 +19,7 @@ from rislam_rt.slam.window.landmarks.landmark_table import enter, idents
 from rislam_rt.slam.window.landmarks.landmark_update import add_clear_paths
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import PanelIdentity
+from rislam_rt.slam.window.motion import motion_agreement
 from rislam_rt.slam.window.smoother import window_features, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.solver_limits import ALIGNED, STRIDE

@@ -12,9 +12,9 @@ from rislam_rt.slam.predicted_returns import NONE, TX
 from rislam_rt.slam.window.births.births import births
 from rislam_rt.slam.window.births.feature_removal import resume
 from rislam_rt.slam.window.cycle_association import CycleAssociation
-from rislam_rt.slam.window.divergence.length_rates import MEASURED
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.motion.length_rates import MEASURED
 from rislam_rt.slam.window.solver_limits import STRIDE
 from rislam_rt.slam.window.state import WindowState
 from rislam_rt.slam.window.tracks import looked_as_before

@@ -13,9 +13,9 @@ from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import PANEL
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.feature_removal import resolve
-from rislam_rt.slam.window.divergence import motion_agreement
-from rislam_rt.slam.window.divergence.length_rates import MEASURED
 from rislam_rt.slam.window.measurement_log import Log, unique_forms
+from rislam_rt.slam.window.motion import motion_agreement
+from rislam_rt.slam.window.motion.length_rates import MEASURED
 from rislam_rt.slam.window.relinearisation import predictions, whitened
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
 from rislam_rt.slam.window.solver_limits import GATE

@@ -15,9 +15,9 @@ from rislam_rt.slam.observations import Observations
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.step_info import LossCause
 from rislam_rt.slam.window.cycle_association import CycleAssociation
-from rislam_rt.slam.window.divergence import egomotion
-from rislam_rt.slam.window.divergence.length_rates import Rates
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
+from rislam_rt.slam.window.motion import egomotion
+from rislam_rt.slam.window.motion.length_rates import Rates
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN, rotation

@@ -5,10 +5,11 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import tracks
-from rislam_rt.slam.window.divergence import divergence_monitor, motion_agreement
+from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.landmarks.landmark_table import empty_table
 from rislam_rt.slam.window.landmarks.landmark_update import no_observations
 from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.motion import motion_agreement
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.motion_basis import HEAD
 from rislam_rt.slam.window.start_frame import with_turn_fixed, without_velocity

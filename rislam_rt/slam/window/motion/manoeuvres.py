@@ -12,9 +12,9 @@ import numpy as np
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
-from rislam_rt.slam.window.divergence import motion_agreement
 from rislam_rt.slam.window.landmarks.landmark_update import with_scatter
 from rislam_rt.slam.window.measurement_log import reweigh_wall_returns, squares, unique_forms
+from rislam_rt.slam.window.motion import motion_agreement
 from rislam_rt.slam.window.motion.motion_learning import COLUMNS, UP, vertical_information
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import Predictions, levelled, predictions, relinearise

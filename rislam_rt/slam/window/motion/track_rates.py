@@ -15,7 +15,7 @@ import numpy as np
 from rislam_rt.arrays import Floats, Integers
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.observations import FAR
-from rislam_rt.slam.window.divergence.length_rates import enough_measured, shown_scatter
+from rislam_rt.slam.window.motion.length_rates import enough_measured, shown_scatter
 from rislam_rt.slam.window.reciprocal_paths import PathDirections, spread_by_legs, with_reciprocal
 from rislam_rt.slam.window.smoother import window_gaussian
 from rislam_rt.slam.window.smoother.marginals import way_variance

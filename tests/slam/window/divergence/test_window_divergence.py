@@ -9,11 +9,12 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
-from rislam_rt.slam.window.divergence import divergence_monitor, egomotion, motion_agreement
-from rislam_rt.slam.window.divergence.length_rates import Heard, Rates, accelerations, lengths, rates
+from rislam_rt.slam.window.divergence import divergence_monitor
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
+from rislam_rt.slam.window.motion import egomotion, motion_agreement
+from rislam_rt.slam.window.motion.length_rates import Heard, Rates, accelerations, lengths, rates
 from rislam_rt.slam.window.smoother import motion, window_features, window_gaussian
 from rislam_rt.slam.window.smoother.direction_priors import no_holds
 from rislam_rt.slam.window.smoother.motion_basis import HEAD

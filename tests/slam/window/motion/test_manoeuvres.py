@@ -16,8 +16,7 @@ from rislam_rt.scene import load_scene
 from rislam_rt.slam import SlamConfig, StartPrior
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window import filter as window_filter
-from rislam_rt.slam.window.divergence import egomotion, length_rates, motion_agreement
-from rislam_rt.slam.window.motion import manoeuvres
+from rislam_rt.slam.window.motion import egomotion, length_rates, manoeuvres, motion_agreement
 from rislam_rt.slam.window.smoother import motion as motion_modes
 
 ROOM, COUNT = Path(__file__).parents[4] / "scenes" / "paper_room", 28

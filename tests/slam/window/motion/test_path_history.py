@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import norm
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.divergence import egomotion
-from rislam_rt.slam.window.divergence.length_rates import Rates
+from rislam_rt.slam.window.motion import egomotion
+from rislam_rt.slam.window.motion.length_rates import Rates
 
 MOTION = np.array([0.6, 0.0, 0.1])
 AHEAD, ASIDE = np.array([-2.0, 0.0, 0.0]), np.array([-0.4, -1.9, -0.3])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.divergence import motion_agreement
-from rislam_rt.slam.window.divergence.length_rates import Heard, lengths, rates
 from rislam_rt.slam.window.measurement_log import empty_log
+from rislam_rt.slam.window.motion import motion_agreement
+from rislam_rt.slam.window.motion.length_rates import Heard, lengths, rates
 
 
 def _wall_heard(heading, std):

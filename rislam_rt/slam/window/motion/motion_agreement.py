@@ -9,7 +9,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.divergence import egomotion, length_rates
+from rislam_rt.slam.window.motion import egomotion, length_rates
 from rislam_rt.slam.window.smoother import motion, window_gaussian
 from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN

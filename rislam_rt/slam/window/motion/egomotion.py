@@ -17,7 +17,7 @@ import numpy as np
 
 from rislam_rt.arrays import Floats, Integers, distinct_rows
 from rislam_rt.slam.model_constants import CONSTANTS
-from rislam_rt.slam.window.divergence.length_rates import Kinds, Rates
+from rislam_rt.slam.window.motion.length_rates import Kinds, Rates
 
 FEWEST = 3
 """Tracks with a rate of length from which on the motion is checked, and pairs of a return and a component from which on
