@@ -16,6 +16,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
+from site import getusersitepackages
 from sysconfig import get_path
 from typing import Any
 
@@ -26,7 +27,9 @@ from rislam_rt.model import DataSheet, Paths, RadioConfig, RisCode, Scene, SlamE
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
-INSTALLED = {Path(__file__).parents[1], *(Path(get_path(name)) for name in ("stdlib", "purelib", "platlib"))}
+INSTALLED = {
+    Path(__file__).parents[1], Path(getusersitepackages()), *map(Path, map(get_path, ("stdlib", "purelib", "platlib"))),
+}  # fmt: skip
 """Folders of this package, of Python and of installed libraries, whose files are no file of a user's own."""
 LARGEST = 1_000_000
 """Most bytes of a file of a user's own that is copied to a run's folder."""
@@ -139,7 +142,8 @@ def large_sources(names: Iterable[str]) -> list[str]:
 def _copied(names: Iterable[str]) -> dict[str, Path]:
     """Files of a user's own methods that a run's folder is to hold, by path relative to the folder of their import."""
     found: dict[str, Path] = {}
-    path = [folder for folder in _import_path() if folder not in _installed()]
+    installed = _installed()
+    path = [folder for folder in _import_path() if folder not in installed]
     for name in names:
         named = Path(import_module(name.partition(":")[0]).__file__ or "")  # it may import what it names
         for file in (named, Path(_file(load_own(name)) or "")):

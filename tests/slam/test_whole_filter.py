@@ -135,7 +135,7 @@ def test_who_is_told_another_start_is_off_by_it_and_by_nothing_else(normal: tupl
     by = np.array([0.03, -0.02, 0.0])
     moved = go(heard._replace(start=replace(heard.start, position=heard.start.position + by)), cycles=20)
     assert len(moved.estimates[-1].map.position) > 0
-    for one, other in zip(course.estimates, moved.estimates, strict=False):
+    for one, other in zip(course.estimates[:20], moved.estimates, strict=True):
         np.testing.assert_allclose(other.position - by, one.position, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(other.map.position - by, one.map.position, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(other.covariance, one.covariance, rtol=1e-6, atol=1e-12)
