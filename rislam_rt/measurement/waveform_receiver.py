@@ -63,8 +63,8 @@ def capture(
     received: Received, radio: RadioConfig, config: ReceiverConfig, front_end: FrontEnd | None = None,
     leakage: complex = 0.0, *, rng: np.random.Generator,
 ) -> list[Capture]:  # fmt: skip
-    """Simulate what the waveform receiver samples in a cycle: one capture, or with alternation the sum and differences
-    of codes.
+    """Simulate the waveform receiver's samples of a cycle: one capture, or with alternation the sum and differences of
+    codes.
 
     Sum and difference of the two halves, over sqrt 2, hold the walls' and the panel's paths at the full energy and the
     noise of one sounding: splitting the slot costs nothing but a second code. What turns within the slot is in both.

@@ -92,7 +92,7 @@ def cluster_pool(address: str, limit: float | None) -> Iterator[tuple[Run, int]]
 
 
 def do_cell(task: Task, limit: float | None) -> tuple[Any, ...]:
-    """Run one cell of a sweep in a process of a Dask worker, and return its outcome as plain data."""
+    """Run one cell of a sweep in a Dask worker's own process pool, and return its outcome as plain data."""
     return tuple(outcome_of(_POOL.do(attempt, (Task(*task),), limit), limit))
 
 

@@ -1,5 +1,7 @@
 """Simplification of imported meshes: flat regions by their outlines, clutter by cells, with errors [m]."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rislam_rt.arrays import Booleans, Floats, Integers
@@ -8,6 +10,16 @@ from rislam_rt.geometry.triangles import distance_to_edges, triangle_heights
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions
 from rislam_rt.scene.meshes import Mesh
 from rislam_rt.scene.polygons import inside_loop, outline_loops, signed_area, simplify_loop, triangulate
+
+MAX_SHADE_FACES = 3000
+"""Most triangles of all clutter, as every segment of every path is tested against occluders; cells grow for it."""
+
+
+class ClutterMesh(NamedTuple):
+    """Triangles (T, 3, 3) [m] of one object of an imported mesh that hide and do not reflect."""
+
+    piece: int
+    triangles: Floats
 
 
 def corners_kept(facets: FlatRegions, label: Integers) -> Booleans:
@@ -108,3 +120,14 @@ def clustered(triangles: Floats, cell: float) -> tuple[Floats, float]:
 def has_area(triangles: Floats) -> Booleans:
     """Whether (T,) triangles (T, 3, 3) of a simplified mesh are higher than a tenth of a millimetre, no mere line."""
     return np.asarray(triangle_heights(triangles) > 1e-4)
+
+
+def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
+    """Simplify an imported mesh's clutter in the smallest cells that leave few triangles; also error and cell [m]."""
+    while True:
+        found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
+        if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:
+            break
+        cell *= np.sqrt(2.0)
+    error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
+    return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell

@@ -9,15 +9,19 @@ from rislam_rt.constants import COPLANAR_OFFSET
 from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FLAT_ANGLE, FlatRegions
-from rislam_rt.scene.importing.regions.mesh_simplification import clustered, corners_kept, has_area, region_mesh
+from rislam_rt.scene.importing.regions.mesh_simplification import (
+    ClutterMesh,
+    corners_kept,
+    has_area,
+    in_cells,
+    region_mesh,
+)
 from rislam_rt.scene.importing.regions.region_groups import RegionGroup
 from rislam_rt.scene.importing.regions.round_surfaces import RoundPatch, prism
 from rislam_rt.scene.meshes import Mesh
 
 RESTING = 5e-3
 """Distance [m] from a wall of the shell up to which the far side of an object stands on it, unseen."""
-MAX_SHADE_FACES = 3000
-"""Most triangles of all clutter, as every segment of every path is tested against occluders; cells grow for it."""
 OUTLINE = 0.125
 """Tolerance [wavelengths] within which outlines of flat regions are simplified."""
 SAGITTA = 0.25
@@ -37,13 +41,6 @@ class Surface(NamedTuple):
     """[m^2] of the regions that it stands for."""
     error: float
     """[m] that it is off the imported mesh."""
-
-
-class ClutterMesh(NamedTuple):
-    """Triangles (T, 3, 3) [m] of one object of an imported mesh that hide and do not reflect."""
-
-    piece: int
-    triangles: Floats
 
 
 class SortedSurfaces(NamedTuple):
@@ -184,17 +181,6 @@ def _with_clutter(
     thin = [ClutterMesh(c.piece, off_walls(c.triangles, shell)) for c in (*prisms, *thin)]
     thin = [clutter for clutter in thin if len(clutter.triangles)]
     return SortedSurfaces(surfaces, thin, error, cell, narrow, shading, gone, cylinders)
-
-
-def in_cells(raw: list[ClutterMesh], cell: float) -> tuple[list[ClutterMesh], float, float]:
-    """Simplify an imported mesh's clutter in the smallest cells that leave few triangles; also error and cell [m]."""
-    while True:
-        found = [(clutter.piece, *clustered(clutter.triangles, cell)) for clutter in raw]
-        if sum(len(triangles) for _, triangles, _ in found) <= MAX_SHADE_FACES:
-            break
-        cell *= np.sqrt(2.0)
-    error = max((moved for _, triangles, moved in found if len(triangles)), default=0.0)
-    return [ClutterMesh(piece, triangles) for piece, triangles, _ in found], error, cell
 
 
 def off_walls(triangles: Floats, walls: list[Surface]) -> Floats:

@@ -7,7 +7,8 @@ from rislam_rt.geometry.triangles import distance_to_triangles, triangle_areas
 from rislam_rt.scene.findings import Fault
 from rislam_rt.scene.importing.import_options import ImportOptions
 from rislam_rt.scene.importing.regions.flat_regions import FlatRegions, Welded
-from rislam_rt.scene.importing.regions.surfaces import ClutterMesh, SortedSurfaces, Surface, in_cells, off_walls
+from rislam_rt.scene.importing.regions.mesh_simplification import ClutterMesh, in_cells
+from rislam_rt.scene.importing.regions.surfaces import SortedSurfaces, Surface, off_walls
 from rislam_rt.scene.importing.scans.point_cloud import downsample_mesh
 from rislam_rt.scene.importing.scans.scan_outline import BRIDGE, CELL, Outline, outline_planes
 from rislam_rt.scene.importing.scans.scan_planes import WIDTHS, ScanPlane, find_planes
@@ -54,7 +55,7 @@ def sort_scan(mesh: Welded, options: ImportOptions) -> tuple[SortedSurfaces, lis
 
 
 def _lies_on(pair: tuple[ScanPlane, Outline], larger: tuple[ScanPlane, Outline], noise: float) -> bool:
-    """Whether a scanned plane is the back of what stands on a larger one: parallel, within noise and outline."""
+    """Whether a plane of a scanned room is the back of what stands on a larger one: parallel, within noise, outline."""
     (plane, outline), (wall, around) = pair, larger
     corners = outline.mesh.vertices
     if abs(float(plane.normal @ wall.normal)) < np.cos(np.radians(5.0)):

@@ -130,8 +130,8 @@ def claims(features: GaussianFeatures, view: View, density: Floats, fresh: Float
 def unresolved_neighbours(
     features: GaussianFeatures, predicted: PredictedReturns, detection: Floats, sensor: SensorModel
 ) -> tuple[Floats, ...]:
-    """For association: probability (C,) that a return merges into a louder one; mean (C, 3) and covariance of
-    neighbours' pull."""
+    """For the association of BP-SLAM's features: probability (C,) that a return merges into a louder one; mean (C, 3)
+    and covariance of neighbours' pull."""
     weight = features.existence[features.owner] * features.share * detection
     sure = np.flatnonzero(weight > 0.1)
     weight = weight[sure]

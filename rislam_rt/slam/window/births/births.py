@@ -116,8 +116,8 @@ def _taken(context: WindowState, at: Integers, form: Integers) -> bool:
 
 
 def _assign(context: WindowState, at: Integers, forms: Integers, scatter: Floats, part: float) -> WindowState:
-    """Associate a track's rows of the log with the paths of forms (2, 5) of idents, with extra variance by the track's
-    scatter."""
+    """For a birth: associate the track's rows of the log with the paths of forms (2, 5) of idents, with extra variance
+    by the track's scatter."""
     extra = CONSTANTS.memory * context.log.std[at] ** 2 * (scatter**2 - 1.0)
     return context._replace(log=context.log.explain(at, forms, part if forms[1, 0] != UNKNOWN else 0.0, 0.0, extra))
 

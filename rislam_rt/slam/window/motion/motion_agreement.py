@@ -11,7 +11,7 @@ from rislam_rt.arrays import Floats
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.window.motion import egomotion, length_rates
 from rislam_rt.slam.window.smoother import motion, window_gaussian
-from rislam_rt.slam.window.smoother.marginals import pose_covariance, way_variance
+from rislam_rt.slam.window.smoother.marginals import acceleration_covariance, pose_covariance, way_variance
 from rislam_rt.slam.window.smoother.motion_basis import TURN
 from rislam_rt.slam.window.smoother.window_gaussian import Window
 from rislam_rt.slam.window.solver_limits import LASTED, STILL
@@ -89,7 +89,7 @@ def weigh_manoeuvre(
     if found.number < egomotion.FEWEST:
         return log_odds, change
     found = _with_history(state, found, steps)
-    calm, facing = _acceleration_covariance(state.window, steps), [np.cos(state.heading[-1]), np.sin(state.heading[-1])]
+    calm, facing = acceleration_covariance(state.window, steps), [np.cos(state.heading[-1]), np.sin(state.heading[-1])]
     starts = egomotion.possible_changes(found, log_prior[0])
     if starts is not None:
         ways = [calm[:2, :2] + CONSTANTS.liveliest**2 * wide for wide in (np.outer(facing, facing), np.eye(2))]
@@ -151,13 +151,6 @@ def _mean_velocity(window: Window) -> tuple[Floats, Floats]:
     place = window_gaussian.floor_poses(window)[:, :3]
     variance = way_variance(window, np.array([-1 - cycles]), np.array([-1]))[0]
     return (place[-1] - place[-1 - cycles]) / time, np.sqrt(variance) / time + 1e-6
-
-
-def _acceleration_covariance(window: Window, steps: int) -> Floats:
-    """Covariance (3, 3) [m^2/s^4] of the mean acceleration over the window's last `steps` but one."""
-    free, size = window.accel.shape[1], len(window.covariance)
-    rows = slice(size - (steps + 1) * free, size - free)
-    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:3, :3])
 
 
 def _latest(window: Window) -> tuple[int, float]:

@@ -38,3 +38,10 @@ def pose_covariance(window: Window, axis: int) -> Floats:
     """Covariance (K, K) of all poses of the sliding window along one axis."""
     along = pose_design(window)[:, axis]
     return mapped(along, mapped(along, window.covariance).T)
+
+
+def acceleration_covariance(window: Window, steps: int) -> Floats:
+    """Covariance (3, 3) [m^2/s^4] of the mean acceleration over the window's last `steps` but one."""
+    free, size = window.accel.shape[1], len(window.covariance)
+    rows = slice(size - (steps + 1) * free, size - free)
+    return np.asarray(window.covariance[rows, rows].reshape(steps, free, steps, free).mean(axis=(0, 2))[:3, :3])
