@@ -24,3 +24,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(f"rislam_rt.pipeline.{_HOME[name]}"), name)
     raise AttributeError(f"module 'rislam_rt.pipeline' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

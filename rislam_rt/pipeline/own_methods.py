@@ -4,20 +4,16 @@ A name is `module:attribute`, as `mine:my_designer` for a function in `mine.py`,
 `GROUPS`. The command line looks for modules beside the pipeline file and in the working folder too.
 """
 
-import ast
-import hashlib
 import inspect
 import re
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from functools import cache
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, partial
 from importlib import import_module
 from importlib.metadata import entry_points
-from pathlib import Path
-from site import getusersitepackages
-from sysconfig import get_path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -27,12 +23,6 @@ from rislam_rt.model import DataSheet, Paths, RadioConfig, RisCode, Scene, SlamE
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
-INSTALLED = {
-    Path(__file__).parents[1], Path(getusersitepackages()), *map(Path, map(get_path, ("stdlib", "purelib", "platlib"))),
-}  # fmt: skip
-"""Folders of this package, of Python and of installed libraries, whose files are no file of a user's own."""
-LARGEST = 1_000_000
-"""Most bytes of a file of a user's own that is copied to a run's folder."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -93,7 +83,8 @@ def own_method_errors(name: str) -> Iterator[None]:
         raise ConfigError(f"'{name}': {error}") from error
     except (Exception, SystemExit) as error:  # a user's method may raise anything
         frames = traceback.extract_tb(error.__traceback__)
-        own = [frame for frame in frames if frame.filename == _file(load_own(name))]
+        files = {getattr(module, "__file__", None) for module in (module_of(name), defining_module(name))}
+        own = [frame for frame in frames if frame.filename in files]
         where = f" in line {own[-1].lineno} of {own[-1].filename}" if own else ""
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise ConfigError(f"'{name}': raised {cause}{where}; mend it") from error
@@ -104,57 +95,9 @@ def is_own(name: str) -> bool:
     return bool(_FORM.fullmatch(name)) or name in _offered()
 
 
-def own_digests(names: Iterable[str]) -> dict[str, str]:
-    """SHA-256 of the source files of each of `names` that is a user's own method, by name; empty if it has no file.
-
-    Files of its own package that it imports are part of it: a run's numbers depend on them.
-    """
-    files = {name: _file(load_own(name)) for name in sorted(set(names)) if is_own(name)}
-    return {name: own_digest(Path(file)) if file else "" for name, file in files.items()}
-
-
-def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
-    """Source files of a user's own methods, given by name with their `own_digests`, and of all that these count.
-
-    Content by path, relative to the folder from which they are imported; of two of one path, that which Python finds.
-
-    Left out are installed ones, those of more than `LARGEST` bytes, and files that have changed since: they are not
-    what has run.
-    """
-    same = [
-        name for name, digest in digests.items()
-        if digest and _FORM.fullmatch(name) and own_digest(Path(_file(load_own(name)) or "")) == digest
-    ]  # fmt: skip
-    return {path: file.read_bytes() for path, file in _copied(same).items() if file.stat().st_size <= LARGEST}
-
-
-def large_sources(names: Iterable[str]) -> list[str]:
-    """A line for each file of a user's own methods that is too large to be copied to a run's folder."""
-    copied = _copied(name for name in sorted(set(names)) if _FORM.fullmatch(name))
-    return [
-        f"{path}: {file.stat().st_size / 1e6:.1f} MB, and a run's folder holds copies of at most {LARGEST / 1e6:g} MB; "
-        "keep it to repeat the run"
-        for path, file in copied.items()
-        if file.stat().st_size > LARGEST
-    ]
-
-
-def _copied(names: Iterable[str]) -> dict[str, Path]:
-    """Files of a user's own methods that a run's folder is to hold, by path relative to the folder of their import."""
-    found: dict[str, Path] = {}
-    installed = _installed()
-    path = [folder for folder in _import_path() if folder not in installed]
-    for name in names:
-        named = Path(import_module(name.partition(":")[0]).__file__ or "")  # it may import what it names
-        for file in (named, Path(_file(load_own(name)) or "")):
-            if file.is_file() and INSTALLED.isdisjoint(file.parents):
-                root = _root(file)
-                packages = {folder / "__init__.py" for folder in file.parents if root in folder.parents}
-                for one in sorted(_closure(file) | {one for one in packages if one.is_file()}):
-                    place = one.relative_to(root).as_posix()
-                    first = next((folder / place for folder in path if (folder / place).is_file()), one)
-                    found[place] = first
-    return found
+def is_entry_point(name: str) -> bool:
+    """Whether a name is that of a user's own method in an installed package's entry points."""
+    return not _FORM.fullmatch(name) and name in _offered()
 
 
 def own_code(
@@ -251,84 +194,14 @@ def _instance(name: str, found: type) -> Any:
         ) from None
 
 
-def _file(thing: Any) -> str | None:
-    """Path of the source file of a user's own method; None if it has none."""
-    with suppress(TypeError):  # built into Python
-        return inspect.getsourcefile(thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing))
-    return None
+def module_of(name: str) -> ModuleType:
+    """Module that is named for a user's own method; it may import the method from another one."""
+    return import_module(name.partition(":")[0] if _FORM.fullmatch(name) else _offered()[name].module)
 
 
-def own_digest(file: Path) -> str:
-    """SHA-256 of a Python file and of all that it imports, directly or not, from its own folder or package.
-
-    Of its bytes alone if there is nothing of that kind. Installed libraries are left out, as are imports by names that
-    are computed at run time.
-    """
-    files = _closure(file)
-    if len(files) == 1:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
-    root = _root(file)
-    parts = [f"{one.relative_to(root)}\0{hashlib.sha256(one.read_bytes()).hexdigest()}\n" for one in sorted(files)]
-    return hashlib.sha256("".join(parts).encode()).hexdigest()
-
-
-def _closure(file: Path) -> set[Path]:
-    """The file of a user's own method, and all that it imports, directly or not, from its own folder or package.
-
-    Its own package alone where it is installed: beside it lie all other libraries.
-    """
-    files, left, root = {file}, [file], _root(file)
-    own = root / file.relative_to(root).parts[0] if root.resolve() in _installed() else root
-    while left:
-        fresh = {one for one in _imported(left.pop()) if own in (one, *one.parents)} - files
-        files |= fresh
-        left += fresh
-    return files
-
-
-def _imported(file: Path) -> Iterator[Path]:
-    """Files of the same folder or package that a user's own method imports, `__init__.py` of packages included."""
-    root = _root(file)
-    try:
-        tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError):  # whoever imports it says so
-        return
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield from _places(root, alias.name.split("."))
-        elif isinstance(node, ast.ImportFrom):
-            # level 1 is the file's own folder, each further one the folder above
-            folder = file.parents[node.level - 1] if 0 < node.level <= len(file.parents) else root
-            for alias in node.names:
-                yield from _places(folder, [*(node.module or "").split("."), alias.name])
-
-
-def _places(folder: Path, names: list[str]) -> Iterator[Path]:
-    """Existing Python files of a dotted module name in a user's own method, and of every package on the way."""
-    place = folder
-    for name in filter(None, names):
-        place = place / name
-        for file in (place.with_suffix(".py"), place / "__init__.py"):
-            if file.is_file():
-                yield file
-
-
-def _root(file: Path) -> Path:
-    """Folder from which Python imports the file of a user's own method: that of the outermost package that it is in,
-    or, where that is not looked in for modules, the nearest above that is; the former if none is."""
-    folder = file.parent
-    while (folder / "__init__.py").is_file() and folder != folder.parent:
-        folder = folder.parent
-    path = set(_import_path())
-    return next((one for one in (folder, *folder.parents) if one.resolve() in path), folder)
-
-
-def _installed() -> set[Path]:
-    """`INSTALLED`, without symbolic links."""
-    return {folder.resolve() for folder in INSTALLED}
-
-
-def _import_path() -> list[Path]:
-    """Folders in which Python looks for modules, a user's own methods among them, the first one first."""
-    return [Path(one).resolve() for one in sys.path]
+def defining_module(name: str) -> ModuleType | None:
+    """Module in which a user's own method, or its class, is written; None if that is not known."""
+    found = load_own(name)
+    while isinstance(found, partial) or hasattr(found, "__wrapped__"):
+        found = found.func if isinstance(found, partial) else found.__wrapped__
+    return sys.modules.get(getattr(found, "__module__", None) or "")

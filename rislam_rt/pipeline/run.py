@@ -20,7 +20,7 @@ from rislam_rt.pipeline.channels import build_channel
 from rislam_rt.pipeline.control_link import check_control
 from rislam_rt.pipeline.cycle import Receptions, usual_step
 from rislam_rt.pipeline.estimators import Estimator, use_directions
-from rislam_rt.pipeline.own_methods import large_sources
+from rislam_rt.pipeline.own_method_files import large_sources
 from rislam_rt.pipeline.room.array_warnings import array_warnings
 from rislam_rt.pipeline.room.diffuse_clutter import check_diffuse, trace_diffuse_clutter
 from rislam_rt.pipeline.room.late_paths import direct_path_warnings, late_path_warnings

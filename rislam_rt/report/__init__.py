@@ -17,3 +17,7 @@ def __getattr__(name: str) -> Any:
 
         return getattr(page, name)
     raise AttributeError(f"module 'rislam_rt.report' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -14,13 +14,13 @@ from rislam_rt.errors import ConfigError, ResultError, RislamError
 from rislam_rt.evaluate import rms_over_runs
 from rislam_rt.model import Scene
 from rislam_rt.pipeline.channels import prepare_channel
-from rislam_rt.pipeline.own_methods import own_digests
+from rislam_rt.pipeline.own_method_files import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions, run_slam
 from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec, build_settings
 from rislam_rt.pipeline.specification.read_pipeline import Table, build_spec, make_way, read_table
 from rislam_rt.pipeline.specification.section import Positive, Section
-from rislam_rt.pipeline.store.identity import short_name
+from rislam_rt.pipeline.store.identity import code_digest, short_name
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import beside_of, room_beside
 from rislam_rt.storage.checksums import checksum, read_sealed
@@ -221,7 +221,7 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
     """Function that checks the settings of a pipeline sweep's cell, and returns the scene's hash and versions that its
     result depends on."""
-    load, versions = cache(load_scene), library_versions()
+    load, versions, code = cache(load_scene), library_versions(), code_digest()
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         try:
@@ -234,7 +234,7 @@ def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]],
                 raise
             text = str(error).removeprefix(f"{path}: ")
             raise type(error)(f"axes {', '.join(keys)}: {text}") from None
-        return {"scene_sha256": room.digest, "versions": versions} | ({"own": own} if own else {})
+        return {"scene_sha256": room.digest, "versions": versions, "code": code} | ({"own": own} if own else {})
 
     return depends
 

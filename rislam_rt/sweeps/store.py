@@ -158,7 +158,7 @@ def read_timings(folder: Path) -> list[dict[str, Any]]:
     """Read the stored times of all cells that ran, from the complete lines of `timings.jsonl`."""
     found = []
     with suppress(OSError):
-        for line in (folder / "timings.jsonl").read_text(encoding="utf-8").splitlines():
+        for line in (folder / "timings.jsonl").read_text(encoding="utf-8", errors="replace").splitlines():
             with suppress(ValueError, KeyError, TypeError):  # the line that a killed run was writing
                 entry = json.loads(line)
                 found.append({**entry, "point": dict(entry["point"]), "seconds": float(entry["seconds"])})

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import rislam_rt
-from rislam_rt.pipeline.own_methods import load_own, own_digests, own_sources
+from rislam_rt.pipeline.own_method_files import own_digests, own_sources
+from rislam_rt.pipeline.own_methods import load_own
 from rislam_rt.storage.checksums import seal
 from rislam_rt.studies.score_card.score import OVER_TIME
 

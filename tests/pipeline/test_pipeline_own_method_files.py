@@ -1,13 +1,17 @@
 """The digest of a method of one's own changes with every file that it is made of, and with no other."""
 
 import hashlib
+import importlib.util
+import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.pipeline import own_methods
-from rislam_rt.pipeline.own_methods import large_sources, load_own, own_digest, own_digests, own_sources
+from rislam_rt.pipeline import own_method_files
+from rislam_rt.pipeline.own_method_files import imported_files, large_sources, own_digest, own_digests, own_sources
+from rislam_rt.pipeline.own_methods import load_own
 
 FILES = {
     "mine.py": "import numpy as np\nimport beside\nfrom tools import deep\n",
@@ -23,6 +27,10 @@ FILES = {
 }
 
 
+def digest(root: Path, name: str) -> str:
+    return own_digest(imported_files(root / name, root))
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for name, text in FILES.items():
@@ -33,49 +41,49 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_file_that_is_imported_counts_and_no_other(folder: Path, name: str) -> None:
-    before = own_digest(folder / "mine.py")
+    before = digest(folder, "mine.py")
     (folder / name).write_text(FILES[name] + "# changed\n")
     unused = name in ("stranger.py", "tools/unused.py")
-    assert (own_digest(folder / "mine.py") == before) == unused
+    assert (digest(folder, "mine.py") == before) == unused
 
 
 def test_it_is_the_same_in_another_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     other = tmp_path_factory.mktemp("elsewhere") / "copy"
     folder.rename(other)
-    moved = own_digest(other / "mine.py")
+    moved = digest(other, "mine.py")
     other.rename(folder)
-    assert moved == own_digest(folder / "mine.py")
+    assert moved == digest(folder, "mine.py")
 
 
 def test_a_file_alone_is_its_bytes(tmp_path: Path) -> None:
     file = tmp_path / "alone.py"
     file.write_text("import numpy\nimport json\n")
-    assert own_digest(file) == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert digest(file.parent, file.name) == hashlib.sha256(file.read_bytes()).hexdigest()
     file.write_text("import alone\n")  # itself
-    assert own_digest(file) == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert digest(file.parent, file.name) == hashlib.sha256(file.read_bytes()).hexdigest()
     file.write_text("this is no Python\n")
-    assert own_digest(file) == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert digest(file.parent, file.name) == hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 def test_within_a_package_absolute_names_are_looked_up_from_its_root(folder: Path) -> None:
     (folder / "tools" / "deep.py").write_text("import tools.more\n")
-    before = own_digest(folder / "tools" / "deep.py")
+    before = digest(folder, "tools/deep.py")
     (folder / "tools" / "more.py").write_text("thing = 2\n")
-    assert own_digest(folder / "tools" / "deep.py") != before
+    assert digest(folder, "tools/deep.py") != before
 
 
 def test_of_an_installed_method_its_own_package_counts_and_no_library_beside_it(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(own_methods, "INSTALLED", {folder})
+    monkeypatch.setattr(own_method_files, "INSTALLED", {folder})
     monkeypatch.syspath_prepend(folder)
     (folder / "tools" / "deep.py").write_text("import beside\nfrom . import near\n")
-    digests = {name: own_digest(folder / name) for name in ("mine.py", "tools/deep.py")}
+    digests = {name: digest(folder, name) for name in ("mine.py", "tools/deep.py")}
     (folder / "beside.py").write_text("a_library = 1\n")
-    assert {name: own_digest(folder / name) for name in digests} == digests
+    assert {name: digest(folder, name) for name in digests} == digests
     (folder / "tools" / "further" / "inner.py").write_text("x = 2\n")
-    assert own_digest(folder / "mine.py") == digests["mine.py"]
-    assert own_digest(folder / "tools" / "deep.py") != digests["tools/deep.py"]
+    assert digest(folder, "mine.py") == digests["mine.py"]
+    assert digest(folder, "tools/deep.py") != digests["tools/deep.py"]
 
 
 DESIGNER = "def design(belief, panel, radio, *, rng):\n    return 0\n"
@@ -119,10 +127,129 @@ def test_a_large_file_is_not_copied_and_said(place: Path, monkeypatch: pytest.Mo
     name = f"large_{place.parent.name}"
     write(place, {f"{name}.py": DESIGNER})
     assert large_sources([f"{name}:design", "random"]) == []
-    monkeypatch.setattr(own_methods, "LARGEST", 10)
+    monkeypatch.setattr(own_method_files, "LARGEST", 10)
     assert own_sources(own_digests([f"{name}:design"])) == {}
     (line,) = large_sources([f"{name}:design", "random"])
     assert line.startswith(f"{name}.py: 0.0 MB, and a run's folder holds copies of at most")
+
+
+MADE = {
+    "a partial function": "from functools import partial\ndef f(*a, rng, x):\n    return x\ndesign = partial(f, x=1)\n",
+    "a decorated function": "import numpy as np\n@np.errstate(all='ignore')\n" + DESIGNER,
+    "a cached function": "from functools import lru_cache\n@lru_cache\n" + DESIGNER,
+    "a function made elsewhere": "from HELPER import make\ndesign = make(1)\n",
+    "an object of a class elsewhere": "from HELPER import Designer\ndesign = Designer(1)\n",
+    "a lambda": "design = lambda *args, rng: 0\n",
+}
+HELPER = """
+def make(gain):
+    return lambda *args, rng: gain
+class Designer:
+    def __init__(self, gain): self.gain = gain
+    def __call__(self, *args, rng): return self.gain
+"""
+
+
+@pytest.mark.parametrize("how", MADE)
+def test_the_named_file_counts_however_the_method_is_made(place: Path, how: str) -> None:
+    name, helper = (f"{word}_{place.parent.name}" for word in ("made", "helper"))
+    text = MADE[how].replace("HELPER", helper)
+    write(place, {f"{name}.py": text, f"{helper}.py": HELPER})
+    before = own_digests([f"{name}:design"])
+    assert f"{name}.py" in own_sources(before)
+    write(place, {f"{name}.py": text + "# changed\n"})
+    changed = own_digests([f"{name}:design"])
+    assert changed != before
+    assert own_sources(before) == {}  # it is not what has run
+    write(place, {f"{helper}.py": HELPER + "# changed\n"})
+    assert (own_digests([f"{name}:design"]) != changed) == (helper in text)
+
+
+@pytest.mark.parametrize("line", ["from . import GAIN", "from .. import GAIN", "import PACKAGE", ""])
+def test_init_files_of_the_packages_that_it_is_in_count(place: Path, line: str) -> None:
+    package = f"package_{place.parent.name}"
+    text = line.replace("PACKAGE", package) + "\n" + DESIGNER
+    write(place, {f"{package}/__init__.py": "GAIN = 1\n", f"{package}/sub/__init__.py": "GAIN = 1\n"})
+    write(place, {f"{package}/sub/m.py": text})
+    name = f"{package}.sub.m:design"
+    before = own_digests([name])
+    assert set(own_sources(before)) == {f"{package}/{one}" for one in ("__init__.py", "sub/__init__.py", "sub/m.py")}
+    for one in ("__init__.py", "sub/__init__.py"):
+        write(place, {f"{package}/{one}": "GAIN = 2\n"})
+        assert own_digests([name]) != before
+        before = own_digests([name])
+
+
+def test_what_lies_beside_this_package_takes_nothing_of_it(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = f"near_{place.parent.name}"
+    write(place, {f"{name}.py": "import rislam_rt\nfrom rislam_rt.model import Paths\n" + DESIGNER})
+    write(place, {"rislam_rt/__init__.py": "", "rislam_rt/model.py": "Paths = 1\n"})  # as in a checkout's root
+    assert set(own_sources(own_digests([f"{name}:design"]))) == {f"{name}.py"}
+
+
+@pytest.mark.parametrize("site", ["site-packages", "dist-packages"])
+def test_whatever_folder_of_installed_libraries_it_is_in_it_is_not_copied(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, site: str
+) -> None:
+    folder, name = tmp_path / "elsewhere" / site, f"installed_{tmp_path.name}"
+    helper, stranger = f"helper_{tmp_path.name}", f"stranger_{tmp_path.name}"
+    text = f"import {helper}\nimport {stranger}\n{DESIGNER}"
+    write(folder, {f"{name}.py": text, f"{helper}.py": "x = 1\n", f"{stranger}.py": "x = 1\n"})
+    record = f"{name}.py,,\n{helper}.py,,\nmine.dist-info/RECORD,,\n"
+    metadata = "Metadata-Version: 2.1\nName: mine\nVersion: 1\n"
+    write(folder, {"mine.dist-info/RECORD": record, "mine.dist-info/METADATA": metadata})
+    (tmp_path / "link").symlink_to(folder)
+    monkeypatch.syspath_prepend(tmp_path / "link")
+    own_method_files._distributions.cache_clear()
+    before = own_digests([f"{name}:design"])
+    assert before[f"{name}:design"]
+    assert own_sources(before) == {}
+    write(folder, {f"{stranger}.py": "x = 2\n"})
+    assert own_digests([f"{name}:design"]) == before
+    write(folder, {f"{helper}.py": "x = 2\n"})  # of the same distribution
+    assert own_digests([f"{name}:design"]) != before
+    own_method_files._distributions.cache_clear()
+
+
+def test_a_package_that_is_found_by_no_folder_is_its_own_wherever_one_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = f"edited_{tmp_path.name}"
+    write(tmp_path / "dev" / "flat", {f"{package}/__init__.py": "", f"{package}/helper.py": "x = 1\n"})
+    write(tmp_path / "dev" / "flat", {f"{package}/m.py": f"from {package} import helper\n" + DESIGNER})
+    root = tmp_path / "dev" / "flat" / package
+    spec = importlib.util.spec_from_file_location(package, root / "__init__.py", submodule_search_locations=[str(root)])
+    monkeypatch.setitem(
+        sys.modules, package, importlib.util.module_from_spec(spec)
+    )  # as an editable install's finder does
+    name, found = f"{package}.m:design", []
+    for folder in (tmp_path / "dev", tmp_path / "dev" / "flat"):
+        with monkeypatch.context() as context:
+            context.syspath_prepend(folder)
+            found.append(own_digests([name]))
+            assert set(own_sources(found[-1])) == {f"{package}/{one}.py" for one in ("__init__", "helper", "m")}
+    assert found[0] == found[1]
+    write(root, {"helper.py": "x = 2\n"})
+    assert own_digests([name]) != found[0]
+
+
+def test_a_helper_in_another_folder_of_the_path_counts(place: Path) -> None:
+    name, helper = (f"{word}_{place.parent.name}" for word in ("apart", "tool"))
+    write(place, {f"{name}.py": f"import {helper}\n{DESIGNER}"})
+    write(place.parent / "behind", {f"{helper}.py": "x = 1\n"})
+    before = own_digests([f"{name}:design"])
+    assert set(own_sources(before)) == {f"{name}.py", f"{helper}.py"}
+    write(place.parent / "behind", {f"{helper}.py": "x = 2\n"})
+    assert own_digests([f"{name}:design"]) != before
+
+
+def test_an_archive_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = f"packed_{tmp_path.name}"
+    with zipfile.ZipFile(tmp_path / "packed.zip", "w") as archive:
+        archive.writestr(f"{name}.py", DESIGNER)
+    monkeypatch.syspath_prepend(tmp_path / "packed.zip")
+    with pytest.raises(ConfigError, match=f"'{name}:design': .*packed.zip.* is no file that can be looked at; unpack"):
+        own_digests([f"{name}:design"])
 
 
 def test_the_hint_names_the_file_in_its_folder() -> None:

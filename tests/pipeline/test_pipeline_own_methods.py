@@ -12,7 +12,8 @@ import rislam_rt
 from rislam_rt.errors import ConfigError
 from rislam_rt.model import SlamResult, empty_map, pose_estimate
 from rislam_rt.pipeline import load_spec
-from rislam_rt.pipeline.own_methods import load_own, own_code, own_digests
+from rislam_rt.pipeline.own_method_files import own_digests
+from rislam_rt.pipeline.own_methods import load_own, own_code
 from rislam_rt.pipeline.scores.component_sources import uses_wall_returns
 from rislam_rt.pipeline.specification.pipeline_spec import build_settings
 from rislam_rt.shipped import find_pipeline
@@ -275,4 +276,4 @@ def test_a_file_that_ends_the_program_is_refused(tmp_path: Path, monkeypatch: py
 
 
 def test_what_python_has_built_in_has_no_digest() -> None:
-    assert own_digests(["math:sin"]) == {"math:sin": ""}
+    assert own_digests(["sys:intern"]) == {"sys:intern": ""}

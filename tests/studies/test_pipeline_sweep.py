@@ -15,6 +15,7 @@ from rislam_rt.pipeline.scores.summary import summarise
 from rislam_rt.report.studies.sweep import main_axis, scores_figure
 from rislam_rt.report.terminal_tables import print_sweep
 from rislam_rt.scene import load_scene
+from rislam_rt.studies import pipeline_sweep
 from rislam_rt.studies.pipeline_sweep import SchemeScore, load_section, run_cell, score_rows, slam_sweep, write_scores
 from rislam_rt.sweeps import build_cells, run_sweep
 from rislam_rt.sweeps.store import DONE, Row
@@ -122,6 +123,12 @@ def test_what_the_clock_says_stays_out_of_the_cells(swept):
     for line in lines:
         assert line["timing"]["trace_seconds"] > 0.0
         assert all(scheme["seconds"] > 0.0 for scheme in line["timing"]["schemes"].values())
+
+
+def test_changed_code_of_the_package_is_another_cell(monkeypatch):
+    before = build_cells(slam_sweep(PIPELINE, TINY))
+    monkeypatch.setattr(pipeline_sweep, "code_digest", lambda: "of another code")
+    assert not {cell.ident for cell in before} & {cell.ident for cell in build_cells(slam_sweep(PIPELINE, TINY))}
 
 
 def test_a_changed_room_is_another_cell(tmp_path):

@@ -12,6 +12,7 @@ from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.schemes import SCHEMES
 from rislam_rt.studies import load_any
 from rislam_rt.studies.swept import build_sweep, cell_spec, group_rows, paired_difference, paired_gain, spread
+from rislam_rt.studies.swept import sweep as swept_sweep
 from rislam_rt.studies.swept.cell import run_cell
 from rislam_rt.studies.swept.sweep import SNR
 from rislam_rt.sweeps import build_cells
@@ -48,6 +49,13 @@ def test_all_points_of_a_repetition_draw_the_same_numbers():
         by_repetition.setdefault(cell.repetition, set()).add(cell.seed)
     assert all(len(seeds) == 1 for seeds in by_repetition.values())
     assert len(set.union(*by_repetition.values())) == len(by_repetition)
+
+
+def test_changed_code_of_the_package_is_another_cell(monkeypatch):
+    before = {cell.ident for cell in cells_of("fig4b")}
+    assert before == {cell.ident for cell in cells_of("fig4b")}
+    monkeypatch.setattr(swept_sweep, "code_digest", lambda: "of another code")
+    assert not before & {cell.ident for cell in cells_of("fig4b")}
 
 
 def test_a_changed_variant_leaves_the_others_cells_as_they_are():

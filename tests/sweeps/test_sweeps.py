@@ -17,6 +17,7 @@ import sweep_cells
 from rislam_rt.errors import ConfigError, ResultError, SetupError
 from rislam_rt.sweeps import Axis, Sweep, SweepOptions, build_cells, parse_axis, run_sweep
 from rislam_rt.sweeps.run import estimate_cost
+from rislam_rt.sweeps.store import read_timings
 
 HERE = Path(__file__).parent
 AXES = (Axis("x", (1, 2, 3)), Axis("word", ("one", "two")))
@@ -375,3 +376,9 @@ def test_no_scheduler_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr(pools, "CONNECT_SECONDS", 0.2)
     with pytest.raises(SetupError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler answers [^\n]*$"):
         run_sweep(DRAW, tmp_path, SweepOptions(dask="tcp://127.0.0.1:9"))
+
+
+def test_times_that_are_no_text_are_passed_over(tmp_path):
+    line = json.dumps({"point": {"a": 1}, "seconds": 2.0})
+    (tmp_path / "timings.jsonl").write_bytes(b"\xff\xfe\n" + line.encode() + b"\n{")
+    assert [entry["seconds"] for entry in read_timings(tmp_path)] == [2.0]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rislam_rt.model import MapEstimate, Scene, SlamResult
-from rislam_rt.pipeline.own_methods import own_sources
+from rislam_rt.pipeline.own_method_files import own_sources
 from rislam_rt.pipeline.run_datasets import part_name
 from rislam_rt.scene.write import scene_files, tum_bytes
 from rislam_rt.storage.files import json_file

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.own_methods import own_digests
+from rislam_rt.pipeline.own_method_files import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
 from rislam_rt.scene.scene_folder import safe_name

@@ -8,9 +8,10 @@ from typing import Any
 
 from rislam_rt.errors import ConfigError, RislamError
 from rislam_rt.model import Scene
-from rislam_rt.pipeline.own_methods import own_digests
+from rislam_rt.pipeline.own_method_files import own_digests
 from rislam_rt.pipeline.run import check_run, library_versions
 from rislam_rt.pipeline.specification.pipeline_spec import PipelineSpec
+from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.scene import load_scene
 from rislam_rt.shipped import room_beside
 from rislam_rt.studies.spec import study_record
@@ -83,13 +84,13 @@ def check_swept(spec: SweptSpec) -> None:
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
     """Function that checks a cell's settings, and returns all that its result depends on: settings, scene, versions."""
-    load, versions = cache(load_scene), library_versions()
+    load, versions, code = cache(load_scene), library_versions(), code_digest()
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         spec = cell_spec({**settings, **local}, pipeline)
         room = load(room_beside(pipeline.parent, str(settings["scene"])))
         found = checked_settings(room, spec, spec.schemes, f"{pipeline}: {settings['scene']}")
-        return {**found, "scene_sha256": room.digest, "versions": versions}
+        return {**found, "scene_sha256": room.digest, "versions": versions, "code": code}
 
     return depends
 
