@@ -1,11 +1,10 @@
 """Source files that a user's own methods are made of: their digests, and the copies that a run's folder holds."""
 
 import ast
+import csv
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
-from importlib.metadata import distribution, packages_distributions
 from pathlib import Path
 from sysconfig import get_path
 from types import ModuleType
@@ -125,7 +124,7 @@ def _imported(place: str, file: Path, folders: list[Path]) -> Iterator[tuple[Pat
         tree = ast.parse(file.read_bytes())
     except (SyntaxError, ValueError):  # whoever imports it says so
         return
-    for node in ast.walk(tree):
+    for node in _statements(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield from _modules(folders, alias.name.split("."))
@@ -135,6 +134,14 @@ def _imported(place: str, file: Path, folders: list[Path]) -> Iterator[tuple[Pat
             for alias in node.names:
                 names = [*above, *filter(None, (node.module or "").split(".")), alias.name]
                 yield from _modules([root] if node.level else folders, names)
+
+
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """All statements of a user's own file, in whatever block they stand."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.stmt | ast.excepthandler | ast.match_case):
+            yield node
+            yield from _statements(node)
 
 
 def _modules(folders: list[Path], names: list[str]) -> Iterator[tuple[Path, Path]]:
@@ -168,16 +175,11 @@ def _own_folders() -> list[Path]:
 
 def _distribution_files(file: Path, root: Path) -> set[Path]:
     """Files of the distribution that an installed file of a user's own is in; of its package alone if none names it."""
-    top = file.relative_to(root).parts[0]
-    for name in _distributions().get(Path(top).stem, ()):
-        files = {Path(str(one.locate())).resolve() for one in distribution(name).files or ()}
-        if file.resolve() in files:
-            return files
-    own = root / top
+    place = file.relative_to(root)
+    for record in sorted(root.glob("*.dist-info/RECORD")):
+        text = record.read_text(encoding="utf-8", errors="replace")
+        places = {row[0] for row in csv.reader(text.splitlines()) if row} if place.as_posix() in text else set()
+        if place.as_posix() in places:
+            return {(root / one).resolve() for one in places}
+    own = root / place.parts[0]
     return {one.resolve() for one in own.rglob("*.py")} if own.is_dir() else {file.resolve()}
-
-
-@cache
-def _distributions() -> Mapping[str, list[str]]:
-    """Names of the installed distributions of every top-level module."""
-    return packages_distributions()

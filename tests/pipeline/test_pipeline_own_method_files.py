@@ -200,7 +200,6 @@ def test_whatever_folder_of_installed_libraries_it_is_in_it_is_not_copied(
     write(folder, {"mine.dist-info/RECORD": record, "mine.dist-info/METADATA": metadata})
     (tmp_path / "link").symlink_to(folder)
     monkeypatch.syspath_prepend(tmp_path / "link")
-    own_method_files._distributions.cache_clear()
     before = own_digests([f"{name}:design"])
     assert before[f"{name}:design"]
     assert own_sources(before) == {}
@@ -208,7 +207,6 @@ def test_whatever_folder_of_installed_libraries_it_is_in_it_is_not_copied(
     assert own_digests([f"{name}:design"]) == before
     write(folder, {f"{helper}.py": "x = 2\n"})  # of the same distribution
     assert own_digests([f"{name}:design"]) != before
-    own_method_files._distributions.cache_clear()
 
 
 def test_a_package_that_is_found_by_no_folder_is_its_own_wherever_one_starts(
@@ -241,6 +239,17 @@ def test_a_helper_in_another_folder_of_the_path_counts(place: Path) -> None:
     assert set(own_sources(before)) == {f"{name}.py", f"{helper}.py"}
     write(place.parent / "behind", {f"{helper}.py": "x = 2\n"})
     assert own_digests([f"{name}:design"]) != before
+
+
+@pytest.mark.parametrize("place_of_it", [
+    "if True:\n    import HELPER\n", "def late():\n    from HELPER import x\n",
+    "class A:\n    def f(self):\n        import HELPER\n",
+    "try:\n    1 / 0\nexcept ZeroDivisionError:\n    import HELPER\n", "match 1:\n    case 1:\n        import HELPER\n",
+    "with open('/dev/null'):\n    import HELPER\n", "for i in ():\n    pass\nelse:\n    import HELPER\n",
+])  # fmt: skip
+def test_an_import_counts_in_whatever_block_it_stands(tmp_path: Path, place_of_it: str) -> None:
+    write(tmp_path, {"mine.py": place_of_it.replace("HELPER", "tool") + DESIGNER, "tool.py": "x = 1\n"})
+    assert set(imported_files(tmp_path / "mine.py", tmp_path)) == {"mine.py", "tool.py"}
 
 
 def test_an_archive_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
