@@ -3,11 +3,16 @@
 import ast
 import csv
 import hashlib
+import importlib
 import sys
+import zipimport
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from functools import cache
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from sysconfig import get_path
-from types import ModuleType
+from typing import NamedTuple
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.own_methods import defining_module, is_entry_point, is_own, module_of
@@ -20,6 +25,13 @@ SITES = ("site-packages", "dist-packages")
 """Names of folders of installed libraries, wherever they are."""
 LARGEST = 1_000_000
 """Most bytes of a file of a user's own that is copied to a run's folder."""
+
+
+class OwnFile(NamedTuple):
+    """Source file of a user's own method: what it holds, and whether it is an installed package's."""
+
+    content: bytes
+    installed: bool
 
 
 def own_digests(names: Iterable[str]) -> dict[str, str]:
@@ -36,9 +48,9 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
     return {name: own_digest(_files(name)) for name in sorted(set(names)) if is_own(name)}
 
 
-def own_digest(files: Mapping[str, Path]) -> str:
+def own_digest(files: Mapping[str, OwnFile]) -> str:
     """SHA-256 of a user's own files, given by path relative to the folder of import; of its bytes for one file."""
-    digests = [(place, hashlib.sha256(file.read_bytes()).hexdigest()) for place, file in sorted(files.items())]
+    digests = [(place, hashlib.sha256(file.content).hexdigest()) for place, file in sorted(files.items())]
     if len(digests) < 2:
         return digests[0][1] if digests else ""
     return hashlib.sha256("".join(f"{place}\0{digest}\n" for place, digest in digests).encode()).hexdigest()
@@ -50,131 +62,137 @@ def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
     Content by path, relative to the folder from which they are imported. Left out are installed ones, those of more
     than `LARGEST` bytes, and files that have changed since: they are not what has run.
     """
-    same = [name for name, digest in digests.items() if digest and own_digests([name]).get(name) == digest]
-    return {path: file.read_bytes() for path, file in _copied(same).items() if file.stat().st_size <= LARGEST}
+    found = {name: _files(name) for name, digest in digests.items() if digest and not is_entry_point(name)}
+    same = [files for name, files in found.items() if own_digest(files) == digests[name]]
+    return {path: content for path, content in _copied(same).items() if len(content) <= LARGEST}
 
 
 def large_sources(names: Iterable[str]) -> list[str]:
     """A line for each file of a user's own methods that is too large to be copied to a run's folder."""
+    own = [_files(name) for name in sorted(set(names)) if is_own(name) and not is_entry_point(name)]
     return [
-        f"{path}: {file.stat().st_size / 1e6:.1f} MB, and a run's folder holds copies of at most {LARGEST / 1e6:g} MB; "
+        f"{path}: {len(content) / 1e6:.1f} MB, and a run's folder holds copies of at most {LARGEST / 1e6:g} MB; "
         "keep it to repeat the run"
-        for path, file in _copied(name for name in sorted(set(names)) if is_own(name)).items()
-        if file.stat().st_size > LARGEST
+        for path, content in _copied(own).items()
+        if len(content) > LARGEST
     ]
 
 
-def _copied(names: Iterable[str]) -> dict[str, Path]:
-    """Files of a user's own methods that a run's folder is to hold, by path relative to the folder of their import."""
-    found: dict[str, Path] = {}
-    for name in names:
-        if not is_entry_point(name):  # found by its name where its package is installed, not by its files
-            found = {place: file for place, file in _files(name).items() if not _is_installed(file)} | found
-    return found
+def _copied(methods: Iterable[Mapping[str, OwnFile]]) -> dict[str, bytes]:
+    """Content of the files of a user's own methods that a run's folder is to hold, by path."""
+    return {path: file.content for files in methods for path, file in files.items() if not file.installed}
 
 
-def _files(name: str) -> dict[str, Path]:
-    """All files that a user's own method is made of, by path relative to the folder of their import."""
-    modules = [module_of(name), defining_module(name)]
-    found: dict[str, Path] = {}
-    for module in modules:
+def _files(name: str) -> dict[str, OwnFile]:
+    """All files that a user's own method is made of, by path relative to the folder of their import.
+
+    Those of a library's class or function that it is an object of do not count.
+    """
+    named, defining = module_of(name), defining_module(name)
+    if isinstance(getattr(named, "__loader__", None), zipimport.zipimporter):
+        raise ConfigError(f"'{name}': {named.__file__} is in an archive, where no file can be looked at; unpack it")
+    importlib.invalidate_caches()
+    found: dict[str, OwnFile] = {}
+    for module in (named, defining):
         file = Path(getattr(module, "__file__", None) or "")
-        if module is None or file == Path():
-            continue
-        if not file.is_file():
-            raise ConfigError(f"'{name}': {file} is no file that can be looked at; unpack the archive that it is in")
-        found = imported_files(file, _import_folder(module, file)) | found
+        if module is not None and file != Path() and (module is named or not _is_installed(file)):
+            found |= imported_files(module.__name__, file)
     return found
 
 
-def _import_folder(module: ModuleType, file: Path) -> Path:
-    """Folder from which the module of a user's own method is imported, by its dotted name."""
-    parts = module.__name__.count(".") + (file.stem == "__init__")
-    return file.parents[min(parts, len(file.parents) - 1)]
-
-
-def imported_files(file: Path, root: Path) -> dict[str, Path]:
-    """A user's own Python file, imported from folder `root`, and all of their own that it imports, directly or not.
+def imported_files(name: str, file: Path) -> dict[str, OwnFile]:
+    """A user's own module, given by its dotted name and file, and all of their own that it imports, directly or not.
 
     By path relative to the folder of their import. The `__init__.py` of packages that they are in count: importing runs
-    them. Of an installed file those of its distribution count, and no library beside it; what is imported by names that
-    are computed at run time is not seen.
+    them. Of an installed module the files of its distribution count, and no library beside it. What is imported by
+    names that are computed at run time is not seen, and what cannot be read is left out.
     """
     installed = _is_installed(file)
-    mine = _distribution_files(file, root) if installed else None
-    folders = [root] if installed else [*_own_folders(), root]
-    place = file.relative_to(root).as_posix()
-    files, left = {place: file}, [place]
+    mine = _distribution_files(name, file) if installed else None
+    files: dict[str, OwnFile] = {}
+    left = [(name, file)]
     while left:
-        place = left.pop()
-        for start, one in _imported(place, files[place], folders):
-            where = one.relative_to(start).as_posix()
-            if where not in files and (mine is None or one.resolve() in mine):
-                files[where] = one
-                left.append(where)
+        name, file = left.pop()
+        is_package = file.stem == "__init__"
+        place = f"{name.replace('.', '/')}{'/__init__' if is_package else ''}{file.suffix}"
+        if place in files or (_is_installed(file) if mine is None else file.resolve() not in mine):
+            continue
+        with suppress(OSError):
+            state = file.stat()
+            files[place] = OwnFile(file.read_bytes(), installed)
+            package = name if is_package else name.rpartition(".")[0]
+            for wanted in (package, *_imported_names(file, state.st_mtime_ns, state.st_size, package)):
+                left += _modules(wanted)
     return files
 
 
-def _imported(place: str, file: Path, folders: list[Path]) -> Iterator[tuple[Path, Path]]:
-    """Files that a file at `place` imports, with the folder of their import, those of the packages it is in first."""
-    root = file.parents[place.count("/")]
-    package = place.split("/")[:-1]
-    yield from _modules([root], package)
+@cache
+def _imported_names(file: Path, changed_ns: int, size: int, package: str) -> list[str]:
+    """Dotted names that a user's own file, in a package, imports; the last part may be no module. Kept while the file's
+    time and size are the same."""
     try:
         tree = ast.parse(file.read_bytes())
-    except (SyntaxError, ValueError):  # whoever imports it says so
-        return
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # whoever imports it says so
+        return []
+    names = []
     for node in _statements(tree):
         if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield from _modules(folders, alias.name.split("."))
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             # level 1 is the file's own package, each further one the package above
-            above = package[: len(package) - node.level + 1] if node.level else []
-            for alias in node.names:
-                names = [*above, *filter(None, (node.module or "").split(".")), alias.name]
-                yield from _modules([root] if node.level else folders, names)
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            whole = [*above, *filter(None, [node.module])]
+            names += [".".join([*whole, alias.name]) for alias in node.names]
+    return list(dict.fromkeys(name for name in names if name.partition(".")[0] != PACKAGE.name))
 
 
 def _statements(tree: ast.AST) -> Iterator[ast.AST]:
     """All statements of a user's own file, in whatever block they stand."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.stmt | ast.excepthandler | ast.match_case):
-            yield node
-            yield from _statements(node)
+    left = [tree]
+    while left:
+        for node in ast.iter_child_nodes(left.pop()):
+            if isinstance(node, ast.stmt | ast.excepthandler | ast.match_case):
+                yield node
+                left.append(node)
 
 
-def _modules(folders: list[Path], names: list[str]) -> Iterator[tuple[Path, Path]]:
-    """Python files of a dotted name in a user's own method, and of every package on the way, in the first of the
-    folders that has the first of its names."""
-    if not names or names[0] == PACKAGE.name:
-        return
-    heads = [(one / names[0], one) for one in folders]
-    # as Python: a package or module in any folder before a folder that is no package
-    found = [one for head, one in heads if (head / "__init__.py").is_file() or head.with_suffix(".py").is_file()]
-    found += [one for head, one in heads if head.is_dir()]
-    place = root = next(iter(found), Path())
-    for name in names if found else []:
-        place = place / name
-        for file in (place.with_suffix(".py"), place / "__init__.py"):
-            if file.is_file():
-                yield root, file
+def _modules(wanted: str) -> Iterator[tuple[str, Path]]:
+    """Names and files of the module of a dotted name in a user's own method, and of every package on the way."""
+    path: list[str] | None = None
+    name = ""
+    for part in filter(None, wanted.split(".")):
+        name = f"{name}.{part}" if name else part
+        spec = _spec(name, path)
+        if spec is None:
+            return
+        if spec.has_location and spec.origin:
+            yield name, Path(spec.origin)
+        if spec.submodule_search_locations is None:
+            return
+        path = list(spec.submodule_search_locations)
+
+
+def _spec(name: str, path: list[str] | None) -> ModuleSpec | None:
+    """How Python has imported a module that a user's own method names, or would: nothing is imported."""
+    spec = getattr(sys.modules.get(name), "__spec__", None)
+    for finder in sys.meta_path if spec is None else ():
+        with suppress(Exception):  # a finder of any package may be among them
+            spec = spec or finder.find_spec(name, path, None)
+    return spec if isinstance(spec, ModuleSpec) else None
 
 
 def _is_installed(file: Path) -> bool:
-    """Whether a file is of this package, of Python or of an installed library, and not a user's own."""
-    parents, installed = file.resolve().parents, {folder.resolve() for folder in INSTALLED}
-    return any(one in installed or one.name in SITES for one in parents)
+    """Whether a file, or what it links to, is of this package, of Python or of an installed library."""
+    installed = {one for folder in INSTALLED for one in (folder, folder.resolve())}
+    with suppress(OSError, RuntimeError):  # links in a circle
+        file = file.absolute()
+        return any(one in installed or one.name in SITES for one in (*file.parents, *file.resolve().parents))
+    return True
 
 
-def _own_folders() -> list[Path]:
-    """Folders in which Python looks for modules of a user's own, the first one first."""
-    folders = [Path(one).resolve() for one in sys.path]
-    return [folder for folder in folders if not _is_installed(folder / "module.py")]
-
-
-def _distribution_files(file: Path, root: Path) -> set[Path]:
-    """Files of the distribution that an installed file of a user's own is in; of its package alone if none names it."""
+def _distribution_files(name: str, file: Path) -> set[Path]:
+    """Files of the distribution that an installed module of a user's own is in; of its package if none names it."""
+    root = file.parents[name.count(".") + (file.stem == "__init__")]
     place = file.relative_to(root)
     for record in sorted(root.glob("*.dist-info/RECORD")):
         text = record.read_text(encoding="utf-8", errors="replace")

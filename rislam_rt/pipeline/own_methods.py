@@ -201,7 +201,8 @@ def module_of(name: str) -> ModuleType:
 
 def defining_module(name: str) -> ModuleType | None:
     """Module in which a user's own method, or its class, is written; None if that is not known."""
-    found = load_own(name)
-    while isinstance(found, partial) or hasattr(found, "__wrapped__"):
+    found, met = load_own(name), list[Any]()
+    while (isinstance(found, partial) or hasattr(found, "__wrapped__")) and not any(found is one for one in met):
+        met.append(found)
         found = found.func if isinstance(found, partial) else found.__wrapped__
-    return sys.modules.get(getattr(found, "__module__", None) or "")
+    return sys.modules.get(str(getattr(found, "__module__", "")))

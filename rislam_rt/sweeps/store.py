@@ -7,6 +7,7 @@ timings.jsonl            seconds and machine of every cell that ran, in the orde
 """
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -159,9 +160,13 @@ def read_timings(folder: Path) -> list[dict[str, Any]]:
     found = []
     with suppress(OSError):
         for line in (folder / "timings.jsonl").read_text(encoding="utf-8", errors="replace").splitlines():
-            with suppress(ValueError, KeyError, TypeError):  # the line that a killed run was writing
+            with suppress(
+                ValueError, KeyError, TypeError, OverflowError, RecursionError
+            ):  # a killed run was writing it
                 entry = json.loads(line)
-                found.append({**entry, "point": dict(entry["point"]), "seconds": float(entry["seconds"])})
+                seconds = float(entry["seconds"])
+                if 0.0 <= seconds < math.inf:
+                    found.append({**entry, "point": dict(entry["point"]), "seconds": seconds})
     return found
 
 

@@ -28,11 +28,15 @@ FILES = {
 
 
 def digest(root: Path, name: str) -> str:
-    return own_digest(imported_files(root / name, root))
+    importlib.invalidate_caches()
+    return own_digest(imported_files(name.removesuffix(".py").replace("/", "."), root / name))
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.syspath_prepend(tmp_path)
+    for module in {*sys.modules} & {"mine", "beside", "tools", "stranger"}:
+        monkeypatch.delitem(sys.modules, module)
     for name, text in FILES.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -47,12 +51,16 @@ def test_every_file_that_is_imported_counts_and_no_other(folder: Path, name: str
     assert (digest(folder, "mine.py") == before) == unused
 
 
-def test_it_is_the_same_in_another_folder(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_it_is_the_same_in_another_folder(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
     other = tmp_path_factory.mktemp("elsewhere") / "copy"
+    here = digest(folder, "mine.py")
     folder.rename(other)
+    monkeypatch.syspath_prepend(other)
     moved = digest(other, "mine.py")
     other.rename(folder)
-    assert moved == digest(folder, "mine.py")
+    assert moved == here
 
 
 def test_a_file_alone_is_its_bytes(tmp_path: Path) -> None:
@@ -247,9 +255,77 @@ def test_a_helper_in_another_folder_of_the_path_counts(place: Path) -> None:
     "try:\n    1 / 0\nexcept ZeroDivisionError:\n    import HELPER\n", "match 1:\n    case 1:\n        import HELPER\n",
     "with open('/dev/null'):\n    import HELPER\n", "for i in ():\n    pass\nelse:\n    import HELPER\n",
 ])  # fmt: skip
-def test_an_import_counts_in_whatever_block_it_stands(tmp_path: Path, place_of_it: str) -> None:
-    write(tmp_path, {"mine.py": place_of_it.replace("HELPER", "tool") + DESIGNER, "tool.py": "x = 1\n"})
-    assert set(imported_files(tmp_path / "mine.py", tmp_path)) == {"mine.py", "tool.py"}
+def test_an_import_counts_in_whatever_block_it_stands(place: Path, place_of_it: str) -> None:
+    tool = f"tool_{place.parent.name}"
+    write(place, {"mine.py": place_of_it.replace("HELPER", tool) + DESIGNER, f"{tool}.py": "x = 1\n"})
+    assert set(imported_files("mine", place / "mine.py")) == {"mine.py", f"{tool}.py"}
+
+
+def test_a_long_chain_of_branches_is_read(place: Path) -> None:
+    chain = "if 0:\n    pass\n" + "".join(f"elif {k}:\n    pass\n" for k in range(2000))
+    write(place, {"mine.py": chain + DESIGNER})
+    assert set(imported_files("mine", place / "mine.py")) == {"mine.py"}
+
+
+@pytest.mark.parametrize("line", ["from NS.t import LEVEL", "import NS.t", "from NS import t"])
+def test_every_folder_of_a_namespace_package_is_looked_in(place: Path, line: str) -> None:
+    name, space = (f"{word}_{place.parent.name}" for word in ("user", "ns"))
+    write(place, {f"{name}.py": line.replace("NS", space) + "\n" + DESIGNER, f"{space}/readme.txt": ""})
+    write(place.parent / "behind", {f"{space}/t.py": "LEVEL = 0\n"})
+    before = own_digests([f"{name}:design"])
+    assert set(own_sources(before)) == {f"{name}.py", f"{space}/t.py"}
+    write(place.parent / "behind", {f"{space}/t.py": "LEVEL = 1\n"})
+    assert own_digests([f"{name}:design"]) != before
+
+
+def test_an_object_of_a_librarys_class_counts_no_library(place: Path) -> None:
+    name = f"vector_{place.parent.name}"
+    write(place, {f"{name}.py": "import numpy as np\ndesign = np.vectorize(lambda *args: 0)\n"})
+    assert own_digests([f"{name}:design"]) == {
+        f"{name}:design": hashlib.sha256((place / f"{name}.py").read_bytes()).hexdigest()
+    }
+
+
+def test_a_file_that_is_moved_away_costs_its_copy_alone(place: Path) -> None:
+    name = f"moved_{place.parent.name}"
+    write(place, {f"{name}.py": DESIGNER})
+    before = own_digests([f"{name}:design"])
+    (place / f"{name}.py").unlink()
+    assert own_sources(before) == {}
+    assert large_sources([f"{name}:design"]) == []
+
+
+@pytest.mark.parametrize("text", [
+    "def design(*args, rng):\n    return 0\ndesign.__wrapped__ = design\n",
+    "class Proxy:\n    def __getattr__(self, name):\n        return self\n    def __call__(self):\n        return 0\n"
+    "design = Proxy()\n",
+])  # fmt: skip
+def test_a_method_that_wraps_itself_ends(place: Path, text: str) -> None:
+    name = f"round_{place.parent.name}"
+    write(place, {f"{name}.py": text})
+    assert own_digests([f"{name}:design"])[f"{name}:design"]
+
+
+def test_folders_that_cannot_be_looked_in_are_passed_over(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = f"locked_{place.parent.name}"
+    write(place, {f"{name}.py": "import json\nimport absent_everywhere\n" + DESIGNER.replace("0", "1")})
+    (place / "loop").symlink_to(place / "loop")
+    monkeypatch.setattr(sys, "path", [str(place / "loop"), str(place / "nowhere"), b"", None, *sys.path])
+    assert set(imported_files(name, place / f"{name}.py")) == {f"{name}.py"}
+
+
+def test_an_installed_package_of_links_is_installed(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site, cache = tmp_path / "env" / "site-packages", tmp_path / "cache"
+    name = f"linked_{tmp_path.name}"
+    write(cache, {f"{name}/__init__.py": "", f"{name}/m.py": DESIGNER})
+    site.mkdir(parents=True)
+    (site / name).symlink_to(cache / name)
+    monkeypatch.syspath_prepend(site)
+    before = own_digests([f"{name}.m:design"])
+    assert before[f"{name}.m:design"]
+    assert own_sources(before) == {}
 
 
 def test_an_archive_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -257,7 +333,9 @@ def test_an_archive_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest.Mon
     with zipfile.ZipFile(tmp_path / "packed.zip", "w") as archive:
         archive.writestr(f"{name}.py", DESIGNER)
     monkeypatch.syspath_prepend(tmp_path / "packed.zip")
-    with pytest.raises(ConfigError, match=f"'{name}:design': .*packed.zip.* is no file that can be looked at; unpack"):
+    with pytest.raises(
+        ConfigError, match=f"'{name}:design': .*packed.zip.* is in an archive, where no file can be looked at; unpack"
+    ):
         own_digests([f"{name}:design"])
 
 

@@ -380,5 +380,7 @@ def test_no_scheduler_is_one_line(tmp_path, monkeypatch):
 
 def test_times_that_are_no_text_are_passed_over(tmp_path):
     line = json.dumps({"point": {"a": 1}, "seconds": 2.0})
-    (tmp_path / "timings.jsonl").write_bytes(b"\xff\xfe\n" + line.encode() + b"\n{")
+    endless = [b'{"point": {}, "seconds": %s}' % value for value in (b"NaN", b"Infinity", b"-1", b"1" * 400)]
+    lines = [b"\xff\xfe", line.encode(), *endless, b"[" * 100_000, b"{"]
+    (tmp_path / "timings.jsonl").write_bytes(b"\n".join(lines))
     assert [entry["seconds"] for entry in read_timings(tmp_path)] == [2.0]
