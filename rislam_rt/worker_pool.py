@@ -50,7 +50,8 @@ class Worker:
         self.channel, theirs = Pipe()
         with theirs:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", f"from rislam_rt.worker_pool import serve; serve({theirs.fileno()})"],
+                # -P: modules are looked for where this process looks for them, and not in the working folder first
+                [sys.executable, "-P", "-c", f"from rislam_rt.worker_pool import serve; serve({theirs.fileno()})"],
                 env={**os.environ, **environment, "PYTHONPATH": path},
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # what it prints goes to the error stream

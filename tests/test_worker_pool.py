@@ -1,6 +1,8 @@
 """Work side by side: the same results, news on the way, and no silence when a process dies."""
 
 import os
+import sys
+from importlib import import_module
 
 import pytest
 
@@ -46,3 +48,20 @@ def test_a_dead_process_is_told():
     assert found["b"] == "b"
     assert isinstance(found["a"], RislamError)
     assert "exit code 11" in str(found["a"])
+
+
+def place(name, tell):
+    return import_module(name).PLACE
+
+
+def test_a_worker_finds_the_modules_that_this_process_finds(tmp_path, monkeypatch):
+    """Not those of the working folder, which may have a file of the same name, or of one of Python's own."""
+    for folder in ("working", "named"):
+        (tmp_path / folder).mkdir()
+        for name in ("of_two_folders", "of_both"):
+            (tmp_path / folder / f"{name}.py").write_text(f"PLACE = '{folder}'\n")
+    (tmp_path / "working" / "random.py").write_text("PLACE = 'no library'\n")
+    monkeypatch.chdir(tmp_path / "working")
+    monkeypatch.setattr(sys, "path", [one for one in sys.path if one] + [str(tmp_path / "named")])
+    found = dict(run_side_by_side(place, ["of_two_folders", "of_both"], (), 2, print))
+    assert found == {"of_two_folders": "named", "of_both": "named"}

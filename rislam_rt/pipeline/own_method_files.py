@@ -4,6 +4,7 @@ import ast
 import csv
 import hashlib
 import importlib
+import os
 import sys
 import zipimport
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,7 +13,7 @@ from functools import cache
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from sysconfig import get_path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError
 from rislam_rt.pipeline.own_methods import defining_module, is_entry_point, is_own, module_of
@@ -28,10 +29,15 @@ LARGEST = 1_000_000
 
 
 class OwnFile(NamedTuple):
-    """Source file of a user's own method: what it holds, and whether it is an installed package's."""
+    """Source file of a user's own method: where it is, what it holds, and whether it is an installed package's."""
 
+    file: Path
     content: bytes
     installed: bool
+
+
+_hashed: dict[tuple[str, str], dict[str, OwnFile]] = {}
+"""Files of a user's own methods by name and digest, as this process has found them: a run's copies are of these."""
 
 
 def own_digests(names: Iterable[str]) -> dict[str, str]:
@@ -45,7 +51,10 @@ def own_digests(names: Iterable[str]) -> dict[str, str]:
     ConfigError
         The module is in an archive, so that no file can be looked at.
     """
-    return {name: own_digest(_files(name)) for name in sorted(set(names)) if is_own(name)}
+    files = {name: _files(name) for name in sorted(set(names)) if is_own(name)}
+    digests = {name: own_digest(found) for name, found in files.items()}
+    _hashed.update(((name, digest), files[name]) for name, digest in digests.items())
+    return digests
 
 
 def own_digest(files: Mapping[str, OwnFile]) -> str:
@@ -62,8 +71,11 @@ def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
     Content by path, relative to the folder from which they are imported. Left out are installed ones, those of more
     than `LARGEST` bytes, and files that have changed since: they are not what has run.
     """
-    found = {name: _files(name) for name, digest in digests.items() if digest and not is_entry_point(name)}
-    same = [files for name, files in found.items() if own_digest(files) == digests[name]]
+    methods = [item for item in digests.items() if item[1] and not is_entry_point(item[0])]
+    if unknown := [name for name, digest in methods if (name, digest) not in _hashed]:
+        own_digests(unknown)
+    files = [_hashed.get(method, {}) for method in methods]
+    same = [{path: file for path, file in one.items() if _content(file.file) == file.content} for one in files]
     return {path: content for path, content in _copied(same).items() if len(content) <= LARGEST}
 
 
@@ -89,15 +101,33 @@ def _files(name: str) -> dict[str, OwnFile]:
     Those of a library's class or function that it is an object of do not count.
     """
     named, defining = module_of(name), defining_module(name)
-    if isinstance(getattr(named, "__loader__", None), zipimport.zipimporter):
-        raise ConfigError(f"'{name}': {named.__file__} is in an archive, where no file can be looked at; unpack it")
+    if isinstance(_attribute(named, "__loader__"), zipimport.zipimporter):
+        raise ConfigError(
+            f"'{name}': {_attribute(named, '__file__')} is in an archive, where no file can be looked at; unpack it"
+        )
     importlib.invalidate_caches()
     found: dict[str, OwnFile] = {}
-    for module in (named, defining):
-        file = Path(getattr(module, "__file__", None) or "")
-        if module is not None and file != Path() and (module is named or not _is_installed(file)):
-            found |= imported_files(module.__name__, file)
+    for module, place in ((named, name.partition(":")[0]), (defining, getattr(defining, "__name__", ""))):
+        file = _attribute(module, "__file__")
+        if not file and module is named:  # a module may put another object in its place
+            file = dict(_modules(place)).get(place)
+        if file and (module is named or not _is_installed(Path(file))):
+            found |= imported_files(str(_attribute(module, "__name__") or place), Path(file))
     return found
+
+
+def _attribute(module: Any, name: str) -> Any:
+    """Attribute of a module that a user's own method is in; None if it has none, or raises anything for it."""
+    with suppress(Exception):
+        return getattr(module, name)
+    return None
+
+
+def _content(file: Path) -> bytes | None:
+    """What a file of a user's own holds; None if it cannot be read."""
+    with suppress(OSError):
+        return file.read_bytes()
+    return None
 
 
 def imported_files(name: str, file: Path) -> dict[str, OwnFile]:
@@ -113,25 +143,30 @@ def imported_files(name: str, file: Path) -> dict[str, OwnFile]:
     left = [(name, file)]
     while left:
         name, file = left.pop()
-        is_package = file.stem == "__init__"
+        is_package = _is_package(file)
         place = f"{name.replace('.', '/')}{'/__init__' if is_package else ''}{file.suffix}"
         if place in files or (_is_installed(file) if mine is None else file.resolve() not in mine):
             continue
-        with suppress(OSError):
-            state = file.stat()
-            files[place] = OwnFile(file.read_bytes(), installed)
-            package = name if is_package else name.rpartition(".")[0]
-            for wanted in (package, *_imported_names(file, state.st_mtime_ns, state.st_size, package)):
-                left += _modules(wanted)
+        content = _content(file)
+        if content is None:
+            continue
+        files[place] = OwnFile(file, content, installed)
+        package = name if is_package else name.rpartition(".")[0]
+        for wanted in (package, *_imported_names(content, package)):
+            left += _modules(wanted)
     return files
 
 
+def _is_package(file: Path) -> bool:
+    """Whether a file of a user's own is what runs when its package is imported, compiled or not."""
+    return file.name.partition(".")[0] == "__init__"
+
+
 @cache
-def _imported_names(file: Path, changed_ns: int, size: int, package: str) -> list[str]:
-    """Dotted names that a user's own file, in a package, imports; the last part may be no module. Kept while the file's
-    time and size are the same."""
+def _imported_names(content: bytes, package: str) -> list[str]:
+    """Dotted names that a user's own file, in a package, imports; the last part may be no module, or `*`."""
     try:
-        tree = ast.parse(file.read_bytes())
+        tree = ast.parse(content)
     except (SyntaxError, ValueError, RecursionError, MemoryError):  # whoever imports it says so
         return []
     names = []
@@ -161,23 +196,30 @@ def _modules(wanted: str) -> Iterator[tuple[str, Path]]:
     path: list[str] | None = None
     name = ""
     for part in filter(None, wanted.split(".")):
+        if part == "*":  # Python imports those submodules that the package names
+            for one in _attribute(sys.modules.get(name), "__all__") or ():
+                yield from _modules(f"{name}.{one}")
+            return
         name = f"{name}.{part}" if name else part
         spec = _spec(name, path)
-        if spec is None:
-            return
-        if spec.has_location and spec.origin:
+        if spec is not None and spec.has_location and spec.origin:
             yield name, Path(spec.origin)
-        if spec.submodule_search_locations is None:
+        folders = _attribute(sys.modules.get(name), "__path__") or (spec and spec.submodule_search_locations)
+        if not folders and path:  # a namespace within one, which nothing has imported yet
+            folders = [folder for one in path if os.path.isdir(folder := os.path.join(one, part))]
+        if not folders:
             return
-        path = list(spec.submodule_search_locations)
+        path = list(map(str, folders))
 
 
 def _spec(name: str, path: list[str] | None) -> ModuleSpec | None:
     """How Python has imported a module that a user's own method names, or would: nothing is imported."""
-    spec = getattr(sys.modules.get(name), "__spec__", None)
-    for finder in sys.meta_path if spec is None else ():
+    spec = _attribute(sys.modules.get(name), "__spec__")
+    for finder in () if isinstance(spec, ModuleSpec) else sys.meta_path:
         with suppress(Exception):  # a finder of any package may be among them
-            spec = spec or finder.find_spec(name, path, None)
+            spec = finder.find_spec(name, path, None)
+            if isinstance(spec, ModuleSpec):
+                break
     return spec if isinstance(spec, ModuleSpec) else None
 
 
@@ -192,7 +234,7 @@ def _is_installed(file: Path) -> bool:
 
 def _distribution_files(name: str, file: Path) -> set[Path]:
     """Files of the distribution that an installed module of a user's own is in; of its package if none names it."""
-    root = file.parents[name.count(".") + (file.stem == "__init__")]
+    root = file.parents[name.count(".") + _is_package(file)]
     place = file.relative_to(root)
     for record in sorted(root.glob("*.dist-info/RECORD")):
         text = record.read_text(encoding="utf-8", errors="replace")
