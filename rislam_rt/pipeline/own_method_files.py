@@ -107,7 +107,7 @@ def _files(name: str) -> dict[str, OwnFile]:
         )
     importlib.invalidate_caches()
     found: dict[str, OwnFile] = {}
-    for module, place in ((named, name.partition(":")[0]), (defining, getattr(defining, "__name__", ""))):
+    for module, place in ((named, name.partition(":")[0]), (defining, str(_attribute(defining, "__name__")))):
         file = _attribute(module, "__file__")
         if not file and module is named:  # a module may put another object in its place
             file = dict(_modules(place)).get(place)
