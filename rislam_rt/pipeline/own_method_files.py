@@ -16,7 +16,7 @@ from sysconfig import get_path
 from typing import Any, NamedTuple
 
 from rislam_rt.errors import ConfigError
-from rislam_rt.pipeline.own_methods import defining_module, is_entry_point, is_own, module_of
+from rislam_rt.pipeline.own_methods import defining_module, is_entry_point, is_own, module_of, place_of, text_of
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of this package."""
@@ -75,7 +75,8 @@ def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
     if unknown := [name for name, digest in methods if (name, digest) not in _hashed]:
         own_digests(unknown)
     files = [_hashed.get(method, {}) for method in methods]
-    same = [{path: file for path, file in one.items() if _content(file.file) == file.content} for one in files]
+    copied = [{path: file for path, file in one.items() if not file.installed} for one in files]
+    same = [{path: file for path, file in one.items() if _content(file.file) == file.content} for one in copied]
     return {path: content for path, content in _copied(same).items() if len(content) <= LARGEST}
 
 
@@ -100,19 +101,21 @@ def _files(name: str) -> dict[str, OwnFile]:
 
     Those of a library's class or function that it is an object of do not count.
     """
-    named, defining = module_of(name), defining_module(name)
+    defining, place = defining_module(name), place_of(name)
+    named = module_of(name)
     if isinstance(_attribute(named, "__loader__"), zipimport.zipimporter):
-        raise ConfigError(
-            f"'{name}': {_attribute(named, '__file__')} is in an archive, where no file can be looked at; unpack it"
-        )
+        at = text_of(named, "__file__")
+        raise ConfigError(f"'{name}': {at} is in an archive, where no file can be looked at; unpack it")
     importlib.invalidate_caches()
     found: dict[str, OwnFile] = {}
-    for module, place in ((named, name.partition(":")[0]), (defining, str(_attribute(defining, "__name__")))):
-        file = _attribute(module, "__file__")
-        if not file and module is named:  # a module may put another object in its place
-            file = dict(_modules(place)).get(place)
-        if file and (module is named or not _is_installed(Path(file))):
-            found |= imported_files(str(_attribute(module, "__name__") or place), Path(file))
+    # a module may put another object in its place
+    at = text_of(named, "__file__")
+    file = Path(at) if at else dict(_modules(place)).get(place)
+    if file is not None:
+        found |= imported_files(place, file)
+    at = text_of(defining, "__file__")
+    if at and defining is not named and not _is_installed(Path(at)):
+        found |= imported_files(text_of(defining, "__name__"), Path(at))
     return found
 
 
@@ -196,8 +199,8 @@ def _modules(wanted: str) -> Iterator[tuple[str, Path]]:
     path: list[str] | None = None
     name = ""
     for part in filter(None, wanted.split(".")):
-        if part == "*":  # Python imports those submodules that the package names
-            for one in _attribute(sys.modules.get(name), "__all__") or ():
+        if part == "*":  # the package may name any of its modules
+            for one in sorted({one.stem for folder in path or () for one in Path(folder).glob("[!_]*.py")}):
                 yield from _modules(f"{name}.{one}")
             return
         name = f"{name}.{part}" if name else part
@@ -209,7 +212,10 @@ def _modules(wanted: str) -> Iterator[tuple[str, Path]]:
             folders = [folder for one in path if os.path.isdir(folder := os.path.join(one, part))]
         if not folders:
             return
-        path = list(map(str, folders))
+        try:
+            path = list(map(str, folders))
+        except Exception:  # an object in a module's place may give anything for a path
+            return
 
 
 def _spec(name: str, path: list[str] | None) -> ModuleSpec | None:
@@ -237,9 +243,11 @@ def _distribution_files(name: str, file: Path) -> set[Path]:
     root = file.parents[name.count(".") + _is_package(file)]
     place = file.relative_to(root)
     for record in sorted(root.glob("*.dist-info/RECORD")):
-        text = record.read_text(encoding="utf-8", errors="replace")
-        places = {row[0] for row in csv.reader(text.splitlines()) if row} if place.as_posix() in text else set()
-        if place.as_posix() in places:
-            return {(root / one).resolve() for one in places}
+        with suppress(OSError, csv.Error):
+            text = record.read_text(encoding="utf-8", errors="replace")
+            places = {row[0] for row in csv.reader(text.splitlines()) if row} if place.as_posix() in text else set()
+            if place.as_posix() in places:
+                return {(root / one).resolve() for one in places}
     own = root / place.parts[0]
-    return {one.resolve() for one in own.rglob("*.py")} if own.is_dir() else {file.resolve()}
+    whole = own.rglob("*") if own.is_dir() else ()
+    return {file.resolve(), *(one.resolve() for one in whole if "__pycache__" not in one.parts)}

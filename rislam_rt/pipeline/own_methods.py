@@ -9,7 +9,7 @@ import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -23,6 +23,8 @@ from rislam_rt.model import DataSheet, Paths, RadioConfig, RisCode, Scene, SlamE
 
 GROUPS = ("rislam_rt.schemes", "rislam_rt.designers", "rislam_rt.estimators", "rislam_rt.channels")
 """Entry point groups under which an installed package offers schemes, designers, estimators and channels."""
+WRAPPERS = 20
+"""Most wrappers about a function of a user's own that are taken off to find where it is written."""
 _FORM = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -83,7 +85,7 @@ def own_method_errors(name: str) -> Iterator[None]:
         raise ConfigError(f"'{name}': {error}") from error
     except (Exception, SystemExit) as error:  # a user's method may raise anything
         frames = traceback.extract_tb(error.__traceback__)
-        files = {getattr(module, "__file__", None) for module in (module_of(name), defining_module(name))}
+        files = [text_of(module, "__file__") for module in (defining_module(name), module_of(name))]
         own = [frame for frame in frames if frame.filename in files]
         where = f" in line {own[-1].lineno} of {own[-1].filename}" if own else ""
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:200]
@@ -194,15 +196,34 @@ def _instance(name: str, found: type) -> Any:
         ) from None
 
 
-def module_of(name: str) -> ModuleType:
-    """Module that is named for a user's own method; it may import the method from another one."""
-    return import_module(name.partition(":")[0] if _FORM.fullmatch(name) else _offered()[name].module)
+def module_of(name: str) -> ModuleType | None:
+    """Module that is named for a user's own method, once it is loaded; it may import the method from another one."""
+    return sys.modules.get(place_of(name))
+
+
+def place_of(name: str) -> str:
+    """Dotted name of the module that is named for a user's own method."""
+    return name.partition(":")[0] if _FORM.fullmatch(name) else str(_offered()[name].module)
 
 
 def defining_module(name: str) -> ModuleType | None:
-    """Module in which a user's own method, or its class, is written; None if that is not known."""
-    found, met = load_own(name), list[Any]()
-    while (isinstance(found, partial) or hasattr(found, "__wrapped__")) and not any(found is one for one in met):
-        met.append(found)
-        found = found.func if isinstance(found, partial) else found.__wrapped__
-    return sys.modules.get(str(getattr(found, "__module__", "")))
+    """Module in which a user's own method, or its class, is written; None if that is not known.
+
+    Raises
+    ------
+    ConfigError
+        The method cannot be loaded.
+    """
+    found = load_own(name)
+    for _ in range(WRAPPERS):
+        with suppress(Exception):
+            found = found.func if isinstance(found, partial) else found.__wrapped__
+    return sys.modules.get(text_of(found, "__module__"))
+
+
+def text_of(thing: Any, name: str) -> str:
+    """Attribute of an object of a user's own that is a text; empty if it has none, or raises anything for it."""
+    with suppress(Exception):
+        found = getattr(thing, name)
+        return found if isinstance(found, str) else ""
+    return ""

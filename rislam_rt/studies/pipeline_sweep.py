@@ -221,14 +221,14 @@ def write_scores(scores: Sequence[SchemeScore], folder: Path) -> None:
 def _depends(path: Path, keys: tuple[str, ...]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
     """Function that checks the settings of a pipeline sweep's cell, and returns the scene's hash and versions that its
     result depends on."""
-    load, versions, code = cache(load_scene), library_versions(), code_digest()
+    load, versions, code, digests = cache(load_scene), library_versions(), code_digest(), cache(own_digests)
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         try:
             spec = build_spec(Table(path, dict(settings), ()), PipelineSpec, build_settings)
             room: Scene = load(room_beside(path.parent, str(spec.scene)))
             check_run(room, spec)
-            own = own_digests([*spec.schemes, spec.channel])
+            own = digests((*spec.schemes, spec.channel))
         except RislamError as error:
             if not keys:
                 raise

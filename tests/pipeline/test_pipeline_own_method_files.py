@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib.util
+import py_compile
 import sys
 import zipfile
 from pathlib import Path
@@ -188,11 +189,9 @@ def test_init_files_of_the_packages_that_it_is_in_count(place: Path, line: str) 
         before = own_digests([name])
 
 
-def test_what_lies_beside_this_package_takes_nothing_of_it(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    name = f"near_{place.parent.name}"
-    write(place, {f"{name}.py": "import rislam_rt\nfrom rislam_rt.model import Paths\n" + DESIGNER})
-    write(place, {"rislam_rt/__init__.py": "", "rislam_rt/model.py": "Paths = 1\n"})  # as in a checkout's root
-    assert set(own_sources(own_digests([f"{name}:design"]))) == {f"{name}.py"}
+def test_what_lies_beside_this_package_takes_nothing_of_it() -> None:
+    text = b"import rislam_rt\nfrom rislam_rt.model import Paths\nimport beside\n"
+    assert own_method_files._imported_names(text, "") == ["beside"]
 
 
 @pytest.mark.parametrize("site", ["site-packages", "dist-packages"])
@@ -262,9 +261,10 @@ def test_an_import_counts_in_whatever_block_it_stands(place: Path, place_of_it: 
 
 
 def test_a_long_chain_of_branches_is_read(place: Path) -> None:
-    chain = "if 0:\n    pass\n" + "".join(f"elif {k}:\n    pass\n" for k in range(2000))
-    write(place, {"mine.py": chain + DESIGNER})
-    assert set(imported_files("mine", place / "mine.py")) == {"mine.py"}
+    tool = f"tool_{place.parent.name}"
+    chain = "if 0:\n    pass\n" + "elif 0:\n    pass\n" * 1500 + f"else:\n    import {tool}\n"
+    write(place, {"mine.py": chain + DESIGNER, f"{tool}.py": ""})
+    assert set(imported_files("mine", place / "mine.py")) == {"mine.py", f"{tool}.py"}
 
 
 @pytest.mark.parametrize("line", ["from NS.t import LEVEL", "import NS.t", "from NS import t"])
@@ -315,12 +315,13 @@ def test_what_a_star_imports_counts(place: Path) -> None:
 
 @pytest.mark.parametrize("stand_in", [
     "class M:\n    def design(self, *args, rng):\n        return 0\nsys.modules[__name__] = M()\n",
+    "class M:\n    def __getattr__(self, name):\n        return 1\nsys.modules[__name__] = M()\n",
     "class M(dict):\n    def __getattr__(self, name):\n        return self[name]\nsys.modules[__name__] = M()\n",
 ])  # fmt: skip
 def test_a_module_with_another_object_in_its_place_counts(place: Path, stand_in: str) -> None:
     name, user = (f"{word}_{place.parent.name}" for word in ("standin", "user"))
     write(place, {f"{name}.py": "import sys\n" + stand_in, f"{user}.py": f"import {name}\n{DESIGNER}"})
-    for method in (f"{user}:design", *([f"{name}:design"] if "dict" not in stand_in else [])):
+    for method in (f"{user}:design", *([f"{name}:design"] if "def design" in stand_in else [])):
         assert f"{name}.py" in own_sources(own_digests([method]))
 
 
@@ -328,6 +329,8 @@ def test_a_module_with_another_object_in_its_place_counts(place: Path, stand_in:
     "def design(*args, rng):\n    return 0\ndesign.__wrapped__ = design\n",
     "class Proxy:\n    def __getattr__(self, name):\n        return self\n    def __call__(self):\n        return 0\n"
     "design = Proxy()\n",
+    "class P:\n    def __getattr__(self, name):\n        return P()\n    def __call__(self):\n        return 0\n"
+    "design = P()\n",
 ])  # fmt: skip
 def test_a_method_that_wraps_itself_ends(place: Path, text: str) -> None:
     name = f"round_{place.parent.name}"
@@ -364,6 +367,39 @@ def test_an_archive_is_refused_in_a_line(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.syspath_prepend(tmp_path / "packed.zip")
     with pytest.raises(ConfigError, match=f"'{name}:design': .*packed.zip.* is in an archive"):
         own_digests([f"{name}:design"])
+
+
+@pytest.mark.parametrize("text", [None, "raise SystemExit(3)\n", "1 / 0\n"])
+def test_what_cannot_be_loaded_is_one_line(place: Path, text: str | None) -> None:
+    name = f"broken_{place.parent.name}"
+    write(place, {} if text is None else {f"{name}.py": text})
+    for ask in (own_digests, large_sources):
+        with pytest.raises(ConfigError, match=f"'{name}:design'"):
+            ask([f"{name}:design"])
+
+
+def test_a_star_that_is_reached_late_counts_from_the_first(place: Path) -> None:
+    name, late, package = (f"{word}_{place.parent.name}" for word in ("user", "late", "starry"))
+    write(place, {f"{name}.py": DESIGNER.replace("    return", f"    import {late}\n    return")})
+    write(place, {f"{late}.py": f"from {package} import *\n", f"{package}/one.py": ""})
+    write(place, {f"{package}/__init__.py": "__all__ = ['one']\n"})
+    before = own_digests([f"{name}:design"])
+    load_own(f"{name}:design")(0, 0, 0, rng=0)
+    assert own_digests([f"{name}:design"]) == before
+    assert f"{package}/one.py" in own_sources(before)
+
+
+def test_an_installed_method_without_a_record_or_a_source_has_a_digest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site, name = tmp_path / "site-packages", f"compiled_{tmp_path.name}"
+    write(site, {f"{name}/__init__.py": "", f"{name}/m.py": DESIGNER})
+    py_compile.compile(str(site / name / "m.py"), cfile=str(site / name / "m.pyc"))
+    (site / name / "m.py").unlink()
+    monkeypatch.syspath_prepend(site)
+    before = own_digests([f"{name}.m:design"])
+    (site / name / "m.pyc").write_bytes(b"another")
+    assert own_digests([f"{name}.m:design"]) != before
 
 
 def test_the_hint_names_the_file_in_its_folder() -> None:
