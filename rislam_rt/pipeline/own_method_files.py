@@ -74,26 +74,25 @@ def own_sources(digests: Mapping[str, str]) -> dict[str, bytes]:
     methods = [item for item in digests.items() if item[1] and not is_entry_point(item[0])]
     if unknown := [name for name, digest in methods if (name, digest) not in _hashed]:
         own_digests(unknown)
-    files = [_hashed.get(method, {}) for method in methods]
-    copied = [{path: file for path, file in one.items() if not file.installed} for one in files]
-    same = [{path: file for path, file in one.items() if _content(file.file) == file.content} for one in copied]
-    return {path: content for path, content in _copied(same).items() if len(content) <= LARGEST}
+    found = _copied(_hashed.get(method, {}) for method in methods)
+    same = {path: file.content for path, file in found.items() if _content(file.file) == file.content}
+    return {path: content for path, content in same.items() if len(content) <= LARGEST}
 
 
 def large_sources(names: Iterable[str]) -> list[str]:
     """A line for each file of a user's own methods that is too large to be copied to a run's folder."""
     own = [_files(name) for name in sorted(set(names)) if is_own(name) and not is_entry_point(name)]
     return [
-        f"{path}: {len(content) / 1e6:.1f} MB, and a run's folder holds copies of at most {LARGEST / 1e6:g} MB; "
+        f"{path}: {len(file.content) / 1e6:.1f} MB, and a run's folder holds copies of at most {LARGEST / 1e6:g} MB; "
         "keep it to repeat the run"
-        for path, content in _copied(own).items()
-        if len(content) > LARGEST
+        for path, file in _copied(own).items()
+        if len(file.content) > LARGEST
     ]
 
 
-def _copied(methods: Iterable[Mapping[str, OwnFile]]) -> dict[str, bytes]:
-    """Content of the files of a user's own methods that a run's folder is to hold, by path."""
-    return {path: file.content for files in methods for path, file in files.items() if not file.installed}
+def _copied(methods: Iterable[Mapping[str, OwnFile]]) -> dict[str, OwnFile]:
+    """Files of a user's own methods that a run's folder is to hold, by path."""
+    return {path: file for files in methods for path, file in files.items() if not file.installed}
 
 
 def _files(name: str) -> dict[str, OwnFile]:

@@ -160,9 +160,8 @@ def read_timings(folder: Path) -> list[dict[str, Any]]:
     found = []
     with suppress(OSError):
         for line in (folder / "timings.jsonl").read_text(encoding="utf-8", errors="replace").splitlines():
-            with suppress(
-                ValueError, KeyError, TypeError, OverflowError, RecursionError
-            ):  # a killed run was writing it
+            # a line that a killed run was writing, or that is none of ours
+            with suppress(ValueError, KeyError, TypeError, OverflowError, RecursionError):
                 entry = json.loads(line)
                 seconds = float(entry["seconds"])
                 if 0.0 <= seconds < math.inf:

@@ -84,27 +84,30 @@ def check_swept(spec: SweptSpec) -> None:
 
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
     """Function that checks a cell's settings, and returns all that its result depends on: settings, scene, versions."""
-    load, versions, code = cache(load_scene), library_versions(), code_digest()
+    load, versions, code, digests = cache(load_scene), library_versions(), code_digest(), cache(own_digests)
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         spec = cell_spec({**settings, **local}, pipeline)
         room = load(room_beside(pipeline.parent, str(settings["scene"])))
-        found = checked_settings(room, spec, spec.schemes, f"{pipeline}: {settings['scene']}")
+        found = checked_settings(room, spec, spec.schemes, f"{pipeline}: {settings['scene']}", digests)
         return {**found, "scene_sha256": room.digest, "versions": versions, "code": code}
 
     return depends
 
 
-def checked_settings(room: Scene, spec: PipelineSpec, schemes: Sequence[str], place: str) -> dict[str, Any]:
+def checked_settings(
+    room: Scene, spec: PipelineSpec, schemes: Sequence[str], place: str,
+    digests: Callable[[tuple[str, ...]], dict[str, str]],
+) -> dict[str, Any]:  # fmt: skip
     """Settings that a cell's result depends on, and the digests of a user's own methods, after a check with the room.
 
-    `schemes` are those that run there; `place` begins an error's line.
+    `schemes` are those that run there; `place` begins an error's line; `digests` are `own_digests`, kept for a sweep.
     """
     try:
         check_run(room, spec.model_copy(update={"schemes": list(schemes)}))
     except RislamError as error:
         raise type(error)(f"{place}: {error}") from None
-    own = own_digests([*spec.schemes, spec.channel])
+    own = digests((*spec.schemes, spec.channel))
     config = spec.model_dump(mode="json", exclude={"name", "description", "scene", "seed"})
     return {"config": config} | ({"own": own} if own else {})
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rislam_rt.errors import StoreError
+from rislam_rt.pipeline.own_method_files import own_digests
 from rislam_rt.pipeline.run import library_versions
 from rislam_rt.pipeline.store.identity import code_digest
 from rislam_rt.scene.random_rooms import draw_room
@@ -53,12 +54,12 @@ def build_unseen(spec: UnseenSpec, pipeline: Path, data: Path) -> Sweep:
 def _depends(pipeline: Path, local: Mapping[str, Any]) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
     """Function that checks the settings of a cell in unseen rooms, and returns all that its result depends on:
     settings, room, code."""
-    draw, versions, code = cache(draw_room), library_versions(), code_digest()
+    draw, versions, code, digests = cache(draw_room), library_versions(), code_digest(), cache(own_digests)
 
     def depends(settings: Mapping[str, Any]) -> dict[str, Any]:
         spec, room = cell_spec({**settings, **local}, pipeline), draw(int(settings["room"]), settings["ways"])
         here = [scheme_here(name, room) for name in spec.schemes]
-        found = checked_settings(room.scene, spec, here, f"{pipeline}: room {settings['room']}")
+        found = checked_settings(room.scene, spec, here, f"{pipeline}: room {settings['room']}", digests)
         return {**found, "room_sha256": room.scene.digest, "versions": versions, "code": code}
 
     return depends
