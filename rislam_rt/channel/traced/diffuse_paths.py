@@ -167,7 +167,7 @@ CELLS = 2.0
 
 
 def as_paths(extras: DiffusePaths, trajectory: Trajectory, radio: RadioConfig) -> Paths:
-    """Sum scattered and diffracted paths within half a resolution cell into one path each, cycle by cycle.
+    """Sum diffuse paths (scattered and diffracted) within half a resolution cell into one path each, cycle by cycle.
 
     These paths have no identity: a column means nothing from one cycle to the next.
 

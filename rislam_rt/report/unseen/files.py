@@ -60,7 +60,7 @@ def unseen_content(runs: Mapping[str, Sequence[SchemeRun]], timings: Sequence[Ma
 
 
 def _brief(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Score card of a class of unseen rooms reduced to what the page shows, numbers with six digits."""
+    """Score card of a class of unseen rooms as the page's data file keeps it: what is shown, with six digits."""
     kept = {name: value for name, value in entry.items() if name in SHOWN}
     return {name: float(_six(value)) if isinstance(value, float) else value for name, value in kept.items()}
 

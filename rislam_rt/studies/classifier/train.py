@@ -74,7 +74,7 @@ def loss_and_slope(
 
 
 def _unpack(flat: Floats, shapes: list[tuple[int, ...]]) -> list[Floats]:
-    """Weight matrices and biases of the trained network's layers from one vector."""
+    """Weight matrices and biases of the network's layers from the one vector that training optimises."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])
     return [part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), shapes, strict=True)]
 

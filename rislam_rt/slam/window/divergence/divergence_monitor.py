@@ -18,10 +18,8 @@ from rislam_rt.slam.window.cycle_association import CycleAssociation
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.motion import egomotion
 from rislam_rt.slam.window.motion.length_rates import Rates
-from rislam_rt.slam.window.smoother import window_gaussian
-from rislam_rt.slam.window.smoother.cholesky import inverse
 from rislam_rt.slam.window.smoother.motion_basis import HEAD, TURN, rotation
-from rislam_rt.slam.window.smoother.window_gaussian import Quadratic, Window
+from rislam_rt.slam.window.smoother.window_gaussian import Window
 
 CELL = 0.01
 """Distance [m] within which two positions are one: as far as a cycle's returns tell."""
@@ -143,48 +141,6 @@ def shifted(window: Window, by: Floats) -> Window:
     accel[-2, :3] += by / size
     accel[-1, :3] -= rotation(window.velocity_turn[-1]) @ by / size * dt[0] / dt[1]
     return window._replace(accel=accel)
-
-
-def after_jump(window: Window, by: Floats) -> Window:
-    """Sliding window after the agent's jump by `by` (3,) [m]: the last pose alone, uncertain by a second's walk;
-    velocity and map as they were."""
-    while window.num_poses > 1:
-        window = window_gaussian.slide(window)
-    head, size = window.head.copy(), len(window.head)
-    head[:3] += by
-    covariance = inverse(window.prior.hessian)
-    covariance[[0, 1], [0, 1]] += CONSTANTS.walk**2
-    slots = window.slots._replace(middle=np.concatenate([head[[0, 1, 2, 6]], head[HEAD:]])[None])
-    prior = Quadratic(inverse(covariance), np.zeros(size), head)
-    turn = prior.hessian @ inverse(window.prior.hessian)
-    noise = turn @ window.noise @ turn.T
-    return window._replace(head=head, prior=prior, noise=noise, slots=slots, covariance=covariance)
-
-
-def with_velocity(window: Window, velocity: Floats, std: float) -> Window:
-    """Sliding window with another horizontal velocity at its start, before any birth, within `std` [m/s] or the told
-    deviation, whichever is larger."""
-    head, hessian = window.head.copy(), window.prior.hessian.copy()
-    # the tracks will be asked again, as features: their word is not to count twice
-    information, axes = np.linalg.eigh(hessian[3:5, 3:5])
-    head[3:5], hessian[3:5, 3:5] = velocity[:2], (axes * np.minimum(information, std**-2.0)) @ axes.T
-    return _begun(window, head, hessian)
-
-
-def with_free_compass(window: Window, std: float) -> Window:
-    """Sliding window whose compass offset is estimated from now on, before any birth: within `std` [rad], with the
-    least rate of turn where none was estimated."""
-    hessian, still = window.prior.hessian.copy(), ((0, 0), (0, int(not window.turns)))
-    hessian[6, 6] = std**-2.0
-    precision = np.pad(window.precision, still, constant_values=CONSTANTS.calmest**-2.0)
-    window = window._replace(accel=np.pad(window.accel, still), variance=np.pad(window.variance, still))
-    # directions hang on the heading from now on: no rates of lengths with them
-    return _begun(window._replace(precision=precision, rates=None), window.head, hessian)
-
-
-def _begun(window: Window, head: Floats, hessian: Floats) -> Window:
-    """Sliding window with another head and Hessian of its prior, solved anew."""
-    return window_gaussian.solve(window._replace(head=head, prior=Quadratic(hessian, np.zeros(len(head)), head)))
 
 
 def is_lost(log_odds: float) -> bool:

@@ -156,7 +156,8 @@ def restricted(told: Attitude, count: int) -> Attitude:
 
 
 def _eliminated(told: Attitude, keep: slice, out: slice, prior: Floats) -> Attitude:
-    """What is `told` of the numbers `keep` with those of `out`, whose prior precisions are given, eliminated."""
+    """What is `told` of the nuisances `keep`, rotation or heave, with the others, `out`, of these prior precisions,
+    eliminated."""
     cross = told.information[:, keep, out]
     gain = cross @ np.linalg.inv(told.information[:, out, out] + np.diag(prior))
     information = told.information[:, keep, keep] - gain @ np.swapaxes(cross, 1, 2)

@@ -9,7 +9,7 @@ from rislam_rt.model import RadioConfig
 from rislam_rt.slam.model_constants import CONSTANTS
 from rislam_rt.slam.predicted_returns import TX
 from rislam_rt.slam.window.births.track_classification import TrackDecision, is_clear
-from rislam_rt.slam.window.divergence import divergence_monitor
+from rislam_rt.slam.window.divergence import divergence_monitor, recovery
 from rislam_rt.slam.window.landmarks.path_forms import UNKNOWN
 from rislam_rt.slam.window.landmarks.ris_identification import unknown
 from rislam_rt.slam.window.measurement_log import Log
@@ -301,7 +301,7 @@ def test_without_wall_returns_they_tell_no_jump(use_vt, told):
 def test_after_a_jump_all_but_the_place_is_as_it_was():
     window, by = _window(np.random.default_rng(5)), np.array([0.7, -0.4, 0.0])
     mean, covariance = window_gaussian.now(window)
-    after, spread = window_gaussian.now(divergence_monitor.after_jump(window, by))
+    after, spread = window_gaussian.now(recovery.window_after_jump(window, by))
     np.testing.assert_allclose(after, mean + np.concatenate([by, np.zeros(len(mean) - 3)]), atol=1e-6)
     wide = covariance.copy()
     wide[[0, 1], [0, 1]] += CONSTANTS.walk**2
@@ -352,7 +352,7 @@ def test_a_compass_that_is_found_wrong_takes_the_rates_of_its_directions_with_it
     many, none = window.num_poses, np.zeros((3, 3))
     rates = RateFactor(np.zeros((many, 3, 3)), np.zeros((many, 3, 2)), np.zeros((many, 3)),
                        window_gaussian.poses(window)[:, :3], none, none[0])  # fmt: skip
-    found = divergence_monitor.with_free_compass(window_gaussian.solve(window._replace(rates=rates)), 0.1)
+    found = recovery.with_free_compass(window_gaussian.solve(window._replace(rates=rates)), 0.1)
     assert found.turns
     assert found.rates is None
     assert np.isfinite(found.head).all()
