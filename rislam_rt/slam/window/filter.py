@@ -33,6 +33,7 @@ from rislam_rt.slam.window.measurement_log import Residuals, empty_log, reweigh_
 from rislam_rt.slam.window.motion import coordinated_turn, manoeuvres, motion_learning
 from rislam_rt.slam.window.motion.track_rates import with_rates
 from rislam_rt.slam.window.relinearisation import level, relinearise
+from rislam_rt.slam.window.reported_threshold import sensor_of_reports
 from rislam_rt.slam.window.smoother import attitude, heave, motion, window_gaussian
 from rislam_rt.slam.window.smoother.attitude import Attitude
 from rislam_rt.slam.window.smoother.marginals import prediction_variance
@@ -72,7 +73,7 @@ def init(
         np.array([start.heading]), np.zeros((1, 3)), np.zeros((1, 2 + (not turns), 2 + (not turns))),
         attitude.first_levels(compass=not turns), heave_levels, height,
         start.position_std * free, frame, scene, CONSTANTS.log_lost, False, 0.0,
-        (None,), np.zeros((0, 3)),
+        (None,), np.zeros((0, 3)), sensor, (),
     )  # fmt: skip
 
 
@@ -93,8 +94,10 @@ def step(
         heading += state.turned
     turn, restarted = heading - float(state.heading[-1]), state.lost_log_odds == 0.0
     state = manoeuvres.with_climb(manoeuvres.with_manoeuvre(with_rates(_move(state, dt, heading))))
-    state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :])
-    scene = state.scene
+    snr = state.scene.radio.integrated_snr(measurement.amplitude)
+    reported = (*state.reported, snr)[-CONSTANTS.window :]
+    scene = state.scene._replace(sensor=sensor_of_reports(state.sensor, reported))
+    state = state._replace(codes=(*state.codes, code)[-state.window.num_poses :], scene=scene, reported=reported)
     heard = components_to_explain(measurement, scene)
     observed = heard.observed
     strangers = stranger_density(observed, scene.sensor, max(config.new_density, unexplained(state, observed)))

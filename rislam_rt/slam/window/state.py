@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rislam_rt.arrays import Floats
-from rislam_rt.model import RisCode
+from rislam_rt.model import RisCode, SensorModel
 from rislam_rt.slam.config import SlamConfig
 from rislam_rt.slam.window.landmarks.landmark_table import WindowTable
 from rislam_rt.slam.window.landmarks.landmark_update import VisibilityObservations
@@ -65,7 +65,7 @@ class WindowState(NamedTuple):
     frame: StartFrame
     """Frame of the poses and the map, which may be turned with the start (see `start_frame`)."""
     scene: KnownEnvironment
-    """What the filter is told beforehand: body, radio, sensor, panels."""
+    """What the filter is told beforehand: body, radio, sensor (but see `sensor`), panels."""
     lost_log_odds: float
     """Log odds that the agent is lost: that the map explains nothing of what is heard (see `divergence`)."""
     start_was_wrong: bool
@@ -76,6 +76,10 @@ class WindowState(NamedTuple):
     """(K,) phase codes of the window's cycles, as the agent believes they were applied."""
     passed: Floats
     """(P, 3) [m] smoothed positions of the poses that have left the window."""
+    sensor: SensorModel
+    """The sensor model as it was told; that of `scene` has the detection threshold that reports show."""
+    reported: tuple[Floats, ...]
+    """SNRs (M,) of the components reported in each of the last cycles, as many as a window has."""
 
     @property
     def attitude_variance(self) -> Floats:
