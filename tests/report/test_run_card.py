@@ -35,3 +35,10 @@ def test_cells() -> None:
     assert rows["CPU time of the estimator a cycle [ms]"] == ["31.4", "-"]
     lost = run_card.card_rows({"random": {**SCORES, "panel_found": False, "panel_delay_s": None}})
     assert (lost["panel found"], lost["delay of the panel [s]"]) == (["no"], ["-"])
+
+
+def test_a_run_without_a_panel_has_no_row_of_it() -> None:
+    none = {**SCORES, "panel_heard": None, "panel_found": None, "panel_delay_s": None}
+    assert not [label for label in run_card.card_rows({"off": none}) if label in run_card.OF_PANEL]
+    rows = run_card.card_rows({"random": SCORES, "off": none})
+    assert [rows[label] for label in run_card.OF_PANEL] == [["yes", "-"], ["9.20", "-"]]

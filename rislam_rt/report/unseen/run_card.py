@@ -27,8 +27,11 @@ def print_run_card(title: str, scores: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def card_rows(scores: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-    """Cells of a run's score card by the label of their row, one a scheme."""
-    return {label: [show(entry) for entry in scores.values()] for label, show in ROWS.items()}
+    """Cells of a run's score card by the label of their row, one a scheme; no row of the panel where no scheme was told
+    of one."""
+    told = any(entry["panel_heard"] is not None for entry in scores.values())
+    rows = {label: show for label, show in ROWS.items() if told or label not in OF_PANEL}
+    return {label: [show(entry) for entry in scores.values()] for label, show in rows.items()}
 
 
 def _value(name: str, scale: float = 1.0, digits: int = 2) -> Show:
@@ -52,6 +55,15 @@ def _yes(name: str) -> Show:
     return lambda entry: "yes" if entry[name] else "no"
 
 
+def _panel(entry: Mapping[str, Any]) -> str:
+    """Cell of a run's card: whether the panel was found, `-` of a scheme that was told of none."""
+    if entry["panel_heard"] is None:
+        return NOTHING
+    return _yes("panel_found")(entry) if entry["panel_heard"] else "not heard"
+
+
+OF_PANEL = ("panel found", "delay of the panel [s]")
+"""Labels of the rows of a run's card that a run without a panel does not have."""
 ROWS: dict[str, Show] = {
     "RMSE [mm]": _value("rmse_m", MILLI, 1),
     "RMSE / bound": _value("ratio"),
@@ -77,8 +89,8 @@ ROWS: dict[str, Show] = {
     "landmarks (with panel) found of those heard": _of("points_found", "points_heard"),
     "error of those found [mm]": _value("point_m", MILLI, 1),
     "delay of landmarks [s]": _over_time("point_delay_s"),
-    "panel found": lambda entry: _yes("panel_found")(entry) if entry["panel_heard"] else "not heard",
-    "delay of the panel [s]": _over_time("panel_delay_s"),
+    OF_PANEL[0]: _panel,
+    OF_PANEL[1]: _over_time("panel_delay_s"),
     "ghost walls": _value("ghost_walls", digits=0),
     "ghost landmarks": _value("ghost_points", digits=0),
     "GOSPA [m]": _value("gospa_m"),

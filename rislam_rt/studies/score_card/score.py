@@ -129,9 +129,11 @@ def panel_scores(truth: Truth, maps: list[MapEstimate], inputs: Inputs, told: Fl
 
     The map has it where the landmark that it holds for it lies within `NEAR_POINT` of it. A second landmark in the same
     place, which may be nearer, does not change that. Of several panels all that are detectable have to be found; the
-    delay is their median.
+    delay is their median. None where there is none, or the estimator was told of none.
     """
     count = int(truth.panel) if inputs.panel is not None else 0  # True is one
+    if not count:
+        return dict.fromkeys(("panel_heard", "panel_found", "panel_delay_s"))
     first_panel = len(truth.landmark) - count
     there, audible = truth.landmark[first_panel:], truth.landmark_audible[:, first_panel:]
     heard = heard_long(audible, inputs.time)

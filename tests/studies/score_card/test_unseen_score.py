@@ -242,7 +242,7 @@ def test_the_last_map_alone_is_scored_alike_and_tells_nothing_of_the_time_before
 def test_without_a_panel_there_is_none_to_find() -> None:
     scores = score_run(truth(), inputs()._replace(panel=None), answers())
     assert scores["points_heard"] == 1
-    assert not scores["panel_heard"]
+    assert (scores["panel_heard"], scores["panel_found"], scores["panel_delay_s"]) == (None, None, None)
     assert scores["ghost_points"] == 1
 
 
