@@ -21,21 +21,28 @@ THICKNESS = {
 glass is 4 mm: a nominal thickness of float glass (EN 572-2), the pane of a common double-glazed window."""
 
 WORDS = {
-    "metal": ("metal", "steel", "iron", "aluminium", "aluminum", "alu", "copper", "chrome", "metall", "stahl"),
-    "glass": ("glass", "window", "glas", "fenster", "mirror", "spiegel"),
+    "metal": (
+        "metal", "metallic", "steel", "iron", "aluminium", "aluminum", "alu", "copper", "brass", "chrome", "metall",
+        "stahl", "mirror", "spiegel",
+    ),
+    "glass": ("glass", "window", "glas", "fenster"),
+    "vinyl_tile": ("vinyl", "linoleum"),
+    "carpet_tile": ("carpet", "teppich"),
     "brick": ("brick", "masonry", "ziegel"),
-    "plasterboard": ("plasterboard", "drywall", "gypsum", "plaster", "gips"),
-    "ceiling_board": ("ceiling_board", "ceilingboard", "ceiling_tile", "acoustic"),
+    "plasterboard": (
+        "plasterboard", "drywall", "dry_wall", "sheetrock", "gypsum", "plaster", "gips", "gipskarton",
+    ),
+    "ceiling_board": ("ceiling_board", "ceilingboard", "ceiling_tile", "ceiling_tiles", "acoustic"),
     "chipboard": ("chipboard", "mdf", "particleboard", "laminate"),
     "plywood": ("plywood",),
     "floorboard": ("floorboard", "parquet", "parkett", "planks"),
-    "wood": ("wood", "oak", "pine", "timber", "holz", "walnut", "door"),
+    "wood": ("wood", "wooden", "hardwood", "oak", "pine", "timber", "holz", "walnut", "door"),
     "marble": ("marble", "granite", "marmor", "tile", "tiles"),
     "concrete": ("concrete", "cement", "beton", "stone"),
-    "wet_ground": ("wet_ground",),
     "medium_dry_ground": ("ground", "soil", "grass"),
-}
-"""Words of a material's or node's name and the ITU-R P.2040 material that they stand for, the first that is found."""
+}  # fmt: skip
+"""Words of a material's or node's name and the ITU-R P.2040 material that they stand for, the first that is found. A
+mirror is the silver on its back. Linoleum, which P.2040 has not, is a floor covering like vinyl."""
 
 BOARDS = ("floorboard", "plywood", "chipboard")
 """Materials of timber, for which wood stands in at a carrier for which ITU-R P.2040 does not specify them."""
@@ -150,9 +157,6 @@ class MaterialAssignment:
 
 def itu_by_word(name: str) -> str | None:
     """ITU material that a word in the name of an imported material or node stands for, `Oak.003` for wood."""
-    plain = re.sub(r"[^a-z]+", "_", name.lower()).strip("_")
-    for itu in get_args(ItuMaterial):
-        if f"_{itu}_" in f"_{plain}_":
-            return str(itu)
-    words = set(plain.split("_"))
-    return next((itu for itu, known in WORDS.items() if words & set(known)), None)
+    plain = f"_{re.sub(r'[^a-z]+', '_', name.lower())}_"
+    known = [*((itu, (itu,)) for itu in get_args(ItuMaterial)), *WORDS.items()]
+    return next((itu for itu, words in known if any(f"_{word}_" in plain for word in words)), None)

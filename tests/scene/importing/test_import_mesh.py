@@ -182,7 +182,10 @@ def test_a_guessed_material_is_specified_at_the_carrier(tmp_path: Path) -> None:
 
 def test_names_speak_of_materials() -> None:
     names = {"Oak.003": "wood", "itu_concrete": "concrete", "Window Glass": "glass", "Stahl-blank": "metal",
-             "M_Ceiling_Board": "ceiling_board", "Material.004": None, "": None}  # fmt: skip
+             "M_Ceiling_Board": "ceiling_board", "Material.004": None, "": None, "wooden chest": "wood",
+             "floor vinyl": "vinyl_tile", "Carpet.001": "carpet_tile", "linoleum": "vinyl_tile", "wardrobe": None,
+             "Dry wall": "plasterboard", "Ceiling tiles": "ceiling_board", "ceiling tile": "ceiling_board",
+             "bath mirror": "metal"}  # fmt: skip
     assert {name: itu_by_word(name) for name in names} == names
     assert set(THICKNESS) == set(get_args(ItuMaterial))
     assert parse_material("itu:glass") == {"itu": "glass", "thickness_m": 0.004}
